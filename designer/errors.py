@@ -1,0 +1,55 @@
+"""What can go wrong, and the exit status that says so.
+
+Every error that a user can cause or meet is one of these; the command line turns it into a
+message on standard error and an exit status (docs/contract.md): 2 for bad input, 3 for a missing
+environment. Anything else that escapes is a defect of the tool.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class DesignerError(Exception):
+    """Base of the errors that the tool raises on purpose; ``exit_status`` is what a shell sees."""
+
+    exit_status = 1
+
+
+class InputError(DesignerError):
+    """Bad input: names the file, the field, what was found and what was expected.
+
+    Parameters
+    ----------
+    file : path or short name of where the input came from (``None`` for a function argument).
+    field : dotted name of the offending field, such as ``model.k0`` or ``response[2].omega``.
+    found : what stands there now.
+    expected : what would have been accepted, in words.
+    """
+
+    exit_status = 2
+
+    def __init__(self, file: Path | str | None, field: str, found: object, expected: str) -> None:
+        self.file = None if file is None else str(file)
+        self.field = field
+        self.found = found
+        self.expected = expected
+        where = f"{self.file}: " if self.file else ""
+        shown = found if isinstance(found, str) else repr(found)
+        super().__init__(f"{where}{field}: found {_clip(shown)}, expected {expected}")
+
+
+class Unreachable(InputError):
+    """The target cannot be met with this catalogue: names the condition that binds."""
+
+
+class EnvironmentMissing(DesignerError):
+    """A program or library that the work needs is not on this machine; says what to install."""
+
+    exit_status = 3
+
+
+def _clip(text: str, limit: int = 200) -> str:
+    """One line, printable, at most ``limit`` characters: foreign text stays harmless."""
+    flat = "".join(ch if ch.isprintable() else "?" for ch in text)
+    return flat if len(flat) <= limit else flat[: limit - 1] + "…"

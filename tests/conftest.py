@@ -1,0 +1,55 @@
+"""What all tests share: no skipping under ``--no-skips``, Hypothesis profiles, no display."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+
+# Before anything imports matplotlib.pyplot: tests run without a display.
+os.environ["MPLBACKEND"] = "Agg"
+
+import pytest
+from hypothesis import settings
+
+# The same examples in each run: a failure that one run shows, the next shows too.
+settings.register_profile("ci", deadline=None, derandomize=True)
+# New examples in each run, to look for failures: HYPOTHESIS_PROFILE=explore.
+settings.register_profile("explore", deadline=None, max_examples=1000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--no-skips",
+        action="store_true",
+        help="count a skipped test or module as failed (an expected failure stays what it is)",
+    )
+
+
+def _fail_if_skipped(report: pytest.TestReport | pytest.CollectReport) -> None:
+    # pytest reports an expected failure as skipped too, with the attribute wasxfail.
+    if not report.skipped or hasattr(report, "wasxfail"):
+        return
+    reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+    report.outcome = "failed"
+    report.longrepr = f"under --no-skips: {reason}"
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if item.config.getoption("--no-skips"):
+        _fail_if_skipped(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    report = yield
+    if collector.config.getoption("--no-skips"):
+        _fail_if_skipped(report)
+    return report
