@@ -1,0 +1,186 @@
+"""What a catalogue holds: part families, op-amps, diodes, references, and their figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from designer.quantity import encode_value
+
+Kind = Literal["resistor", "capacitor"]
+
+UNITS: dict[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
+
+PRICE_CLASSES = (0.01, 0.05, 0.25, 1.0, 5.0, math.inf)
+"""Upper ends, in euro apiece at a hundred pieces, of the price classes 1 to 6."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a data sheet: minimum, typical, maximum, where it stands, or that it is assumed.
+
+    ``assumed`` marks what no data sheet gives, or what could not be compared with it.
+    """
+
+    min: float | None
+    typ: float | None
+    max: float | None
+    source: str
+    assumed: bool = False
+
+    @property
+    def nominal(self) -> float:
+        """The typical value; where none is given, the bound that is."""
+        for value in (self.typ, self.max, self.min):
+            if value is not None:
+                return value
+        raise AssertionError("a figure has at least one value")
+
+
+@dataclass(frozen=True)
+class Section:
+    """One amplifier of a package, with its pin numbers."""
+
+    name: str
+    inverting: str
+    noninverting: str
+    output: str
+
+
+@dataclass(frozen=True)
+class OpAmp:
+    """An op-amp package. Voltages and currents are those at a supply of ± ``rated_supply``.
+
+    supply [V] per rail; swing, saturation [V] about ground; offset [V]; bias [A]; gain [V/V];
+    gbw [Hz]; slew [V/s]; output_current [A]; output_resistance [Ω], open loop; common_mode [V], its
+    lower and upper end as min and max; supply_current [A] per section; noise [V/√Hz] at 1 kHz.
+    ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
+    offsets from, and where it is cut. ``supply_pins``: positive, negative.
+    """
+
+    name: str
+    manufacturer: str
+    part_number: str
+    pins: tuple[Section, ...]
+    supply_pins: tuple[str, str]
+    rated_supply: float
+    supply: Figure
+    swing: Figure
+    saturation: Figure
+    offset: Figure
+    bias: Figure
+    gain: Figure
+    gbw: Figure
+    slew: Figure
+    output_current: Figure
+    output_resistance: Figure
+    common_mode: Figure
+    supply_current: Figure
+    noise: Figure
+    offset_sigma: float
+    offset_limit: float
+    price: int
+    footprint: str
+    sources: tuple[str, ...]
+
+    @property
+    def sections(self) -> int:
+        """Number of amplifiers in the package."""
+        return len(self.pins)
+
+    def saturation_at(self, supply: float) -> float:
+        """Typical output limit [V] at rails of ± ``supply``: the distance to the rail stays."""
+        return supply - (self.rated_supply - self.saturation.nominal)
+
+
+@dataclass(frozen=True)
+class Diode:
+    """A diode: forward_voltage [V], reverse_current [A], capacitance [F], recovery [s]."""
+
+    name: str
+    manufacturer: str
+    part_number: str
+    forward_voltage: Figure
+    reverse_current: Figure
+    capacitance: Figure
+    recovery: Figure
+    reverse_voltage: Figure
+    price: int
+    footprint: str
+    sources: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in."""
+
+    name: str
+    manufacturer: str
+    part_number: str
+    voltage: float
+    grade: float
+    temperature_coefficient: float
+    current: Figure
+    price: int
+    footprint: str
+    sources: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Rating:
+    """What a part stands: power [W], voltage [V]; None where it does not apply."""
+
+    power: float | None
+    voltage: float | None
+
+
+@dataclass(frozen=True)
+class PartNumber:
+    """A rule: prefix, the value in a named code (``quantity.VALUE_CODES``), suffix."""
+
+    prefix: str
+    code: str
+    suffix: str
+
+    def of(self, value: float) -> str:
+        """The part number of a value; ValueError for a value that the code cannot spell."""
+        return f"{self.prefix}{encode_value(self.code, value)}{self.suffix}"
+
+
+@dataclass(frozen=True)
+class PartFamily:
+    """Parts of one kind, grade and case that differ in their value.
+
+    ``values`` [Ω or F] are those that can be bought, ascending; temperature_coefficient [1/K] is a
+    magnitude; ``assumed`` says in words what could not be compared with a data sheet.
+    """
+
+    name: str
+    kind: Kind
+    manufacturer: str
+    series: tuple[str, ...]
+    range: tuple[float, float]
+    grade: float
+    temperature_coefficient: float
+    rating: Rating
+    footprint: str
+    dielectric: str
+    price: int
+    part_number: PartNumber
+    sources: tuple[str, ...]
+    assumed: tuple[str, ...]
+    values: tuple[float, ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class PartChoice:
+    """A part that can be bought: a value of a family."""
+
+    family: PartFamily
+    value: float
+    part_number: str
+    manufacturer: str
+    footprint: str
+    rating: Rating
+    price: int

@@ -1,0 +1,451 @@
+"""Model files: TOML, ``format = 1`` (docs/contract.md).
+
+    format = 1
+    [model]                  # or [mechanical], in SI units
+    m = 0.5
+    …
+    [[response]]
+    omega = 0.85
+    expect = "1-2-2"
+    [circuit]
+    opamp = "TL074C"
+
+Whatever is wrong with a file ends in one ``InputError`` that names the file, the field, what was
+found and what was expected; nothing is read by half.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal, NoReturn
+
+from pydantic import BaseModel, Field
+
+from designer.errors import InputError
+from designer.eseries import SERIES
+from designer.model import Dimensionless, Mechanical, Sides
+from designer.schema import (
+    STRICT,
+    Accepts,
+    checked,
+    choice,
+    did_you_mean,
+    exactly,
+    flag,
+    line,
+    number,
+    parse_toml,
+    shown,
+    span,
+)
+
+Twin = Literal["either", "exact"]
+DeadZone = Literal["saturation", "rectifier"]
+Objective = Literal["match", "yield"]
+
+MAX_BYTES = 1_000_000
+"""A model file is a page of text; anything larger is something else."""
+
+MAX_PERIODS = 16
+"""Largest n of an n-p-q response (docs/definitions.md)."""
+
+_EXPECT = re.compile(r"([1-9]\d?)-(0|[1-9]\d{0,3})-(0|[1-9]\d{0,3})", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Expect:
+    """An n-p-q response: n forcing periods, p impacts at +b and q at -b in that time."""
+
+    n: int
+    p: int
+    q: int
+
+    def __str__(self) -> str:
+        return f"{self.n}-{self.p}-{self.q}"
+
+    @classmethod
+    def parse(cls, text: str) -> Expect:
+        """Read "1-2-2"; ValueError unless n is 1 to 16 and p and q are integers >= 0."""
+        match = _EXPECT.fullmatch(text)
+        if not match or int(match[1]) > MAX_PERIODS:
+            raise ValueError(f"not n-p-q with n from 1 to {MAX_PERIODS}")
+        return cls(int(match[1]), int(match[2]), int(match[3]))
+
+    def accepts(self, n: int, p: int, q: int, twin_exact: bool = False) -> bool:
+        """Whether n-p-q is this response, or its mirror twin n-q-p unless ``twin_exact``."""
+        if (n, p, q) == (self.n, self.p, self.q):
+            return True
+        return not twin_exact and (n, p, q) == (self.n, self.q, self.p)
+
+
+@dataclass(frozen=True)
+class Response:
+    """A response that the board shall show.
+
+    omega : dimensionless frequency; None for "best": the tool chooses it.
+    expect : the wanted n-p-q, or None where any is of interest.
+    twin : "either" accepts the mirror twin of ``expect`` as well; "exact" does not.
+    symmetric : whether the orbit has to be symmetric (True), asymmetric (False) or either (None).
+    b : clearance at which this response is wanted: a value, a range to choose from, or None for
+        the model's own.
+    """
+
+    omega: float | None
+    expect: Expect | None = None
+    twin: Twin = "either"
+    symmetric: bool | None = None
+    b: float | tuple[float, float] | None = None
+
+    def accepts(self, n: int, p: int, q: int) -> bool:
+        """Whether n-p-q is what is expected here; without an expectation, anything is."""
+        return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
+
+
+@dataclass(frozen=True)
+class CircuitSpec:
+    """What the circuit is to be made of and how it is to be chosen; the defaults of a model file.
+
+    supply, saturation [V] (saturation None: the catalogue's); grades as fractions (0.01 is 1 %);
+    resistor_range [Ω], capacitor_range [F]; frequency [Hz] is the band for ω = 1.
+    """
+
+    opamp: str = "TL074C"
+    supply: float = 15.0
+    saturation: float | None = None
+    resistors: tuple[str, ...] = ("E96",)
+    capacitors: tuple[str, ...] = ("E12",)
+    resistor_grade: float = 0.01
+    capacitor_grade: float = 0.01
+    resistor_range: tuple[float, float] = (1e3, 1e6)
+    capacitor_range: tuple[float, float] = (1e-9, 1e-6)
+    frequency: tuple[float, float] = (50.0, 1000.0)
+    dead_zone: DeadZone = "saturation"
+    objective: Objective = "match"
+    composites: bool = False
+    side_conditions: bool = True
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model file that has passed every check.
+
+    ``model`` is always filled, from ``mechanical`` where that is what the file gives; ``text`` is
+    the file word for word.
+    """
+
+    title: str
+    model: Dimensionless
+    mechanical: Mechanical | None
+    responses: tuple[Response, ...]
+    circuit: CircuitSpec
+    text: str = field(repr=False)
+    source: Path | None = None
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the text: two files with the same hash ask for the same thing."""
+        return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
+
+
+def read_model_file(path: Path) -> ModelFile:
+    """Read and check a model file.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or anything in it is wrong.
+    """
+    path = Path(path)
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(path, "the file", "a folder", "a model file (TOML)")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(path, "the file", "no regular file", "a model file (TOML)")
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(path, "the file", "nothing", "a model file (TOML)") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(path, "the file", reason, "a model file that can be read") from None
+    if len(content) > MAX_BYTES:
+        raise InputError(
+            path, "the file", f"more than {MAX_BYTES} bytes", "a model file: a page of TOML"
+        )
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = content[: error.start].count(b"\n") + 1
+        raise InputError(
+            path, f"line {row}", f"byte 0x{content[error.start]:02x}", "text in UTF-8"
+        ) from None
+    return parse_model_file(text, path)
+
+
+def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
+    """Check the text of a model file; ``source`` is named in errors and gives the default title.
+
+    Raises
+    ------
+    InputError : anything in the text is wrong.
+    """
+    file = None if source is None else str(source)
+    tables = checked(_File, parse_toml(text, file), file)
+    model, mechanical = _models(tables, file)
+    responses = tuple(
+        _response(table, index, mechanical, file)
+        for index, table in enumerate(tables.response, start=1)
+    )
+    circuit = CircuitSpec(**dict(tables.circuit))
+    if circuit.saturation is not None and circuit.saturation > circuit.supply:
+        raise InputError(
+            file,
+            "circuit.saturation",
+            circuit.saturation,
+            f"a voltage within the supply of {circuit.supply:g} V",
+        )
+    title = tables.title or (source.stem if source is not None else "untitled")
+    return ModelFile(title, model, mechanical, responses, circuit, text, source)
+
+
+def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
+    if tables.model is not None and tables.mechanical is not None:
+        raise InputError(file, "mechanical", "[model] and [mechanical]", "one of the two")
+    try:
+        if tables.model is not None:
+            return Dimensionless(**dict(tables.model)), None
+        if tables.mechanical is not None:
+            mechanical = Mechanical(**dict(tables.mechanical))
+            return _dimensionless(mechanical, file), mechanical
+    except InputError as error:
+        if error.file is not None:
+            raise
+        raise InputError(file, error.field, error.found, error.expected) from None
+    raise InputError(file, "model", "nothing", "a table [model] or a table [mechanical]")
+
+
+# Which quantity of Eq. (1)-(2) to look at when a dimensionless one leaves its domain.
+_CAUSES = {
+    "m": ("M2", "M2/(M1 + M2)"),
+    "k": ("K2", "K2/(K1 + K2)"),
+    "k0": ("K0", "K0/(K0 + K1)"),
+    "c": ("C2", "C2/(C1 + C2)"),
+    "zeta": ("C1", "C1/(2 sqrt(K1 M1))"),
+    "f20": ("P2", "P2/(P1 + P2)"),
+    "b": ("B", "B K1/(P1 + P2)"),
+}
+
+
+def _dimensionless(mechanical: Mechanical, file: str | None) -> Dimensionless:
+    try:
+        return mechanical.dimensionless()
+    except (ZeroDivisionError, OverflowError):
+        raise InputError(
+            file, "mechanical", "values too far apart", "SI values of one mechanism"
+        ) from None
+    except InputError as error:
+        name = error.field.removeprefix("model.")
+        if name not in _CAUSES:
+            raise
+        cause, formula = _CAUSES[name]
+        raise InputError(
+            file,
+            f"mechanical.{cause}",
+            getattr(mechanical, cause),
+            f"a value that makes {name} = {formula} {error.expected}",
+        ) from None
+
+
+def _response(
+    table: _ResponseTable, index: int, mechanical: Mechanical | None, file: str | None
+) -> Response:
+    place = f"response[{index}]"
+
+    def refuse(key: str, found: object, expected: str) -> NoReturn:
+        raise InputError(file, f"{place}.{key}", found, expected)
+
+    if table.omega is not None and table.Omega is not None:
+        refuse("Omega", "omega and Omega", "one of the two")
+    omega = None if table.omega == "best" else table.omega
+    if table.Omega is not None:
+        if mechanical is None:
+            refuse("Omega", table.Omega, "omega: Omega in rad/s needs a table [mechanical]")
+        omega = mechanical.omega(table.Omega)
+        if not 0.0 < omega < math.inf:
+            refuse("Omega", table.Omega, "a frequency within the range of numbers")
+    elif table.omega is None:
+        refuse("omega", "nothing", _OMEGA + ("" if mechanical is None else ", or Omega in rad/s"))
+    if table.twin == "exact" and table.expect is None:
+        refuse("twin", shown(table.twin), "an expect that it can apply to")
+    assert not isinstance(omega, str)
+    return Response(omega, table.expect, table.twin, table.symmetric, table.b)
+
+
+# What the fields of a file accept.
+
+_OMEGA = 'a number > 0, or "best"'
+
+
+def _positive(value: float) -> bool:
+    return value > 0.0
+
+
+def _not_negative(value: float) -> bool:
+    return value >= 0.0
+
+
+def _plain(domain: str) -> Accepts:
+    """A number; ``Dimensionless`` holds it to the domain, which is only told here."""
+    return number("", f"a number {domain}")
+
+
+def _physical(unit: str, *, zero: bool = False) -> Accepts:
+    bound = ">= 0" if zero else "> 0"
+    expected = f"a number {bound} in {unit}, or text such as {_EXAMPLES[unit]}"
+    return number(unit, expected, _not_negative if zero else _positive)
+
+
+_EXAMPLES = {
+    "kg": '"2.5 kg"',
+    "N s/m": '"55 N s/m"',
+    "N/m": '"12 kN/m"',
+    "m": '"0.5 mm"',
+    "N": '"80 N"',
+    "rad/s": '"240 rad/s"',
+    "V": '"15 V"',
+    "Ω": '"22.1k"',
+    "F": '"100nF"',
+    "Hz": '"1 kHz"',
+}
+
+
+def _physical_span(unit: str) -> Accepts:
+    expected = f"a range [low, high] of numbers > 0 in {unit}, or texts such as {_EXAMPLES[unit]}"
+    return span(unit, expected, _positive)
+
+
+def _grade() -> Accepts:
+    return number("", "a fraction in (0, 1): 0.01 is 1 %", lambda value: 0.0 < value < 1.0)
+
+
+def _omega() -> Accepts:
+    frequency = number("", _OMEGA, _positive)
+
+    def check(value: object) -> object:
+        return value if value == "best" else frequency.check(value)
+
+    return Accepts(_OMEGA, check)
+
+
+def _expect() -> Accepts:
+    def check(value: object) -> Expect:
+        if not isinstance(value, str):
+            raise ValueError
+        try:
+            return Expect.parse(value)
+        except ValueError:
+            raise ValueError from None
+
+    return Accepts(f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIODS} and p, q >= 0', check)
+
+
+def _clearance() -> Accepts:
+    expected = "a number > 0, or a range [low, high] of numbers > 0"
+    value_of, span_of = number("", expected, _positive), span("", expected, _positive)
+
+    def check(value: object) -> object:
+        return (span_of if isinstance(value, list) else value_of).check(value)
+
+    return Accepts(expected, check)
+
+
+def _series() -> Accepts:
+    def check(value: object) -> tuple[str, ...]:
+        names = [value] if isinstance(value, str) else value
+        if not isinstance(names, list) or not names:
+            raise ValueError
+        for name in names:
+            if not isinstance(name, str):
+                raise ValueError
+            if name not in SERIES:
+                raise ValueError(did_you_mean(name, SERIES))
+        return tuple(dict.fromkeys(names))
+
+    return Accepts("one or a list of " + ", ".join(SERIES), check)
+
+
+# The tables of a file, key by key.
+
+
+class _ModelTable(BaseModel):
+    model_config = STRICT
+    m: Annotated[float, _plain("in (0, 1)")]
+    k: Annotated[float, _plain("in (0, 1)")]
+    k0: Annotated[float, _plain("in [0, 1)")]
+    c: Annotated[float, _plain("in [0, 1)")]
+    zeta: Annotated[float, _plain("> 0")]
+    f20: Annotated[float, _plain("in [0, 1]")]
+    b: Annotated[float, _plain("> 0")]
+    sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
+
+
+class _MechanicalTable(BaseModel):
+    model_config = STRICT
+    M1: Annotated[float, _physical("kg")]
+    M2: Annotated[float, _physical("kg")]
+    C1: Annotated[float, _physical("N s/m")]
+    C2: Annotated[float, _physical("N s/m", zero=True)]
+    K0: Annotated[float, _physical("N/m", zero=True)]
+    K1: Annotated[float, _physical("N/m")]
+    K2: Annotated[float, _physical("N/m", zero=True)]
+    B: Annotated[float, _physical("m")]
+    P1: Annotated[float, _physical("N", zero=True)]
+    P2: Annotated[float, _physical("N", zero=True)]
+    sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
+
+
+class _ResponseTable(BaseModel):
+    model_config = STRICT
+    omega: Annotated[float | Literal["best"] | None, _omega()] = None
+    Omega: Annotated[float | None, _physical("rad/s")] = None
+    expect: Annotated[Expect | None, _expect()] = None
+    twin: Annotated[Twin, choice("either", "exact")] = "either"
+    symmetric: Annotated[bool | None, flag()] = None
+    b: Annotated[float | tuple[float, float] | None, _clearance()] = None
+
+
+class _CircuitTable(BaseModel):
+    model_config = STRICT
+    opamp: Annotated[str, line("the name of an op-amp of the catalogue")] = CircuitSpec.opamp
+    supply: Annotated[float, _physical("V")] = CircuitSpec.supply
+    saturation: Annotated[float | None, _physical("V")] = CircuitSpec.saturation
+    resistors: Annotated[tuple[str, ...], _series()] = CircuitSpec.resistors
+    capacitors: Annotated[tuple[str, ...], _series()] = CircuitSpec.capacitors
+    resistor_grade: Annotated[float, _grade()] = CircuitSpec.resistor_grade
+    capacitor_grade: Annotated[float, _grade()] = CircuitSpec.capacitor_grade
+    resistor_range: Annotated[tuple[float, float], _physical_span("Ω")] = CircuitSpec.resistor_range
+    capacitor_range: Annotated[tuple[float, float], _physical_span("F")] = (
+        CircuitSpec.capacitor_range
+    )
+    frequency: Annotated[tuple[float, float], _physical_span("Hz")] = CircuitSpec.frequency
+    dead_zone: Annotated[DeadZone, choice("saturation", "rectifier")] = CircuitSpec.dead_zone
+    objective: Annotated[Objective, choice("match", "yield")] = CircuitSpec.objective
+    composites: Annotated[bool, flag()] = CircuitSpec.composites
+    side_conditions: Annotated[bool, flag()] = CircuitSpec.side_conditions
+
+
+class _File(BaseModel):
+    model_config = STRICT
+    format: Annotated[int, exactly(1, "1, the format that this version reads")]
+    title: Annotated[str | None, line("text of one line")] = None
+    model: _ModelTable | None = Field(None, description="a table [model]")
+    mechanical: _MechanicalTable | None = Field(None, description="a table [mechanical]")
+    response: tuple[_ResponseTable, ...] = Field(
+        (), strict=False, description="one table [[response]] for each response"
+    )
+    circuit: _CircuitTable = Field(_CircuitTable(), description="a table [circuit]")

@@ -1,0 +1,227 @@
+"""Numbers with units: text at the boundary, SI floats inside.
+
+``parse_quantity`` reads what an engineer writes ("22.1k", "100nF", "4k7", "10 µF");
+``format_quantity`` writes it back. Prefixes are those of the SI: ``M`` is mega and ``m`` is milli,
+unlike SPICE, where both are milli. All scaling is decimal, so "22.1k" is the same float as 22.1e3.
+
+Part numbers spell values in codes of their own; ``encode_value`` and ``decode_value`` know the
+ones that the catalogues name.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+
+_PREFIXES = {
+    "f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "": 0, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12,
+}  # fmt: skip
+_PREFIX_OF = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_MICRO = str.maketrans({"µ": "u", "μ": "u"})
+_OHM = "Ω"
+_OHMS = ("Ω", "\N{OHM SIGN}", "ohms", "ohm", "Ohms", "Ohm", "R")
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_PREFIXED = re.compile(rf"({_NUMBER})\s*([fpnumkKMGT]?)", re.ASCII)
+_INFIX = re.compile(r"([+-]?\d+)([fpnumkKMGTR])(\d+)", re.ASCII)
+_LONGEST = 64  # characters; a quantity is never longer
+
+
+def parse_quantity(value: str | float, unit: str) -> float:
+    """The SI value of a number, or of a text such as "22.1k", "4k7", "100nF" or "12 kN/m".
+
+    Parameters
+    ----------
+    value : a number is taken as it is; a text may carry a prefix, the unit, or both.
+    unit : what the quantity is measured in, such as "Ω", "F", "N/m"; "" for a bare number.
+        A text that ends in the unit is read with it first: for metres "5m" is 5 m, "5mm" 5e-3 m.
+
+    Raises
+    ------
+    ValueError : not a finite number, an unknown prefix, or another unit; the message says which.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"not a number: a {type(value).__name__}")
+    if not isinstance(value, str):
+        try:
+            result = float(value)
+        except OverflowError:
+            raise ValueError("too large for a number") from None
+        if not math.isfinite(result):
+            raise ValueError("not a finite number")
+        return result
+    text = value.strip()
+    if not text or len(text) > _LONGEST:
+        raise ValueError("not a number: " + ("empty text" if not text else "a very long text"))
+    number, shift = _split(text, unit)
+    result = float(number.scaleb(shift))
+    if not math.isfinite(result):
+        raise ValueError("too large for a number")
+    return result
+
+
+def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
+    """``value`` with an SI prefix and ``unit``: 22100.0, "Ω" gives "22.1kΩ"; 1e-7, "F" "100nF".
+
+    Rounded to ``digits`` significant digits. ``parse_quantity`` reads the text back, exactly where
+    the value has no more digits than that (as every E-series value has for digits >= 3).
+    """
+    if not math.isfinite(value):
+        raise ValueError("not a finite number")
+    if digits < 1:
+        raise ValueError("digits must be at least 1")
+    exact = Decimal(repr(float(value)))
+    if not exact:
+        return f"0{unit}"
+    rounded = Context(prec=digits, rounding=ROUND_HALF_EVEN).plus(exact)
+    exponent = 3 * math.floor(rounded.adjusted() / 3)
+    if unit == "kg":  # carries a prefix already
+        exponent = 0
+    if exponent not in _PREFIX_OF:
+        return f"{_plain(rounded.scaleb(-rounded.adjusted()))}e{rounded.adjusted()}{unit}"
+    return f"{_plain(rounded.scaleb(-exponent))}{_PREFIX_OF[exponent]}{unit}"
+
+
+def encode_value(code: str, value: float) -> str:
+    """``value`` (ohm or farad) as the named code of a part number spells it.
+
+    "yageo": 22100.0 is "22K1"; "eia3": 1e-9 is "102"; "multiplier-first": 2.2e-8 is "322";
+    "plain": 22100.0 is "22.1k".
+
+    Raises
+    ------
+    ValueError : no such code, or a value that the code cannot spell.
+    """
+    if code not in VALUE_CODES:
+        raise ValueError(f"no such code: {code}")
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError("not a finite number > 0")
+    return VALUE_CODES[code][0](value)
+
+
+def decode_value(code: str, text: str) -> float:
+    """The value that ``text`` spells in the named code: the inverse of ``encode_value``."""
+    if code not in VALUE_CODES:
+        raise ValueError(f"no such code: {code}")
+    return VALUE_CODES[code][1](text)
+
+
+def _split(text: str, unit: str) -> tuple[Decimal, int]:
+    """Number and power of ten of a text that may end in ``unit``."""
+    if unit == "kg":
+        return _split_mass(text)
+    normal = text.translate(_MICRO)
+    bare = _without_unit(normal, unit)
+    infix = _INFIX.fullmatch(bare)
+    if infix and (infix[2] != "R" or unit == _OHM):
+        shift = 0 if infix[2] == "R" else _PREFIXES[infix[2]]
+        return Decimal(f"{infix[1]}.{infix[3]}"), shift
+    prefixed = _PREFIXED.fullmatch(bare)
+    if prefixed:
+        return Decimal(prefixed[1]), _PREFIXES[prefixed[2]]
+    if re.match(_NUMBER, bare, re.ASCII):
+        wanted = f"in {unit}, with or without an SI prefix" if unit else "without a unit"
+        raise ValueError(f"not a number {wanted}")
+    raise ValueError("not a number")
+
+
+def _split_mass(text: str) -> tuple[Decimal, int]:
+    """The kilogram is a unit with a prefix of its own: "2.5", "2.5 kg", "500 g", "3 Mg"."""
+    plain = re.fullmatch(_NUMBER, text, re.ASCII)
+    if plain:
+        return Decimal(text), 0
+    if not text.endswith("g"):
+        raise ValueError("not a number in kg")
+    number, shift = _split(text, "g")
+    return number, shift - 3
+
+
+def _without_unit(text: str, unit: str) -> str:
+    spellings = _OHMS if unit == _OHM else (unit, unit.replace(" ", "·"), unit.replace(" ", ""))
+    for spelling in spellings:
+        if spelling and text.endswith(spelling):
+            return text.removesuffix(spelling).rstrip()
+    return text
+
+
+def _plain(number: Decimal) -> str:
+    """Digits without exponent and without zeros after the last one that counts."""
+    text = f"{number:f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _significant(value: float, most: int, what: str) -> tuple[int, int]:
+    """``value`` as an integer of at most ``most`` digits times a power of ten."""
+    digits, exponent = Decimal(repr(float(value))).normalize().as_tuple()[1:]
+    if len(digits) > most or not isinstance(exponent, int):
+        raise ValueError(f"{what} spells at most {most} significant digits")
+    return int("".join(map(str, digits))), exponent
+
+
+def _encode_yageo(value: float) -> str:
+    _significant(value, 3, "this code")
+    for letter, power in (("M", 6), ("K", 3), ("R", 0)):
+        scaled = Decimal(repr(float(value))).scaleb(-power)
+        if 1 <= scaled < 1000:
+            whole, _, rest = _plain(scaled).partition(".")
+            return f"{whole}{letter}{rest}"
+    raise ValueError("this code spells 1 Ω to less than 1 GΩ")
+
+
+def _decode_yageo(text: str) -> float:
+    match = re.fullmatch(r"(\d{1,3})([RKM])(\d{0,2})", text, re.ASCII)
+    if not match:
+        raise ValueError("expected digits with R, K or M as the decimal point")
+    power = {"R": 0, "K": 3, "M": 6}[match[2]]
+    return float(f"{match[1]}.{match[3] or 0}e{power}")
+
+
+def _picofarads(value: float) -> tuple[int, int]:
+    """Two digits and the power of ten that give the capacitance in pF."""
+    number, exponent = _significant(value, 2, "a three-digit code")
+    exponent += 12
+    if number < 10:
+        number, exponent = 10 * number, exponent - 1
+    if not 0 <= exponent <= 7:
+        raise ValueError("a three-digit code spells 10 pF to 990 µF")
+    return number, exponent
+
+
+def _encode_eia3(value: float) -> str:
+    number, exponent = _picofarads(value)
+    return f"{number}{exponent}"
+
+
+def _decode_eia3(text: str) -> float:
+    if not re.fullmatch(r"[1-9]\d[0-7]", text, re.ASCII):
+        raise ValueError("expected two digits and the number of zeros, in pF")
+    return float(f"{text[:2]}e{int(text[2]) - 12}")
+
+
+def _encode_multiplier_first(value: float) -> str:
+    number, exponent = _picofarads(value)
+    return f"{exponent}{number}"
+
+
+def _decode_multiplier_first(text: str) -> float:
+    if not re.fullmatch(r"[0-7][1-9]\d", text, re.ASCII):
+        raise ValueError("expected the number of zeros and two digits, in pF")
+    return float(f"{text[1:]}e{int(text[0]) - 12}")
+
+
+def _encode_plain(value: float) -> str:
+    return format_quantity(value, digits=15).replace("µ", "u")
+
+
+def _decode_plain(text: str) -> float:
+    return parse_quantity(text, "")
+
+
+VALUE_CODES: dict[str, tuple[Callable[[float], str], Callable[[str], float]]] = {
+    "yageo": (_encode_yageo, _decode_yageo),
+    "eia3": (_encode_eia3, _decode_eia3),
+    "multiplier-first": (_encode_multiplier_first, _decode_multiplier_first),
+    "plain": (_encode_plain, _decode_plain),
+}
+"""How part numbers spell values: name of the code, and its encoder and decoder."""

@@ -1,0 +1,132 @@
+"""A piecewise-linear system with one sinusoidal drive: the common ground of model and circuit.
+
+In each mode the state x (n entries) follows
+
+    x' = A x + B u(t) + d,      u(t) = amplitude · sin(ω t + phase) + offset
+
+until a guard becomes positive. A guard is a linear function C x + D u + e of state and drive,
+negative inside its mode, and names the mode on its other side. A mode's key is a tuple of small
+integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an op-amp: -1 at its
+lower limit, 0 linear, 1 at its upper limit). Modes are built when first entered and kept, never
+enumerated.
+
+The vector field is continuous across every boundary (springs and limiters are), so a crossing
+changes the mode and nothing else: the saltation matrix is the identity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+ModeKey = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Guard:
+    """One way out of a mode.
+
+    C : (n,), D, e : the linear function C·x + D·u + e, negative while the mode lasts.
+    target : key of the mode that is entered when it becomes positive.
+    clearance : index of the clearance whose contact begins or ends here, or -1. Such guards are
+        scaled to displacement, so that -(C·x + D·u + e) is the distance to the boundary.
+    """
+
+    C: Array
+    D: float
+    e: float
+    target: ModeKey
+    clearance: int = -1
+
+
+@dataclass(frozen=True)
+class Mode:
+    """The linear system that holds while no guard is positive.
+
+    A : (n, n); B, d : (n,); guards : ways out.
+    sides : for each clearance -1, 0 or 1: in contact with the lower stop, open, with the upper.
+    clipped : an element that ought to be linear is at its limit.
+    """
+
+    A: Array
+    B: Array
+    d: Array
+    guards: tuple[Guard, ...]
+    sides: tuple[int, ...]
+    clipped: bool = False
+
+
+@dataclass(frozen=True)
+class Drive:
+    """u(t) = amplitude · sin(omega · t) + offset; omega in rad per unit of the system's time."""
+
+    omega: float
+    amplitude: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def period(self) -> float:
+        return 2.0 * np.pi / self.omega
+
+
+@dataclass
+class PiecewiseLinearSystem:
+    """Named states and a rule that builds the mode for a key.
+
+    Parameters
+    ----------
+    states : names of the n states.
+    build : called once for each key that is entered; raises KeyError for a key that cannot be.
+    start : key of the mode that holds near x = 0.
+    clearances : names of the clearances, in the order of ``Mode.sides``.
+    displacement : index of the state that moves in each clearance.
+    mirror : (n, n) M with x → M x, u → -u a symmetry of the system, or None.
+    """
+
+    states: tuple[str, ...]
+    build: Callable[[ModeKey], Mode]
+    start: ModeKey
+    clearances: tuple[str, ...]
+    displacement: tuple[int, ...]
+    mirror: Array | None = None
+    _modes: dict[ModeKey, Mode] = field(default_factory=dict, repr=False)
+
+    @property
+    def size(self) -> int:
+        return len(self.states)
+
+    def mode(self, key: ModeKey) -> Mode:
+        """The mode of this key, built on its first use."""
+        known = self._modes.get(key)
+        if known is None:
+            known = self._modes[key] = self.build(key)
+        return known
+
+    def mode_at(self, x: Array, u: float, near: ModeKey | None = None) -> ModeKey:
+        """Key of the mode that holds at state x (n,) and drive u.
+
+        Walks from ``near`` (default: ``start``) across the most violated guard until none is
+        violated; a bounded walk, since a consistent network has exactly one answer.
+        """
+        key = self.start if near is None else near
+        for _ in range(64):
+            mode = self.mode(key)
+            if not mode.guards:
+                return key
+            values = [float(g.C @ x) + g.D * u + g.e for g in mode.guards]
+            worst = int(np.argmax(values))
+            if values[worst] <= 0.0:
+                return key
+            key = mode.guards[worst].target
+        raise ArithmeticError(f"no mode holds at x = {x}, u = {u}")
+
+    @property
+    def built(self) -> int:
+        """How many modes have been built so far."""
+        return len(self._modes)
