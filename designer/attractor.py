@@ -1,0 +1,249 @@
+"""Which attractor a start leads to: settling, shooting, classification.
+
+Settle for 20 drive periods, look for the period n at which the strobe nearly repeats, polish by
+Newton's method on the n-period map and accept only what converged, is stable and lies where the
+settling had arrived; otherwise settle longer (40, 140, 800, 4000 periods in all). Newton at once
+would be faster and wrong: it also lands on unstable orbits and on other attractors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.stats import qmc
+
+from designer.flow import Flow, FlowResult, FlowStatus
+from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.system import Array, ModeKey
+
+STAGES = (20, 20, 100, 660, 3200)
+STROBE_TOLERANCE = 1e-8
+"""Of the peak of each state (docs/definitions.md)."""
+ENGINE_ERROR = 1e-10
+"""Of the peak: contacts shallower and misses nearer than this are undecided."""
+NEAR = 0.05
+"""Of the peak: how far a polished orbit may lie from where settling had arrived."""
+CHAOS = 0.02
+"""Growth of a tangent vector per drive period that is taken for chaos after 800 periods."""
+
+
+def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
+    """The attractor reached from state x (n,) at drive phase 0.
+
+    Returns an orbit of any status; it never raises for lack of an answer.
+    """
+    spent = 0
+    peak = np.abs(x)
+    for stage, periods in enumerate(STAGES):
+        run = flow.run(x, periods, mode=mode)
+        spent += len(run.strobes) - 1
+        if run.status is not FlowStatus.DONE:
+            status = (
+                OrbitStatus.DIVERGED
+                if run.status is FlowStatus.DIVERGED
+                else OrbitStatus.NOT_SETTLED
+            )
+            return Orbit(status, reason=str(run.status), periods=spent)
+        x, mode = run.strobes[-1], run.mode
+        tail = run.strobes[-2 * MAX_PERIOD :]
+        peak = np.maximum(np.abs(tail).max(axis=0), 1e-300)
+        found, cost = _polish(flow, run, peak)
+        spent += cost
+        if found is not None:
+            return _with_cost(found, spent)
+        if stage >= 3:
+            exponent, x, mode = lyapunov(flow, x, mode, 300)
+            spent += 300
+            if exponent * flow.drive.period > CHAOS:
+                return Orbit(
+                    OrbitStatus.APERIODIC, start=x, mode=mode, lyapunov=exponent, periods=spent
+                )
+    return Orbit(
+        OrbitStatus.NOT_SETTLED,
+        start=x,
+        mode=mode or (),
+        lyapunov=exponent,
+        reason=f"no period up to {MAX_PERIOD} and no chaos after {spent} drive periods",
+        periods=spent,
+    )
+
+
+def shoot(flow: Flow, x: Array, n: int, mode: ModeKey | None = None) -> tuple[Array, Array] | None:
+    """A fixed point of the n-period map near x, with its monodromy matrix, or None.
+
+    Newton with at most eight evaluations; converged means that the map moves the point by less
+    than 1e-11 of the peak. Finds unstable orbits as well as stable ones.
+    """
+    size = len(x)
+    last = np.inf
+    for _ in range(8):
+        run = flow.run(x, n, mode=mode, tangent=np.eye(size))
+        if run.status is not FlowStatus.DONE or run.tangent is None:
+            return None
+        step = run.strobes[-1] - x
+        peak = np.maximum(np.abs(run.strobes).max(axis=0), 1e-12 * np.abs(run.strobes).max())
+        error = float((np.abs(step) / peak).max())
+        if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
+            return x, run.tangent
+        try:
+            x = x - np.linalg.solve(run.tangent - np.eye(size), step)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
+            return None
+        last, mode = error, None
+    return None
+
+
+def describe(flow: Flow, x: Array, n: int, monodromy: Array, mode: ModeKey | None = None) -> Orbit:
+    """The orbit through the fixed point x (states,) of the n-period map, over 3n periods.
+
+    Checks by running that the strobe repeats, counts impacts, refines extremes.
+    """
+    run = flow.run(x, 3 * n, mode=mode, measure=True)
+    j = flow.system.displacement[0] if flow.system.displacement else 0
+    peak = np.abs(run.extremes).max(axis=1)
+    drift = np.abs(run.strobes - np.tile(run.strobes[:n], (4, 1))[: 3 * n + 1])
+    multipliers = np.linalg.eigvals(monodromy).astype(complex)
+    counts = run.counts.reshape(3, n, -1, 2).sum(axis=(1, 2))
+    # Entries at the very strobe may fall into one lap or the next: judge the three together.
+    lower, upper = (round(c / 3) for c in counts.sum(axis=0))
+    once = run.impacts.time < n * flow.drive.period
+    status = OrbitStatus.PERIODIC
+    floor = ENGINE_ERROR * peak[j]
+    if (drift > STROBE_TOLERANCE * peak).any():
+        status = OrbitStatus.NOT_SETTLED
+    elif run.clipped_time > 0.0:
+        status = OrbitStatus.CLIPPED
+    elif min(run.penetration, run.miss) < floor or run.tangencies:
+        status = OrbitStatus.GRAZING
+    span = n * flow.drive.period
+    radius = float(np.abs(multipliers).max())
+    return Orbit(
+        status=status,
+        n=n,
+        p=upper,
+        q=lower,
+        start=run.strobes[0],
+        mode=flow.system.mode_at(x, flow.drive.offset, mode),
+        extremes=run.extremes,
+        impact_times=run.impacts.time[once],
+        impact_velocities=run.impacts.state[once, j + 1] if len(peak) > j + 1 else np.zeros(0),
+        impact_sides=run.impacts.side[once].astype(float),
+        asymmetry=asymmetry(flow, x, n, peak),
+        multipliers=multipliers,
+        lyapunov=float(np.log(radius) / span) if radius > 0.0 else -np.inf,
+        penetration=run.penetration,
+        miss=run.miss,
+        reason="" if status is OrbitStatus.PERIODIC else f"while classifying period {n}",
+    )
+
+
+def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> float:
+    """max over t of |x(t + nT/2) + x(t)| relative to each state's peak; nan for even n."""
+    if n % 2 == 0:
+        return float("nan")
+    trace = flow.run(x, n, points=points).strobes[:-1]
+    half = n * points // 2
+    return float((np.abs(np.roll(trace, -half, axis=0) + trace).max(axis=0) / peak).max())
+
+
+def lyapunov(
+    flow: Flow, x: Array, mode: ModeKey | None, periods: int, block: int = 5
+) -> tuple[float, Array, ModeKey]:
+    """Largest exponent per unit time over ``periods`` by the exact variational flow.
+
+    The tangent vector is renormalised every ``block`` periods. Returns the state reached too.
+    """
+    rng = np.random.default_rng(0)
+    v = rng.standard_normal((len(x), 1))
+    growth, done = 0.0, 0
+    while done < periods:
+        run = flow.run(x, block, mode=mode, tangent=v)
+        if run.status is not FlowStatus.DONE or run.tangent is None:
+            break
+        size = float(np.linalg.norm(run.tangent))
+        if done:  # the first block only turns the vector towards the leading direction
+            growth += np.log(max(size, 1e-300))
+        v, x, mode = run.tangent / max(size, 1e-300), run.strobes[-1], run.mode
+        done += block
+    span = max(done - block, 1) * flow.drive.period
+    return float(growth / span), x, mode if mode is not None else flow.system.start
+
+
+def starts(scale: Array, count: int, seed: int = 0) -> Array:
+    """(count, n) initial states: rest, then a scrambled Sobol set in the box ± scale."""
+    box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
+    return np.vstack([np.zeros((1, len(scale))), scale * (2.0 * box - 1.0)])[:count]
+
+
+def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
+    """The different attractors that these starts lead to, in order of discovery.
+
+    Mirror twins count as one; aperiodic ones are not told apart.
+    """
+    found: list[Orbit] = []
+    for x in states:
+        orbit = settle(flow, np.asarray(x, dtype=float))
+        if not any(same(flow, orbit, other) for other in found):
+            found.append(orbit)
+    return found
+
+
+def same(flow: Flow, a: Orbit, b: Orbit) -> bool:
+    """Whether two orbits are one, up to the strobe they start at and the mirror."""
+    if a.status is not b.status or {(a.n, a.p, a.q), (a.n, a.q, a.p)}.isdisjoint({(b.n, b.p, b.q)}):
+        return False
+    if a.status is not OrbitStatus.PERIODIC:
+        return True
+    peak = np.abs(b.extremes).max(axis=1)
+    laps = flow.run(b.start, b.n).strobes[:-1]
+    candidates = [laps]
+    if flow.system.mirror is not None:
+        candidates.append(mirrored_strobes(flow, b))
+    return any(bool((np.abs(c - a.start) < 1e-6 * peak).all(axis=1).any()) for c in candidates)
+
+
+def mirrored_strobes(flow: Flow, orbit: Orbit) -> Array:
+    """(n, states) strobes of the mirror twin: the orbit half a drive period on, reflected."""
+    assert flow.system.mirror is not None
+    trace = flow.run(orbit.start, orbit.n, points=2).strobes
+    return np.asarray(trace[1:-1:2] @ flow.system.mirror.T)
+
+
+def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
+    """The mirror twin of a periodic orbit, or None where the system has no mirror."""
+    if flow.system.mirror is None or orbit.status is not OrbitStatus.PERIODIC:
+        return None
+    x = mirrored_strobes(flow, orbit)[0]
+    found = shoot(flow, x, orbit.n)
+    return None if found is None else describe(flow, found[0], orbit.n, found[1])
+
+
+def _polish(flow: Flow, run: FlowResult, peak: Array) -> tuple[Orbit | None, int]:
+    """Try to turn the end of a settling run into a periodic orbit; also what it cost."""
+    strobes, cost = run.strobes, 0
+    for n in range(1, min(MAX_PERIOD, len(strobes) - 1) + 1):
+        gap = np.abs(strobes[-1] - strobes[-1 - n]) / peak
+        if gap.max() > 1e-2:
+            continue
+        found = shoot(flow, strobes[-1], n, run.mode)
+        cost += 8 * n
+        if found is None:
+            continue
+        x, monodromy = found
+        stable = np.abs(np.linalg.eigvals(monodromy)).max() < 1.0
+        near = (np.abs(x - strobes[-1]) / peak).max() < NEAR
+        if not (stable and near):
+            continue
+        orbit = describe(flow, x, n, monodromy)
+        cost += 4 * n
+        if orbit.status is not OrbitStatus.NOT_SETTLED:
+            return orbit, cost
+    return None, cost
+
+
+def _with_cost(orbit: Orbit, periods: int) -> Orbit:
+    values = {**orbit.__dict__, "periods": periods}
+    return Orbit(**values)

@@ -1,0 +1,243 @@
+"""Exact flow of a piecewise-linear system under a sinusoidal drive.
+
+The general engine: any number of states and modes, constant terms, guards that see the drive. Each
+step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
+absent or found (see ``designer.flow_kernel``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.linalg import matrix_balance
+
+from designer import flow_kernel as kernel
+from designer.system import Array, Drive, Mode, ModeKey, PiecewiseLinearSystem
+
+STEP = 0.5
+"""‖A h‖ of one step, after balancing."""
+MAX_EVENTS = 10_000
+"""Mode changes in one drive period past which the flow stops: chattering ends with a status."""
+
+
+class FlowStatus(StrEnum):
+    """How a run of the flow ended."""
+
+    DONE = "done"
+    CHATTER = "too many events"
+    DIVERGED = "diverged"
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Entries into contact in order of time.
+
+    time : (k,); clearance, side : (k,) ints, side 1 upper and -1 lower; state : (k, n).
+    """
+
+    time: Array
+    clearance: kernel.Int
+    side: kernel.Int
+    state: Array
+
+
+@dataclass(frozen=True)
+class FlowResult:
+    """What happened over ``periods`` drive periods.
+
+    strobes : (periods · points + 1, n) states at the start and after each stretch.
+    counts : (periods · points, clearances, 2) impacts on the lower and the upper stop.
+    end : state (n,) and mode reached. tangent : (n, k) tangent vectors carried along, or None.
+    Where measured: impacts; extremes (n, 2) of each state; penetration, the smallest of all
+    contacts; miss, the nearest approach to a stop without contact (inf where there is none).
+    """
+
+    status: FlowStatus
+    strobes: Array
+    counts: kernel.Int
+    mode: ModeKey
+    tangent: Array | None
+    impacts: Impacts
+    extremes: Array
+    penetration: float
+    miss: float
+    tangencies: int
+    clipped_time: float
+
+
+class Flow:
+    """The flow of one system under one drive; keeps the tables of the modes it has met."""
+
+    def __init__(self, system: PiecewiseLinearSystem, drive: Drive) -> None:
+        self.system = system
+        self.drive = drive
+        self._index: dict[ModeKey, int] = {}
+        self._keys: list[ModeKey] = []
+        self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
+
+    def run(
+        self,
+        x: Array,
+        periods: int,
+        *,
+        mode: ModeKey | None = None,
+        tangent: Array | None = None,
+        measure: bool = False,
+        points: int = 1,
+        max_events: int = MAX_EVENTS,
+    ) -> FlowResult:
+        """Start at a strobe (drive phase 0) in state x (n,) and run for ``periods`` periods.
+
+        points : strobes per period; more than one gives a dense trace, as exact as the strobe.
+        tangent : (n, k) vectors to be carried by the linearised flow.
+        measure : also log impacts and refine extremes, at about three times the cost.
+        """
+        n, c = self.system.size, len(self.system.clearances)
+        key = self.system.mode_at(x, self.drive.offset, mode)
+        z = np.concatenate([x, [0.0, 1.0, 1.0]])
+        clock = np.zeros(2)
+        cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
+        stretches = periods * points
+        phases = 2.0 * np.pi * np.arange(points) / points
+        anchor = np.stack([np.sin(phases), np.cos(phases)], axis=1)
+        capacity = 64 * periods if measure else 0
+        log = kernel.Log(
+            strobes=np.empty((stretches + 1, n)),
+            impacts=np.zeros((stretches, c, 2), dtype=np.int64),
+            when=np.empty(capacity),
+            at=np.empty((capacity, n)),
+            stop=np.zeros((capacity, 2), dtype=np.int64),
+            extremes=np.tile([np.inf, -np.inf], (n, 1)),
+            graze=np.array([np.inf, np.inf, 0.0]),
+            clipped=np.zeros(1),
+        )
+        log.strobes[0] = x
+        depth = np.full(c, 0.0)
+        for j, side in enumerate(self.system.mode(key).sides):
+            # A contact that was already running has an unknown deepest point so far.
+            depth[j] = np.inf if side else 0.0
+        code = kernel.UNKNOWN_MODE
+        while code == kernel.UNKNOWN_MODE:
+            code = kernel.advance(
+                self._tables,
+                z,
+                clock,
+                cursor,
+                self.drive.period / points,
+                anchor,
+                phi,
+                depth,
+                max_events,
+                measure,
+                log,
+            )
+            if code == kernel.UNKNOWN_MODE:
+                self._link(int(cursor[1]), int(cursor[3]))
+        status = {
+            kernel.DONE: FlowStatus.DONE,
+            kernel.TOO_MANY_EVENTS: FlowStatus.CHATTER,
+            kernel.DIVERGED: FlowStatus.DIVERGED,
+        }[code]
+        done, k = int(cursor[0]), int(clock[1])
+        return FlowResult(
+            status=status,
+            strobes=log.strobes[: done + 1],
+            counts=log.impacts[:done],
+            mode=self._keys[int(cursor[1])],
+            tangent=None if tangent is None else phi,
+            impacts=Impacts(log.when[:k], log.stop[:k, 0], log.stop[:k, 1], log.at[:k]),
+            extremes=log.extremes,
+            penetration=float(log.graze[0]),
+            miss=float(log.graze[1]),
+            tangencies=int(log.graze[2]),
+            clipped_time=float(log.clipped[0]),
+        )
+
+    def _number(self, key: ModeKey) -> int:
+        """Index of the mode in the tables, which are filled on its first use."""
+        known = self._index.get(key)
+        if known is not None:
+            return known
+        number = len(self._keys)
+        mode = self.system.mode(key)
+        rows, width, guards = len(self._tables.step), self.system.size + 3, len(mode.guards)
+        if number >= rows or guards > self._tables.guard.shape[1]:
+            room = _empty_tables(
+                max(rows, 2 * (number + 1)),
+                max(guards, self._tables.guard.shape[1]),
+                width,
+                len(self.system.clearances),
+            )
+            for new, old in zip(room, self._tables, strict=True):
+                new[tuple(slice(0, s) for s in old.shape)] = old
+            self._tables = room
+        _fill(self._tables, number, mode, self.drive)
+        self._index[key] = number
+        self._keys.append(key)
+        return number
+
+    def _link(self, number: int, guard: int) -> None:
+        """Give a guard its target, building the mode if it is new."""
+        target = self._number(self.system.mode(self._keys[number]).guards[guard].target)
+        self._tables.target[number, guard] = target
+
+
+def augmented(mode: Mode, drive: Drive) -> Array:
+    """(n + 3, n + 3) M with z' = M z for z = (x, sin, cos, 1)."""
+    n = len(mode.d)
+    M = np.zeros((n + 3, n + 3))
+    M[:n, :n] = mode.A
+    M[:n, n] = drive.amplitude * mode.B
+    M[:n, n + 2] = mode.d + drive.offset * mode.B
+    M[n, n + 1] = drive.omega
+    M[n + 1, n] = -drive.omega
+    return M
+
+
+def _step_length(A: Array, omega: float) -> float:
+    balanced, _ = matrix_balance(A, permute=False)
+    return STEP / max(float(np.linalg.norm(balanced, 2)), omega)
+
+
+def _fill(tables: kernel.Tables, i: int, mode: Mode, drive: Drive) -> None:
+    M = augmented(mode, drive)
+    h = _step_length(mode.A, drive.omega)
+    powers = tables.taylor[i]
+    powers[0] = np.eye(len(M))
+    for k in range(1, kernel.ORDER + 1):
+        powers[k] = powers[k - 1] @ M * (h / k)
+    tables.step[i] = h
+    tables.propagator[i] = powers[::-1].sum(axis=0)
+    tables.guards[i] = len(mode.guards)
+    tables.side[i] = mode.sides
+    tables.clipped[i] = mode.clipped
+    for g, guard in enumerate(mode.guards):
+        row = np.concatenate(
+            [guard.C, [guard.D * drive.amplitude, 0.0, guard.e + guard.D * drive.offset]]
+        )
+        taylor = row @ powers
+        tables.guard[i, g] = taylor
+        # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
+        weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
+        tables.chord[i, g] = weights @ np.abs(taylor) * (1.0 + 1e-9)
+        tables.target[i, g] = -1
+        tables.clearance[i, g] = guard.clearance
+
+
+def _empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.Tables:
+    order = kernel.ORDER + 1
+    return kernel.Tables(
+        step=np.zeros(modes),
+        propagator=np.zeros((modes, width, width)),
+        taylor=np.zeros((modes, order, width, width)),
+        guard=np.zeros((modes, guards, order, width)),
+        chord=np.zeros((modes, guards, width)),
+        guards=np.zeros(modes, dtype=np.int64),
+        target=np.full((modes, guards), -1, dtype=np.int64),
+        clearance=np.full((modes, guards), -1, dtype=np.int64),
+        side=np.zeros((modes, clearances), dtype=np.int64),
+        clipped=np.zeros(modes, dtype=np.int64),
+    )
