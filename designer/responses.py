@@ -1,0 +1,141 @@
+"""The wanted responses: found on the model, carried over to the circuit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.attractor import coexisting, settle, starts, twin
+from designer.errors import InputError
+from designer.flow import Flow
+from designer.model import Dimensionless
+from designer.modelfile import Response
+from designer.orbit import Orbit, OrbitStatus
+from designer.synthesis import Design, Peaks
+from designer.system import Array, Drive, PiecewiseLinearSystem
+
+STARTS = 16
+"""Initial states tried for each response: rest and a Sobol set."""
+SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
+"""Frequencies that set the swing of a model file that names no response."""
+
+
+@dataclass(frozen=True)
+class ModelResponse:
+    """A wanted response and what the model shows there.
+
+    spec : as wanted. b : the clearance it is wanted at. orbit : the wanted one, or the attractor
+    reached from rest where it was not found. others : coexisting attractors that were met.
+    found : whether it is what was wanted (always, where nothing was).
+    """
+
+    spec: Response
+    b: float
+    orbit: Orbit
+    others: tuple[Orbit, ...]
+    found: bool
+
+    @property
+    def omega(self) -> float:
+        assert self.spec.omega is not None
+        return self.spec.omega
+
+    @property
+    def expected(self) -> str | None:
+        return None if self.spec.expect is None else str(self.spec.expect)
+
+
+def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelResponse, ...]:
+    """Find each wanted response on the model with the exact flow.
+
+    Raises
+    ------
+    InputError : a response leaves omega or b open, which only a search can fill.
+    """
+    out = []
+    for number, spec in enumerate(wanted, start=1):
+        if spec.omega is None:
+            raise InputError(
+                None, f"response[{number}].omega", "best", "a number: this version does not choose"
+            )
+        if isinstance(spec.b, tuple):
+            raise InputError(
+                None,
+                f"response[{number}].b",
+                list(spec.b),
+                "a number: this version does not choose",
+            )
+        b = model.b if spec.b is None else spec.b
+        out.append(_find_one(replace(model, b=b), spec, b))
+    return tuple(out)
+
+
+def matches(orbit: Orbit, spec: Response) -> bool:
+    """Whether an orbit is the one wanted."""
+    if orbit.status is not OrbitStatus.PERIODIC:
+        return spec.expect is None and spec.symmetric is None
+    if not spec.accepts(orbit.n, orbit.p, orbit.q):
+        return False
+    return spec.symmetric is None or orbit.symmetric is spec.symmetric
+
+
+def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
+    """Largest states and deepest penetration over all responses and their starts from rest."""
+    runs: list[tuple[Dimensionless, float, Orbit]] = [
+        (replace(model, b=r.b), r.omega, r.orbit) for r in found
+    ]
+    if not runs:
+        system = model.second_order().piecewise_linear()
+        rest = np.zeros(system.size)
+        runs = [(model, w, settle(Flow(system, Drive(w)), rest)) for w in SCOUT]
+    states, depth = np.zeros(4), 0.0
+    for variant, omega, orbit in runs:
+        system = variant.second_order().piecewise_linear()
+        flow = Flow(system, Drive(omega))
+        spans = [flow.run(np.zeros(system.size), 20, measure=True).extremes]
+        if orbit.status is OrbitStatus.PERIODIC:
+            spans.append(orbit.extremes)
+        elif len(orbit.start):
+            spans.append(flow.run(orbit.start, 200, measure=True).extremes)
+        scale = model.b / variant.b  # the generator's amplitude follows b, the threshold stays
+        for span in spans:
+            states = np.maximum(states, scale * np.abs(span).max(axis=1))
+            depth = max(depth, scale * float(np.abs(span[0]).max() - variant.b))
+    return Peaks(states, depth)
+
+
+def on_circuit(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Orbit:
+    """The orbit that the exact circuit reaches from the model's own, in volts and seconds."""
+    return settle(
+        circuit_flow(system, design, response), response.orbit.start * design.volts(response.b)
+    )
+
+
+def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Flow:
+    """The flow of a reduced board under the generator's setting for this response."""
+    frequency = design.errors.scales.frequency(response.omega)
+    return Flow(system, Drive(2.0 * np.pi * frequency, -design.amplitude(response.b)))
+
+
+def scale_of(model: Dimensionless, omega: float) -> Array:
+    """(states,) size of the states that starts are drawn from: a few static deflections."""
+    system = model.second_order()
+    stiffness = np.linalg.inv(system.stiffness)
+    x = np.abs(stiffness @ system.force) + model.b
+    return np.stack([x, x * max(omega, 1.0)], axis=1).ravel()
+
+
+def _find_one(model: Dimensionless, spec: Response, b: float) -> ModelResponse:
+    assert spec.omega is not None
+    flow = Flow(model.second_order().piecewise_linear(), Drive(spec.omega))
+    met = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
+    wanted = next((o for o in met if matches(o, spec)), None)
+    orbit = wanted if wanted is not None else met[0]
+    others = tuple(o for o in met if o is not orbit)
+    if wanted is not None and spec.expect is not None:
+        expect = spec.expect
+        if (orbit.n, orbit.p, orbit.q) != (expect.n, expect.p, expect.q):
+            orbit = twin(flow, orbit) or orbit
+    return ModelResponse(spec, b, orbit, others, wanted is not None)
