@@ -1,0 +1,189 @@
+"""The main job, stage by stage: model file → responses → design → checked circuit → yields.
+
+Each stage takes what the one before it made and can be called alone. Nothing here writes files or
+prints; ``designer.folder`` and the command line do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer import gate
+from designer.catalog import Catalog
+from designer.circuit import nominal_board
+from designer.deck import Excitation
+from designer.flow import Flow
+from designer.gate import GateResult
+from designer.modelfile import ModelFile
+from designer.ngspice import SimulationFailed
+from designer.orbit import Orbit, OrbitStatus
+from designer.reduction import Reduction
+from designer.responses import ModelResponse, circuit_flow, find, on_circuit, peaks
+from designer.spread import Spread
+from designer.synthesis import Design, synthesise
+from designer.system import Array, Drive
+from designer.tolerance import Answer, Question, StudyPlan, Yield, count
+from designer.workers import SpicePool
+
+TRACE_POINTS = 1024
+"""Points of a drawn orbit per drive period."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One engine's orbit over its n periods in model units: time (k,), states (k, 4)."""
+
+    time: Array
+    states: Array
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A wanted response on all three engines, for the nominal circuit.
+
+    circuit : orbit of the exact circuit rung, in volts and seconds. gate : ngspice's settings and
+    its run; None where ngspice was not asked.
+    """
+
+    model: ModelResponse
+    circuit: Orbit
+    excitation: Excitation
+    gate: GateResult | None
+
+    @property
+    def ngspice(self) -> Orbit | None:
+        """ngspice's orbit; status failed with the reason where it failed or the gate did not
+        pass."""
+        if self.gate is None:
+            return None
+        if isinstance(self.gate.read, SimulationFailed):
+            return Orbit(OrbitStatus.FAILED, reason=self.gate.read.reason)
+        if not self.gate.passed:
+            return Orbit(
+                OrbitStatus.FAILED,
+                reason=f"the numerics gate did not pass (steps a period: {self.gate.tried})",
+            )
+        return self.gate.read.orbit
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every engine that was asked shows the same n-p-q, up to the mirror twin."""
+
+        def kind(o: Orbit) -> tuple[int, tuple[int, ...]] | str:
+            return (o.n, tuple(sorted((o.p, o.q)))) if o.n else str(o.status)
+
+        engines = [self.model.orbit, self.circuit]
+        if self.ngspice is not None:
+            engines.append(self.ngspice)
+        return len({(str(o.status), kind(o)) for o in engines}) == 1
+
+
+def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelResponse, ...], Design]:
+    """Find the wanted responses on the model and choose the parts.
+
+    Raises
+    ------
+    InputError, Unreachable : see ``responses.find`` and ``synthesis.synthesise``.
+    """
+    found = find(modelfile.model, modelfile.responses)
+    return found, synthesise(
+        modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found)
+    )
+
+
+def nominal_reduction(design: Design) -> Reduction:
+    """The nominal board's exact reduction, with the op-amps' finite gain and bias."""
+    return Reduction(design.circuit, nominal_board(design.circuit))
+
+
+def check(
+    design: Design,
+    found: Sequence[ModelResponse],
+    pool: SpicePool | None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[Checked, ...]:
+    """Every response on the exact circuit and, with a pool, in ngspice behind the gate."""
+    reduction = nominal_reduction(design)
+    system = reduction.system()
+    settings = [
+        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in found
+    ]
+    progress("exact circuit")
+    orbits = [on_circuit(system, design, r) for r in found]
+    gates: list[GateResult | None] = [None] * len(found)
+    if pool is not None:
+        progress("ngspice, numerics gate")
+        gates = list(
+            gate.check(
+                pool,
+                [gate.Subject(reduction, e, o) for e, o in zip(settings, orbits, strict=True)],
+            )
+        )
+    return tuple(
+        Checked(r, o, e, g) for r, o, e, g in zip(found, orbits, settings, gates, strict=True)
+    )
+
+
+def plan_study(
+    modelfile: ModelFile,
+    design: Design,
+    checked: Sequence[Checked],
+    catalog: Catalog,
+    *,
+    samples: int,
+    seed: int,
+) -> StudyPlan:
+    """The Monte Carlo study of these responses under ``bench-1``.
+
+    Responses that the nominal circuit does not show periodically are left out: there is no
+    nominal orbit to start from.
+    """
+    spec = modelfile.circuit
+    return StudyPlan(
+        circuit=design.circuit,
+        spread=Spread.bench_1(catalog.opamp(spec.opamp), spec.resistor_grade, spec.capacitor_grade),
+        seed=seed,
+        samples=samples,
+        questions=tuple(
+            Question(
+                c.model.spec,
+                c.excitation,
+                c.circuit,
+                c.gate.settings if c.gate is not None and c.gate.passed else None,
+            )
+            for c in checked
+        ),
+    )
+
+
+def yields(plan: StudyPlan, answers: Sequence[Answer]) -> tuple[Yield, ...]:
+    """The yield of each question of the plan."""
+    return tuple(count([a for a in answers if a.question == i]) for i in range(len(plan.questions)))
+
+
+def traces(design: Design, checked: Checked) -> dict[str, Trace]:
+    """Orbits of each engine in model units, for overlays: "model", "circuit", "ngspice"."""
+    out: dict[str, Trace] = {}
+    b = checked.model.b
+    volts, seconds = design.volts(b), design.errors.scales.seconds
+    model = design.model.__class__(**{**design.model.__dict__, "b": b})
+    flow = Flow(model.second_order().piecewise_linear(), Drive(checked.model.omega))
+    out["model"] = _trace(flow, checked.model.orbit, np.ones(4), 1.0)
+    circuit = circuit_flow(nominal_reduction(design).system(), design, checked.model)
+    out["circuit"] = _trace(circuit, checked.circuit, volts, seconds)
+    read = checked.gate.read if checked.gate is not None else None
+    if read is not None and not isinstance(read, SimulationFailed) and read.trace is not None:
+        time, states = read.trace
+        out["ngspice"] = Trace(time / seconds, states / volts)
+    return out
+
+
+def _trace(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
+    periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else 30
+    start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
+    run = flow.run(start, periods, points=TRACE_POINTS)
+    time = np.arange(len(run.strobes)) * flow.drive.period / TRACE_POINTS
+    return Trace(time / seconds, run.strobes / volts)

@@ -1,0 +1,251 @@
+"""How many boards will show the response: Monte Carlo over component spread.
+
+Every verdict is decided on the exact circuit rung, started on the nominal design's orbit; ngspice
+repeats the first samples of each response, started on the attractor that the exact rung reached.
+Finished blocks of samples go to disk at once (``designer.blocks``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from scipy.stats import binomtest
+
+from designer.attractor import settle
+from designer.circuit import Circuit
+from designer.deck import Excitation, SolverSettings
+from designer.flow import Flow
+from designer.gate import Subject, job
+from designer.modelfile import Response
+from designer.ngspice import SimulationFailed
+from designer.orbit import Orbit, OrbitStatus
+from designer.reduction import FloatingCircuit, Reduction
+from designer.spread import Spread, draw
+from designer.system import Drive
+from designer.waveform_orbit import Read
+from designer.workers import SpicePool
+
+BLOCK = 25
+"""Samples in a block; block edges depend on the sample index alone."""
+NGSPICE_SAMPLES = 40
+"""How many samples of each response ngspice repeats at least (all, where there are fewer)."""
+
+
+REFINEMENTS = 3
+"""How often the step is halved where ngspice disagrees, until two step sizes say the same."""
+
+
+class Verdict(StrEnum):
+    """What became of a response on one board (docs/definitions.md)."""
+
+    OK = "ok"
+    LOST = "lost"
+    GRAZING = "grazing"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Question:
+    """One wanted response of the nominal design: what every board is asked.
+
+    start : nominal orbit on the exact circuit. settings : ngspice's, from the numerics gate;
+    None where the gate did not pass, and ngspice is then not asked.
+    """
+
+    spec: Response
+    excitation: Excitation
+    start: Orbit
+    settings: SolverSettings | None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One sample of one response.
+
+    response : n-p-q or status on the exact circuit; the margins are its. ngspice : n-p-q or
+    status there, "" where ngspice was not asked; agrees : whether both say the same.
+    """
+
+    sample: int
+    question: int
+    verdict: Verdict
+    response: str
+    reason: str
+    radius: float
+    penetration: float
+    miss: float
+    asymmetry: float
+    periods: int
+    ngspice: str = ""
+    ngspice_reason: str = ""
+
+    @property
+    def agrees(self) -> bool | None:
+        """None where ngspice was not asked or failed."""
+        if self.ngspice in ("", OrbitStatus.FAILED):
+            return None
+        return self.ngspice == self.response
+
+
+@dataclass(frozen=True)
+class Yield:
+    """Counts, and the two-sided 95 % Wilson interval of ok/(samples - failed)."""
+
+    ok: int
+    lost: int
+    grazing: int
+    failed: int
+
+    @property
+    def samples(self) -> int:
+        return self.ok + self.lost + self.grazing + self.failed
+
+    @property
+    def rate(self) -> float:
+        """nan where nothing was decided."""
+        decided = self.samples - self.failed
+        return self.ok / decided if decided else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        decided = self.samples - self.failed
+        if not decided:
+            return (0.0, 1.0)
+        ci = binomtest(self.ok, decided).proportion_ci(0.95, method="wilson")
+        return (float(ci.low), float(ci.high))
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """Everything that decides a study's samples; equal plans give equal answers."""
+
+    circuit: Circuit
+    spread: Spread
+    seed: int
+    samples: int
+    questions: tuple[Question, ...]
+
+    def blocks(self) -> Iterator[range]:
+        """Sample indices block by block."""
+        for first in range(0, self.samples, BLOCK):
+            yield range(first, min(first + BLOCK, self.samples))
+
+
+def count(answers: Sequence[Answer]) -> Yield:
+    """The yield of a set of answers to one question."""
+    tally = {v: sum(a.verdict is v for a in answers) for v in Verdict}
+    return Yield(
+        tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
+    )
+
+
+def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
+    """Verdict and reason. Without an expectation the nominal circuit's own response is wanted."""
+    if orbit.status is OrbitStatus.GRAZING:
+        return Verdict.GRAZING, orbit.reason
+    if orbit.status in (OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED, OrbitStatus.DIVERGED):
+        return Verdict.FAILED, orbit.reason or str(orbit.status)
+    if orbit.status is not OrbitStatus.PERIODIC:
+        return Verdict.LOST, str(orbit.status)
+    n, p, q = orbit.n, orbit.p, orbit.q
+    wanted = (
+        spec.accepts(n, p, q)
+        if spec.expect is not None
+        else (n, p, q) in ((nominal.n, nominal.p, nominal.q), (nominal.n, nominal.q, nominal.p))
+    )
+    if not wanted:
+        return Verdict.LOST, f"to {orbit.response}"
+    if spec.symmetric and not orbit.symmetric:
+        return Verdict.LOST, f"asymmetric by {orbit.asymmetry:.2g} of the peak"
+    return Verdict.OK, ""
+
+
+def run_block(
+    plan: StudyPlan,
+    block: range,
+    pool: SpicePool | None,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Answer]:
+    """Answers for every sample of the block and every question, in order.
+
+    ``progress`` is called once per answer, and once more for each that ngspice repeats.
+    """
+    with ThreadPoolExecutor(jobs) as threads:
+        pieces = threads.map(lambda index: _exact(plan, index, progress), block)
+        found = [pair for piece in pieces for pair in piece]
+    answers = [answer for answer, _ in found]
+    if pool is None:
+        return answers
+    asked = [
+        (k, subject, settings)
+        for k, (answer, subject) in enumerate(found)
+        if answer.sample < NGSPICE_SAMPLES
+        and subject is not None
+        and (settings := plan.questions[answer.question].settings) is not None
+    ]
+    for _ in range(REFINEMENTS + 1):
+        again = []
+        for i, result in pool.map(job(subject, settings) for _, subject, settings in asked):
+            k, subject, settings = asked[i]
+            before = answers[k]
+            answers[k] = _heard(before, result)
+            settled = before.ngspice == answers[k].ngspice or answers[k].agrees
+            if settled:
+                progress()
+            else:
+                again.append((k, subject, replace(settings, max_step=settings.max_step / 2.0)))
+        asked = sorted(again, key=lambda item: item[0])
+    for _ in asked:
+        progress()
+    return answers
+
+
+def _heard(answer: Answer, result: Read | SimulationFailed) -> Answer:
+    if isinstance(result, SimulationFailed):
+        return replace(answer, ngspice=str(OrbitStatus.FAILED), ngspice_reason=result.reason)
+    return replace(answer, ngspice=result.orbit.response, ngspice_reason=result.orbit.reason)
+
+
+def _exact(
+    plan: StudyPlan, index: int, progress: Callable[[], None]
+) -> list[tuple[Answer, Subject | None]]:
+    """One board on the exact rung: an answer per question, and what ngspice would need."""
+    board = draw(plan.circuit, plan.spread, plan.seed, index)
+    out: list[tuple[Answer, Subject | None]] = []
+    reduction = Reduction(plan.circuit, board)
+    system = reduction.system()
+    for number, question in enumerate(plan.questions):
+        excitation = question.excitation
+        subject: Subject | None = None
+        try:
+            drive = Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude)
+            orbit = settle(Flow(system, drive), question.start.start)
+            verdict, reason = judge(orbit, question.spec, question.start)
+            if len(orbit.start):
+                subject = Subject(reduction, excitation, orbit)
+        except (FloatingCircuit, ArithmeticError) as error:
+            orbit, verdict, reason = Orbit(OrbitStatus.FAILED), Verdict.FAILED, str(error)
+        out.append(
+            (
+                Answer(
+                    sample=index,
+                    question=number,
+                    verdict=verdict,
+                    response=orbit.response,
+                    reason=reason,
+                    radius=orbit.radius,
+                    penetration=orbit.penetration,
+                    miss=orbit.miss,
+                    asymmetry=orbit.asymmetry,
+                    periods=orbit.periods,
+                ),
+                subject,
+            )
+        )
+        progress()
+    return out
