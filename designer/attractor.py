@@ -34,7 +34,6 @@ def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
     Returns an orbit of any status; it never raises for lack of an answer.
     """
     spent = 0
-    peak = np.abs(x)
     for stage, periods in enumerate(STAGES):
         run = flow.run(x, periods, mode=mode)
         spent += len(run.strobes) - 1
@@ -46,9 +45,7 @@ def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
             )
             return Orbit(status, reason=str(run.status), periods=spent)
         x, mode = run.strobes[-1], run.mode
-        tail = run.strobes[-2 * MAX_PERIOD :]
-        peak = np.maximum(np.abs(tail).max(axis=0), 1e-300)
-        found, cost = _polish(flow, run, peak)
+        found, cost = _polish(flow, run)
         spent += cost
         if found is not None:
             return _with_cost(found, spent)
@@ -69,20 +66,34 @@ def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
     )
 
 
-def shoot(flow: Flow, x: Array, n: int, mode: ModeKey | None = None) -> tuple[Array, Array] | None:
+def peaks_near(flow: Flow, x: Array, mode: ModeKey | None = None, points: int = 32) -> Array:
+    """(states,) peak of each state over the drive period that starts at x.
+
+    A state's value at the strobe may be tiny beside its peak, so strobes alone give no scale.
+    States that hardly move are measured against the largest.
+    """
+    peak = np.abs(flow.run(x, 1, mode=mode, points=points).strobes).max(axis=0)
+    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+
+
+def shoot(
+    flow: Flow, x: Array, n: int, mode: ModeKey | None = None, peak: Array | None = None
+) -> tuple[Array, Array] | None:
     """A fixed point of the n-period map near x, with its monodromy matrix, or None.
 
     Newton with at most eight evaluations; converged means that the map moves the point by less
-    than 1e-11 of the peak. Finds unstable orbits as well as stable ones.
+    than 1e-11 of the peak. Finds unstable orbits as well as stable ones, and does not check that
+    n is the least period.
     """
     size = len(x)
     last = np.inf
+    if peak is None:
+        peak = peaks_near(flow, x, mode)
     for _ in range(8):
         run = flow.run(x, n, mode=mode, tangent=np.eye(size))
         if run.status is not FlowStatus.DONE or run.tangent is None:
             return None
         step = run.strobes[-1] - x
-        peak = np.maximum(np.abs(run.strobes).max(axis=0), 1e-12 * np.abs(run.strobes).max())
         error = float((np.abs(step) / peak).max())
         if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
             return x, run.tangent
@@ -221,24 +232,36 @@ def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
     return None if found is None else describe(flow, found[0], orbit.n, found[1])
 
 
-def _polish(flow: Flow, run: FlowResult, peak: Array) -> tuple[Orbit | None, int]:
+def _polish(flow: Flow, run: FlowResult) -> tuple[Orbit | None, int]:
     """Try to turn the end of a settling run into a periodic orbit; also what it cost."""
-    strobes, cost = run.strobes, 0
+    strobes, cost = run.strobes, 1
+    peak = peaks_near(flow, strobes[-1], run.mode)
     for n in range(1, min(MAX_PERIOD, len(strobes) - 1) + 1):
         gap = np.abs(strobes[-1] - strobes[-1 - n]) / peak
         if gap.max() > 1e-2:
             continue
-        found = shoot(flow, strobes[-1], n, run.mode)
+        found = shoot(flow, strobes[-1], n, run.mode, peak)
         cost += 8 * n
         if found is None:
             continue
         x, monodromy = found
+        laps = flow.run(x, n).strobes
+        least = next(
+            d
+            for d in range(1, n + 1)
+            if n % d == 0 and (np.abs(laps[d] - x) <= STROBE_TOLERANCE * peak).all()
+        )
+        if least < n:
+            shorter = shoot(flow, x, least, None, peak)
+            if shorter is None:
+                continue
+            x, monodromy = shorter
         stable = np.abs(np.linalg.eigvals(monodromy)).max() < 1.0
         near = (np.abs(x - strobes[-1]) / peak).max() < NEAR
         if not (stable and near):
             continue
-        orbit = describe(flow, x, n, monodromy)
-        cost += 4 * n
+        orbit = describe(flow, x, least, monodromy)
+        cost += 5 * n
         if orbit.status is not OrbitStatus.NOT_SETTLED:
             return orbit, cost
     return None, cost

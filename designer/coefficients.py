@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
 
 from designer.circuit import Board, Circuit, nominal_board
 from designer.mechanics import SecondOrderSystem
+from designer.minimax import minimax
 from designer.reduction import Reduction
 from designer.system import Array
 
@@ -97,7 +97,7 @@ def coefficient_errors(
     if not np.all(np.isfinite(h)):
         wrong = [name for name, value in zip(names, h, strict=True) if not np.isfinite(value)]
         raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
-    free = _minimax(h, D[:, [0, *range(2, 1 + n)]])  # volts of x1 is the amplitude, set below
+    free = minimax(h, D[:, [0, *range(2, 1 + n)]])  # volts of x1 is the amplitude, set below
     residual = h + D[:, [0, *range(2, 1 + n)]] @ free
     errors = dict(zip(names, (float(e) for e in residual), strict=True))
     relative = np.exp(np.concatenate([[0.0], free[1:]]))
@@ -144,33 +144,6 @@ def _dead_zone(reduction: Reduction) -> tuple[Array, float, float, float]:
         float(np.log1p(-flat / steep)),
         threshold,
     )
-
-
-def _minimax(h: Array, D: Array) -> Array:
-    """s that minimises max |h + D s|, and among those the sum of |h + D s|."""
-    m, n = D.shape
-    level = linprog(
-        np.concatenate([np.zeros(n), [1.0]]),
-        A_ub=np.block([[D, -np.ones((m, 1))], [-D, -np.ones((m, 1))]]),
-        b_ub=np.concatenate([-h, h]),
-        bounds=[(None, None)] * n + [(0.0, None)],
-        method="highs",
-    )
-    if level.x is None:  # feasible for every h, so only a broken solver comes here
-        raise ArithmeticError(f"no minimax scales: {level.message}")
-    worst = float(np.abs(h + D @ level.x[:n]).max())
-    # Second pass: |e_i| <= t_i <= worst, least sum of t.
-    total = linprog(
-        np.concatenate([np.zeros(n), np.ones(m)]),
-        A_ub=np.block([[D, -np.eye(m)], [-D, -np.eye(m)]]),
-        b_ub=np.concatenate([-h, h]),
-        bounds=[(None, None)] * n + [(0.0, worst + 1e-12)] * m,
-        method="highs",
-    )
-    best = level.x[:n]
-    if total.x is not None and np.abs(h + D @ total.x[:n]).max() <= worst + 1e-9:
-        best = total.x[:n]
-    return np.asarray(best, dtype=float)
 
 
 def _state(j: int) -> str:

@@ -19,8 +19,12 @@ import numpy as np
 from designer.selection import SOLVER
 from designer.system import Array
 
-MAX_LEVEL_ROWS = 600
-"""Rows of one table that go into the program; the least errors are kept."""
+FEW = 120
+"""Values of a list that is short enough to leave one more resistor free."""
+GROUPS, ROWS = 40, 15
+"""Gains A_, and rows of each table for each gain, that go into the program."""
+SLOPES = 24_000
+"""Rows of the slope's table that are looked at further."""
 
 
 @dataclass(frozen=True)
@@ -65,17 +69,20 @@ def size(
     slopes = _slope_rows(target, resistors, heavy, base)
     if len(slopes) == 0:
         return "stop slope"
-    nulls = _null_rows(target, heavy, base, np.unique(slopes[:, 4]))
+    gains = np.unique(slopes[:, 4])
+    nulls = _null_rows(target, heavy, np.array([base]), base, gains)
+    if len(heavy) <= FEW and (len(nulls) == 0 or nulls[:, 6].min() > 1e-9):
+        # A coarse series reaches the null better with a free input resistor.
+        inputs = heavy[(heavy >= base) & (heavy < 10.0 * base)]
+        nulls = _null_rows(target, heavy, inputs, base, gains)
     if len(nulls) == 0:
         return "dead-zone null"
-    common = np.intersect1d(np.round(slopes[:, 4], 12), np.round(nulls[:, 5], 12))
-    slopes = _best_of_each(slopes, 4, 5, common)
-    nulls = _best_of_each(nulls, 5, 6, common)
+    slopes, nulls, common = _best_groups(slopes, nulls)
     i, j, word = _choose(slopes, nulls, common, used, base)
     r206, r207, r210, r50 = slopes[i, :4]
-    r201, r203, r204, r205 = nulls[j, :4]
+    r200, r201, r203, r204, r205 = nulls[j, [7, 0, 1, 2, 3]]
     values = {
-        "R50": r50, "R200": base, "R201": r201, "R202": base, "R203": r203, "R204": r204,
+        "R50": r50, "R200": r200, "R201": r201, "R202": base, "R203": r203, "R204": r204,
         "R205": r205, "R206": r206, "R207": r207, "R208": base, "R209": base, "R210": r210,
     }  # fmt: skip
     return DeadZone(
@@ -104,18 +111,20 @@ def _slope_rows(target: DeadZoneTarget, resistors: Array, heavy: Array, base: fl
     r50, error = _nearest(np.log(heavy), wanted)
     rows = np.stack([r206[i], r207[i], feedback[j], heavy[r50], np.log(gain[i]), error], axis=1)
     rows = rows[error < 0.05]
-    return rows[np.argsort(rows[:, 5], kind="stable")][: 40 * MAX_LEVEL_ROWS]
+    return rows[np.argsort(rows[:, 5], kind="stable")][:SLOPES]
 
 
-def _null_rows(target: DeadZoneTarget, heavy: Array, base: float, gains: Array) -> Array:
-    """Columns R201, R203, R204, R205, ln A+, ln A_, mu |ln(beta A+/A_)|."""
+def _null_rows(
+    target: DeadZoneTarget, heavy: Array, inputs: Array, base: float, gains: Array
+) -> Array:
+    """Columns R201, R203, R204, R205, ln A+, ln A_, mu |ln(beta A+/A_)|, R200 of ``inputs``."""
     wide = heavy[(heavy >= base) & (heavy <= 100 * base)]
-    r201, r203 = (a.ravel() for a in np.meshgrid(wide, wide))
-    steep = r201 * r203 / base**2
+    r200, r201, r203 = (a.ravel() for a in np.meshgrid(inputs, wide, wide))
+    steep = r201 * r203 / (r200 * base)
     least = target.saturation / target.threshold
     # U3B must still be linear where U3C reaches its limit.
     fine = (steep >= least) & (steep <= 1.2 * least) & (r203 / base >= 1.15)
-    r201, r203, steep = r201[fine], r203[fine], np.log(steep[fine])
+    r200, r201, r203, steep = r200[fine], r201[fine], r203[fine], np.log(steep[fine])
     low = heavy[heavy <= 20 * base]
     r204, r205 = (a.ravel() for a in np.meshgrid(low, low))
     loaded = r205 * base / (r205 + base)
@@ -123,7 +132,7 @@ def _null_rows(target: DeadZoneTarget, heavy: Array, base: float, gains: Array) 
     order = np.argsort(beta, kind="stable")
     r204, r205, beta = r204[order], r205[order], beta[order]
     if len(steep) == 0 or len(beta) == 0:
-        return np.zeros((0, 7))
+        return np.zeros((0, 8))
     out = []
     for gain in gains:
         index, error = _nearest(beta, gain - steep)
@@ -141,6 +150,7 @@ def _null_rows(target: DeadZoneTarget, heavy: Array, base: float, gains: Array) 
                     steep[keep],
                     same,
                     target.mu * error[keep],
+                    r200[keep],
                 ],
                 axis=1,
             )
@@ -156,10 +166,26 @@ def _nearest(table: Array, wanted: Array) -> tuple[Array, Array]:
     return index, np.abs(table[index] - wanted)
 
 
-def _best_of_each(rows: Array, group: int, error: int, common: Array) -> Array:
-    """Rows of groups that both tables have; least errors first, as many as the program holds."""
-    rows = rows[np.isin(np.round(rows[:, group], 12), common)]
-    return rows[np.argsort(rows[:, error], kind="stable")][:MAX_LEVEL_ROWS]
+def _best_groups(slopes: Array, nulls: Array) -> tuple[Array, Array, Array]:
+    """Rows of the gains A_ that both tables have and whose larger least error is smallest.
+
+    At most ``GROUPS`` gains with ``ROWS`` rows each: what the program holds.
+    """
+    key1, key2 = np.round(slopes[:, 4], 12), np.round(nulls[:, 5], 12)
+    common = np.intersect1d(key1, key2)
+    least1, least2 = (np.full(len(common), np.inf) for _ in range(2))
+    for least, key, error in ((least1, key1, slopes[:, 5]), (least2, key2, nulls[:, 6])):
+        known = np.isin(key, common)
+        np.minimum.at(least, np.searchsorted(common, key[known]), error[known])
+    chosen = np.sort(common[np.argsort(np.maximum(least1, least2), kind="stable")[:GROUPS]])
+    out = []
+    for rows, key, error in ((slopes, key1, slopes[:, 5]), (nulls, key2, nulls[:, 6])):
+        keep = []
+        for gain in chosen:
+            own = np.flatnonzero(key == gain)
+            keep.append(own[np.argsort(error[own], kind="stable")[:ROWS]])
+        out.append(rows[np.concatenate(keep)])
+    return out[0], out[1], chosen
 
 
 def _choose(
@@ -169,9 +195,8 @@ def _choose(
     z1, z2 = cp.Variable(len(slopes), boolean=True), cp.Variable(len(nulls), boolean=True)
     error = cp.Variable(nonneg=True)
     g1, g2 = np.round(slopes[:, 4], 12), np.round(nulls[:, 5], 12)
-    groups = common[np.isin(common, g1) & np.isin(common, g2)]
-    m1 = (g1[None, :] == groups[:, None]).astype(float)
-    m2 = (g2[None, :] == groups[:, None]).astype(float)
+    m1 = (g1[None, :] == common[:, None]).astype(float)
+    m2 = (g2[None, :] == common[:, None]).astype(float)
     rules = [
         cp.sum(z1) == 1,
         cp.sum(z2) == 1,
@@ -188,11 +213,11 @@ def _choose(
         raise ArithmeticError(f"HiGHS: {problem.status}")
     best = int(np.argmax(z1.value)), int(np.argmax(z2.value))
     reached = max(slopes[best[0], 5], nulls[best[1], 6])
-    values = np.unique(np.concatenate([slopes[:, :4].ravel(), nulls[:, :4].ravel()]))
+    values = np.unique(np.concatenate([slopes[:, :4].ravel(), nulls[:, [0, 1, 2, 3, 7]].ravel()]))
     values = values[~np.isin(values, [*used, base])]
     kinds = cp.Variable(len(values), nonneg=True)
     uses = []
-    for z, columns in ((z1, slopes[:, :4]), (z2, nulls[:, :4])):
+    for z, columns in ((z1, slopes[:, :4]), (z2, nulls[:, [0, 1, 2, 3, 7]])):
         for column in columns.T:
             member = (column[None, :] == values[:, None]).astype(float)
             uses.append(member @ z <= kinds)

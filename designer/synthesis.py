@@ -16,11 +16,12 @@ from designer import dead_zone, matching, topology
 from designer.catalog import Catalog, OpAmp
 from designer.circuit import Circuit
 from designer.coefficients import CoefficientErrors, coefficient_errors
+from designer.completion import Bounds
 from designer.errors import InputError, Unreachable
 from designer.linear_block import FIRST_LEVEL, GROWTH, LAST_LEVEL, Targets, ratio_table
 from designer.model import Dimensionless
 from designer.modelfile import CircuitSpec
-from designer.selection import Bounds, Selection, select
+from designer.selection import Selection, select
 from designer.system import Array
 
 SWING_SHARE = 0.8
@@ -121,7 +122,11 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
     base = _nearest(resistors, BASE)
     swing = SWING_SHARE * saturation
     bounds = _bounds(model, spec, peaks, resistors)
-    chosen, bound, proved = _linear(model, spec, resistors, capacitors, bounds)
+    prices = np.array(
+        [catalog.part("capacitor", v, spec.capacitor_grade).price for v in capacitors.tolist()],
+        dtype=float,
+    )
+    chosen, bound, proved = _linear(model, spec, resistors, capacitors, prices, bounds)
     values = {
         name: _nearest(resistors if name.startswith("R") else capacitors, value)
         for name, value in chosen.values.items()
@@ -188,7 +193,12 @@ def _output_gain(model: Dimensionless, peaks: Peaks) -> float:
 
 
 def _linear(
-    model: Dimensionless, spec: CircuitSpec, resistors: Array, capacitors: Array, bounds: Bounds
+    model: Dimensionless,
+    spec: CircuitSpec,
+    resistors: Array,
+    capacitors: Array,
+    prices: Array,
+    bounds: Bounds,
 ) -> tuple[Selection, float, bool]:
     """(best linear block, proved lower bound of its error, whether the bound is its error)."""
     targets = Targets.from_state_matrix(model.second_order().state_matrix())
@@ -201,7 +211,7 @@ def _linear(
     while level < LAST_LEVEL and len(signal):
         table = ratio_table(signal, capacitors, targets, level, bounds.p_range)
         if len(table):
-            answer = select(table, signal, capacitors, targets, bounds, level)
+            answer = select(table, signal, capacitors, prices, targets, bounds, level)
             if isinstance(answer, Selection):
                 whole = answer.complete or answer.error <= free + PROOF_TOLERANCE
                 return answer, answer.error if whole else max(free, lowest), whole
