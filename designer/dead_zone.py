@@ -19,6 +19,8 @@ import numpy as np
 from designer.selection import SOLVER
 from designer.system import Array
 
+THRESHOLD_ROOM = (1.06, 1.2)
+"""How far below the largest possible threshold the sized one may lie: a narrow range first."""
 FEW = 120
 """Values of a list that is short enough to leave one more resistor free."""
 GROUPS, ROWS = 40, 15
@@ -70,11 +72,15 @@ def size(
     if len(slopes) == 0:
         return "stop slope"
     gains = np.unique(slopes[:, 4])
-    nulls = _null_rows(target, heavy, np.array([base]), base, gains)
+    inputs = np.array([base])
+    nulls = np.zeros((0, 8))
+    for room in THRESHOLD_ROOM:
+        if len(nulls) == 0 or nulls[:, 6].min() > 1e-9:
+            nulls = _null_rows(target, heavy, inputs, base, gains, room)
     if len(heavy) <= FEW and (len(nulls) == 0 or nulls[:, 6].min() > 1e-9):
         # A coarse series reaches the null better with a free input resistor.
         inputs = heavy[(heavy >= base) & (heavy < 10.0 * base)]
-        nulls = _null_rows(target, heavy, inputs, base, gains)
+        nulls = _null_rows(target, heavy, inputs, base, gains, THRESHOLD_ROOM[-1])
     if len(nulls) == 0:
         return "dead-zone null"
     slopes, nulls, common = _best_groups(slopes, nulls)
@@ -115,7 +121,12 @@ def _slope_rows(target: DeadZoneTarget, resistors: Array, heavy: Array, base: fl
 
 
 def _null_rows(
-    target: DeadZoneTarget, heavy: Array, inputs: Array, base: float, gains: Array
+    target: DeadZoneTarget,
+    heavy: Array,
+    inputs: Array,
+    base: float,
+    gains: Array,
+    room: float,
 ) -> Array:
     """Columns R201, R203, R204, R205, ln A+, ln A_, mu |ln(beta A+/A_)|, R200 of ``inputs``."""
     wide = heavy[(heavy >= base) & (heavy <= 100 * base)]
@@ -123,7 +134,7 @@ def _null_rows(
     steep = r201 * r203 / (r200 * base)
     least = target.saturation / target.threshold
     # U3B must still be linear where U3C reaches its limit.
-    fine = (steep >= least) & (steep <= 1.2 * least) & (r203 / base >= 1.15)
+    fine = (steep >= least) & (steep <= room * least) & (r203 / base >= 1.15)
     r200, r201, r203, steep = r200[fine], r201[fine], r203[fine], np.log(steep[fine])
     low = heavy[heavy <= 20 * base]
     r204, r205 = (a.ravel() for a in np.meshgrid(low, low))

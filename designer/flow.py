@@ -2,7 +2,8 @@
 
 The general engine: any number of states and modes, constant terms, guards that see the drive. Each
 step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
-absent or found (see ``designer.flow_kernel``).
+absent or found (see ``designer.flow_kernel``). Four states with one stop pair take the modal fast
+path (``designer.modal``) where only strobes, impact counts and tangents are asked for.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from designer import flow_kernel as kernel
+from designer import modal, modal_kernel
 from designer.system import Array, Drive, Mode, ModeKey, PiecewiseLinearSystem
 
 STEP = 0.5
@@ -68,11 +70,15 @@ class FlowResult:
 
 
 class Flow:
-    """The flow of one system under one drive; keeps the tables of the modes it has met."""
+    """The flow of one system under one drive; keeps the tables of the modes it has met.
 
-    def __init__(self, system: PiecewiseLinearSystem, drive: Drive) -> None:
+    fast : take the modal fast path where it fits; False: always the general kernel.
+    """
+
+    def __init__(self, system: PiecewiseLinearSystem, drive: Drive, *, fast: bool = True) -> None:
         self.system = system
         self.drive = drive
+        self._modal = modal.tables(system, drive) if fast else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
@@ -96,6 +102,8 @@ class Flow:
         """
         n, c = self.system.size, len(self.system.clearances)
         key = self.system.mode_at(x, self.drive.offset, mode)
+        if self._modal is not None and points == 1 and not measure:
+            return self._run_modal(self._modal, x, periods, key, tangent, max_events)
         z = np.concatenate([x, [0.0, 1.0, 1.0]])
         clock = np.zeros(2)
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
@@ -136,11 +144,7 @@ class Flow:
             )
             if code == kernel.UNKNOWN_MODE:
                 self._link(int(cursor[1]), int(cursor[3]))
-        status = {
-            kernel.DONE: FlowStatus.DONE,
-            kernel.TOO_MANY_EVENTS: FlowStatus.CHATTER,
-            kernel.DIVERGED: FlowStatus.DIVERGED,
-        }[code]
+        status = _STATUS[code]
         done, k = int(cursor[0]), int(clock[1])
         return FlowResult(
             status=status,
@@ -154,6 +158,48 @@ class Flow:
             miss=float(log.graze[1]),
             tangencies=int(log.graze[2]),
             clipped_time=float(log.clipped[0]),
+        )
+
+    def _run_modal(
+        self,
+        tables: modal_kernel.ModalTables,
+        x: Array,
+        periods: int,
+        key: ModeKey,
+        tangent: Array | None,
+        max_events: int,
+    ) -> FlowResult:
+        """The same by the fast path: no impact log, no extremes."""
+        keys = modal.keys(self.system)
+        cursor = np.array([keys.index(key), 0], dtype=np.int64)
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
+        strobes = np.empty((periods + 1, 4))
+        strobes[0] = x
+        counts = np.zeros((periods, 2), dtype=np.int64)
+        code = modal_kernel.advance(
+            tables,
+            np.array(x, dtype=float),
+            cursor,
+            self.drive.period,
+            phi,
+            max_events,
+            strobes,
+            counts,
+        )
+        done = int(cursor[1])
+        nothing = np.zeros(0)
+        return FlowResult(
+            status=_STATUS[code],
+            strobes=strobes[: done + 1],
+            counts=counts[:done, None, :],
+            mode=keys[int(cursor[0])],
+            tangent=None if tangent is None else phi,
+            impacts=Impacts(nothing, counts[:0, 0], counts[:0, 0], np.zeros((0, 4))),
+            extremes=np.tile([np.inf, -np.inf], (4, 1)),
+            penetration=np.inf,
+            miss=np.inf,
+            tangencies=0,
+            clipped_time=0.0,
         )
 
     def _number(self, key: ModeKey) -> int:
@@ -183,6 +229,13 @@ class Flow:
         """Give a guard its target, building the mode if it is new."""
         target = self._number(self.system.mode(self._keys[number]).guards[guard].target)
         self._tables.target[number, guard] = target
+
+
+_STATUS = {
+    kernel.DONE: FlowStatus.DONE,
+    kernel.TOO_MANY_EVENTS: FlowStatus.CHATTER,
+    kernel.DIVERGED: FlowStatus.DIVERGED,
+}
 
 
 def augmented(mode: Mode, drive: Drive) -> Array:

@@ -24,7 +24,7 @@ from designer.modelfile import CircuitSpec
 from designer.selection import Selection, select
 from designer.system import Array
 
-SWING_SHARE = 0.8
+SWING_SHARE = 0.85
 """Of the op-amp's limit: what the states' peaks may use; the rest is for spread and transients."""
 LEVEL_RATIO = 4.0
 """Largest ratio between the peaks of the state voltages that belong together."""
