@@ -1,8 +1,8 @@
 """Which attractor a start leads to: settling, shooting, classification.
 
 Settle for 20 drive periods, look for the period n at which the strobe nearly repeats, polish by
-Newton's method on the n-period map and accept only what converged, is stable and lies where the
-settling had arrived; otherwise settle longer (40, 140, 800, 4000 periods in all). Newton at once
+Newton's method on the n-period map and accept only what converged, is stable, lies where the
+settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800, 4000 periods in all). Newton at once
 would be faster and wrong: it also lands on unstable orbits and on other attractors.
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.stats import qmc
 
+from designer.errors import InputError
 from designer.flow import Flow, FlowResult, FlowStatus
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.system import Array, ModeKey
@@ -24,6 +25,8 @@ ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
 NEAR = 0.05
 """Of the peak: how far a polished orbit may lie from where settling had arrived."""
+CLOSING = 400
+"""Most periods that are spent on seeing the settling trajectory close in on a polished orbit."""
 CHAOS = 0.02
 """Growth of a tangent vector per drive period that is taken for chaos after 800 periods."""
 
@@ -104,6 +107,38 @@ def shoot(
         if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
             return None
         last, mode = error, None
+    return None
+
+
+def shoot_symmetric(flow: Flow, x: Array, n: int) -> tuple[Array, Array] | None:
+    """A symmetric orbit of odd period n near x, by the half-period map, or None.
+
+    x(t + nT/2) = mirror · x(t); the paper's Eq. (9) is the case of one impact on each stop. Half
+    the work of ``shoot``, and it cannot leave for an asymmetric branch, so beyond a pitchfork it
+    follows the unstable symmetric orbit. Returns the point and the full monodromy matrix.
+
+    Raises
+    ------
+    InputError : n is even, or the system has no mirror.
+    """
+    mirror = flow.system.mirror
+    if n % 2 == 0 or mirror is None:
+        raise InputError(None, "n", n, "an odd period of a system with a mirror")
+    size, last = len(x), np.inf
+    peak = peaks_near(flow, x)
+    for _ in range(12):
+        run = flow.run(x, n, points=2, stretches=n, tangent=np.eye(size))
+        if run.status is not FlowStatus.DONE or run.tangent is None:
+            return None
+        step = mirror @ run.strobes[-1] - x
+        half = mirror @ run.tangent
+        error = float((np.abs(step) / peak).max())
+        if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
+            return x, half @ half
+        x = x - np.linalg.solve(half - np.eye(size), step)
+        if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
+            return None
+        last = error
     return None
 
 
@@ -256,15 +291,33 @@ def _polish(flow: Flow, run: FlowResult) -> tuple[Orbit | None, int]:
             if shorter is None:
                 continue
             x, monodromy = shorter
-        stable = np.abs(np.linalg.eigvals(monodromy)).max() < 1.0
-        near = (np.abs(x - strobes[-1]) / peak).max() < NEAR
-        if not (stable and near):
+        radius = float(np.abs(np.linalg.eigvals(monodromy)).max())
+        if radius >= 1.0 or (np.abs(x - strobes[-1]) / peak).max() >= NEAR:
+            continue
+        turns = int(np.clip(np.log(1e-4) / np.log(max(radius, 1e-3)), 2, CLOSING // n))
+        cost += turns * n
+        if not _closes_in(flow, run, x, turns * n, radius**turns, peak):
             continue
         orbit = describe(flow, x, least, monodromy)
         cost += 5 * n
         if orbit.status is not OrbitStatus.NOT_SETTLED:
             return orbit, cost
     return None, cost
+
+
+def _closes_in(
+    flow: Flow, run: FlowResult, x: Array, periods: int, factor: float, peak: Array
+) -> bool:
+    """Whether the settling trajectory itself goes to the orbit through x: a passing one leaves.
+
+    factor : what the multipliers say of the distance after ``periods``; ten times that is granted.
+    """
+    later = flow.run(run.strobes[-1], periods, mode=run.mode)
+    if later.status is not FlowStatus.DONE:
+        return False
+    before = float((np.abs(run.strobes[-1] - x) / peak).max())
+    after = float((np.abs(later.strobes[-1] - x) / peak).max())
+    return after <= max(10.0 * factor * before, STROBE_TOLERANCE)
 
 
 def _with_cost(orbit: Orbit, periods: int) -> Orbit:

@@ -8,6 +8,7 @@ path (``designer.modal``) where only strobes, impact counts and tangents are ask
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -16,12 +17,19 @@ from scipy.linalg import matrix_balance
 
 from designer import flow_kernel as kernel
 from designer import modal, modal_kernel
+from designer.errors import InputError
 from designer.system import Array, Drive, Mode, ModeKey, PiecewiseLinearSystem
 
 STEP = 0.5
 """‖A h‖ of one step, after balancing."""
 MAX_EVENTS = 10_000
 """Mode changes in one drive period past which the flow stops: chattering ends with a status."""
+
+
+CHUNK = 500
+"""Periods between two looks at ``interrupt``: some 10 to 100 ms of compiled work."""
+interrupt = threading.Event()
+"""Set to stop every flow of this process: compiled code hears no Ctrl-C by itself."""
 
 
 class FlowStatus(StrEnum):
@@ -92,26 +100,37 @@ class Flow:
         tangent: Array | None = None,
         measure: bool = False,
         points: int = 1,
+        stretches: int | None = None,
         max_events: int = MAX_EVENTS,
+        room: int | None = None,
     ) -> FlowResult:
         """Start at a strobe (drive phase 0) in state x (n,) and run for ``periods`` periods.
 
         points : strobes per period; more than one gives a dense trace, as exact as the strobe.
+        stretches : stop after so many of the ``periods · points`` stretches.
+        room : impacts that the log holds; by itself it grows to what is met.
         tangent : (n, k) vectors to be carried by the linearised flow.
         measure : also log impacts and refine extremes, at about three times the cost.
+
+        Raises
+        ------
+        InputError : no period, no point, or a state of the wrong shape or not finite.
+        KeyboardInterrupt : ``interrupt`` was set by another thread.
         """
+        x = np.array(x, dtype=float)
+        _check(x, self.system.size, periods, points)
         n, c = self.system.size, len(self.system.clearances)
         key = self.system.mode_at(x, self.drive.offset, mode)
-        if self._modal is not None and points == 1 and not measure:
+        stretches = periods * points if stretches is None else stretches
+        if self._modal is not None and points == 1 and not measure and stretches == periods:
             return self._run_modal(self._modal, x, periods, key, tangent, max_events)
         z = np.concatenate([x, [0.0, 1.0, 1.0]])
         clock = np.zeros(2)
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
         phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
-        stretches = periods * points
         phases = 2.0 * np.pi * np.arange(points) / points
         anchor = np.stack([np.sin(phases), np.cos(phases)], axis=1)
-        capacity = 64 * periods if measure else 0
+        capacity = (8 + 16 * periods if room is None else room) if measure else 0
         log = kernel.Log(
             strobes=np.empty((stretches + 1, n)),
             impacts=np.zeros((stretches, c, 2), dtype=np.int64),
@@ -127,8 +146,9 @@ class Flow:
         for j, side in enumerate(self.system.mode(key).sides):
             # A contact that was already running has an unknown deepest point so far.
             depth[j] = np.inf if side else 0.0
-        code = kernel.UNKNOWN_MODE
-        while code == kernel.UNKNOWN_MODE:
+        code = kernel.DONE
+        while cursor[0] < stretches:
+            _heed()
             code = kernel.advance(
                 self._tables,
                 z,
@@ -139,11 +159,26 @@ class Flow:
                 phi,
                 depth,
                 max_events,
+                min(int(cursor[0]) + CHUNK * points, stretches),
                 measure,
                 log,
             )
             if code == kernel.UNKNOWN_MODE:
                 self._link(int(cursor[1]), int(cursor[3]))
+            elif code != kernel.DONE:
+                break
+        if measure and clock[1] > capacity:  # more impacts than room: again, with room for all
+            return self.run(
+                x,
+                periods,
+                mode=mode,
+                tangent=tangent,
+                measure=True,
+                points=points,
+                stretches=stretches,
+                max_events=max_events,
+                room=int(clock[1]),
+            )
         status = _STATUS[code]
         done, k = int(cursor[0]), int(clock[1])
         return FlowResult(
@@ -176,17 +211,21 @@ class Flow:
         strobes = np.empty((periods + 1, 4))
         strobes[0] = x
         counts = np.zeros((periods, 2), dtype=np.int64)
-        code = modal_kernel.advance(
-            tables,
-            np.array(x, dtype=float),
-            cursor,
-            self.drive.period,
-            phi,
-            max_events,
-            strobes,
-            counts,
-        )
-        done = int(cursor[1])
+        done, code = 0, modal_kernel.DONE
+        while done < periods and code == modal_kernel.DONE:
+            _heed()
+            last = min(done + CHUNK, periods)
+            code = modal_kernel.advance(
+                tables,
+                strobes[done].copy(),
+                cursor,
+                self.drive.period,
+                phi,
+                max_events,
+                strobes[done : last + 1],
+                counts[done:last],
+            )
+            done += int(cursor[1])
         nothing = np.zeros(0)
         return FlowResult(
             status=_STATUS[code],
@@ -229,6 +268,19 @@ class Flow:
         """Give a guard its target, building the mode if it is new."""
         target = self._number(self.system.mode(self._keys[number]).guards[guard].target)
         self._tables.target[number, guard] = target
+
+
+def _heed() -> None:
+    if interrupt.is_set():
+        raise KeyboardInterrupt
+
+
+def _check(x: Array, size: int, periods: int, points: int) -> None:
+    if x.shape != (size,) or not np.all(np.isfinite(x)):
+        raise InputError(None, "state", np.array2string(x), f"{size} finite numbers")
+    for name, value in (("periods", periods), ("points", points)):
+        if value < 1:
+            raise InputError(None, name, value, "at least 1")
 
 
 _STATUS = {

@@ -289,12 +289,14 @@ def advance(
     phi: Float,
     depth: Float,
     max_events: int,
+    until: int,
     measure: bool,
     log: Log,
 ) -> int:
-    """Carry z over the stretches between the strobes of ``log``; resumable.
+    """Carry z to strobe number ``until`` of ``log``; resumable.
 
-    z : (N,) augmented state, overwritten. clock : (2,) time in the stretch, impacts logged.
+    z : (N,) augmented state, overwritten. clock : (2,) time in the stretch, impacts met (logged
+    as far as the log reaches).
     cursor : (4,) stretch index, mode index, events in this stretch and, on UNKNOWN_MODE, the guard
     whose target is missing. anchor : (stretches a period, 2) the drive's exact sine and cosine at
     the start of each stretch, so that its phase does not drift. phi : (n, k) tangent vectors,
@@ -305,7 +307,7 @@ def advance(
     z1 = np.empty(size)
     work = np.empty((n, n))
     c = np.empty(tables.guard.shape[2])
-    while cursor[0] < log.strobes.shape[0] - 1:
+    while cursor[0] < until:
         mode = cursor[1]
         h = tables.step[mode]
         left = stretch - clock[0]
@@ -372,13 +374,13 @@ def advance(
                     continue
                 log.impacts[cursor[0], j, 0 if after < 0 else 1] += 1
                 k = int(clock[1])
+                clock[1] += 1.0
                 if k < log.when.shape[0]:
                     log.when[k] = cursor[0] * stretch + clock[0]
                     log.stop[k, 0] = j
                     log.stop[k, 1] = after
                     for i in range(n):
                         log.at[k, i] = z[i]
-                    clock[1] += 1.0
             cursor[1] = other
             cursor[2] += 1
             if cursor[2] > max_events:

@@ -22,6 +22,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from designer.errors import InputError
+
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -64,11 +66,23 @@ class Mode:
 
 @dataclass(frozen=True)
 class Drive:
-    """u(t) = amplitude · sin(omega · t) + offset; omega in rad per unit of the system's time."""
+    """u(t) = amplitude · sin(omega · t) + offset; omega in rad per unit of the system's time.
+
+    Raises
+    ------
+    InputError : omega is not positive, or anything is not finite.
+    """
 
     omega: float
     amplitude: float = 1.0
     offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.omega < np.inf):
+            raise InputError(None, "omega", self.omega, "a finite number > 0")
+        for name in ("amplitude", "offset"):
+            if not np.isfinite(getattr(self, name)):
+                raise InputError(None, name, getattr(self, name), "a finite number")
 
     @property
     def period(self) -> float:

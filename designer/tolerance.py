@@ -8,7 +8,6 @@ Finished blocks of samples go to disk at once (``designer.blocks``).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -26,6 +25,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import FloatingCircuit, Reduction
 from designer.spread import Spread, draw
 from designer.system import Drive
+from designer.threads import parallel
 from designer.waveform_orbit import Read
 from designer.workers import SpicePool
 
@@ -175,9 +175,8 @@ def run_block(
 
     ``progress`` is called once per answer, and once more for each that ngspice repeats.
     """
-    with ThreadPoolExecutor(jobs) as threads:
-        pieces = threads.map(lambda index: _exact(plan, index, progress), block)
-        found = [pair for piece in pieces for pair in piece]
+    pieces = parallel(lambda index: _exact(plan, index, progress), block, jobs)
+    found = [pair for piece in pieces for pair in piece]
     answers = [answer for answer, _ in found]
     if pool is None:
         return answers
