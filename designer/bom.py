@@ -1,0 +1,137 @@
+"""The bill of materials: one row for each thing to buy."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from designer.catalog import Catalog, Kind, Rating
+from designer.circuit import Capacitor, Circuit, Resistor
+from designer.modelfile import CircuitSpec
+from designer.quantity import format_quantity
+
+COLUMNS = (
+    "quantity",
+    "designators",
+    "value",
+    "description",
+    "manufacturer",
+    "part_number",
+    "footprint",
+    "rating",
+    "price_class",
+    "grade",
+)
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+
+
+@dataclass(frozen=True)
+class Line:
+    """quantity pieces of one part; designators name where they go."""
+
+    quantity: int
+    designators: tuple[str, ...]
+    value: str
+    description: str
+    manufacturer: str
+    part_number: str
+    footprint: str
+    rating: str
+    price_class: int
+    grade: str
+
+    def cells(self) -> dict[str, str]:
+        row = {name: str(getattr(self, name)) for name in COLUMNS}
+        return {**row, "designators": " ".join(self.designators)}
+
+
+def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, ...]:
+    """Resistors, capacitors and op-amp packages; the generator is an instrument, not a part.
+
+    Raises
+    ------
+    Unreachable : a value that cannot be bought at the grade.
+    """
+    passives: tuple[tuple[Kind, str, float, Sequence[Resistor | Capacitor]], ...] = (
+        ("resistor", "Ω", spec.resistor_grade, circuit.resistors),
+        ("capacitor", "F", spec.capacitor_grade, circuit.capacitors),
+    )
+    lines = []
+    for kind, unit, grade, parts in passives:
+        for value in sorted({p.value for p in parts}):
+            here = [p for p in parts if p.value == value]
+            part = catalog.part(kind, value, grade)
+            lines.append(
+                Line(
+                    quantity=len(here),
+                    designators=tuple(sorted((p.name for p in here), key=natural)),
+                    value=format_quantity(value, unit),
+                    description="; ".join(dict.fromkeys(p.role for p in here)),
+                    manufacturer=part.manufacturer,
+                    part_number=part.part_number,
+                    footprint=part.footprint,
+                    rating=_rating(part.rating),
+                    price_class=part.price,
+                    grade=f"{part.family.grade:.3g}",
+                )
+            )
+    opamp = catalog.opamp(circuit.opamp)
+    if circuit.packages:
+        lines.append(
+            Line(
+                quantity=len(circuit.packages),
+                designators=circuit.packages,
+                value=opamp.name,
+                description=f"op-amp, {opamp.sections} sections; {len(circuit.sections)} used",
+                manufacturer=opamp.manufacturer,
+                part_number=opamp.part_number,
+                footprint=opamp.footprint,
+                rating=f"± {circuit.supply:g} V supply",
+                price_class=opamp.price,
+                grade="",
+            )
+        )
+    return tuple(lines)
+
+
+def bill_csv(lines: Iterable[Line]) -> str:
+    """The bill as CSV."""
+    return csv_text(COLUMNS, (line.cells() for line in lines))
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, str]]) -> str:
+    """CSV in which no cell of text can start a formula when a spreadsheet opens it."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: safe_cell(row[name]) for name in columns})
+    return out.getvalue()
+
+
+def safe_cell(text: str) -> str:
+    """The text, after an apostrophe where it would start a formula; numbers stay numbers."""
+    if not text.startswith(_FORMULA):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return "'" + text
+    return text
+
+
+def natural(name: str) -> tuple[object, ...]:
+    """Sort key: R2 before R10."""
+    return tuple(int(t) if t.isdigit() else t for t in re.split(r"(\d+)", name))
+
+
+def _rating(rating: Rating) -> str:
+    shown = []
+    if rating.power is not None:
+        shown.append(format_quantity(rating.power, "W"))
+    if rating.voltage is not None:
+        shown.append(format_quantity(rating.voltage, "V"))
+    return ", ".join(shown)

@@ -1,0 +1,400 @@
+"""The design folder on disk: its manifest, what may be replaced, what is complete.
+
+``manifest.json`` lists every file that the tool wrote, with its hash, and the stages (``design``,
+``study``) with the hash of their inputs. A stage with the same inputs is not done again; one with
+others only with ``--overwrite``, which touches listed files and no others. A stage's files are
+listed before the first of them is written, so that interrupted work can be told from foreign
+files.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal
+
+from designer.errors import InputError
+from designer.jsonout import dumps
+from designer.provenance import sha256
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+MODEL = "model.toml"
+DESIGN = "design.json"
+TOLERANCE = "tolerance.json"
+REPORTS = ("report.html", "report.md")
+DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "bom.csv", "setup.csv", "scales.csv")
+
+StageName = Literal["design", "study"]
+STAGES: tuple[StageName, ...] = ("design", "study")
+State = Literal["new", "same", "unfinished", "other"]
+_MAX_MANIFEST = 20_000_000
+
+
+@dataclass
+class Stage:
+    """inputs : what decides the stage's files; equal inputs give equal files."""
+
+    inputs: dict[str, Any]
+    complete: bool = False
+
+    @property
+    def hash(self) -> str:
+        return sha256(json.dumps(self.inputs, sort_keys=True).encode("ascii"))
+
+
+@dataclass
+class Manifest:
+    """stages by name; files: name → (stage, hash or None while unfinished)."""
+
+    stages: dict[str, Stage] = field(default_factory=dict)
+    files: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def complete(self) -> bool:
+        return bool(self.stages) and all(s.complete for s in self.stages.values())
+
+    def as_dict(self) -> dict[str, Any]:
+        files = {
+            name: {
+                "stage": stage,
+                "format": 1,
+                "sha256": digest,
+                **({"sha256_without": "cost"} if name.endswith(".json") else {}),
+            }
+            for name, (stage, digest) in sorted(self.files.items())
+        }
+        stages = {
+            name: {"inputs": s.inputs, "inputs_sha256": s.hash, "complete": s.complete}
+            for name, s in sorted(self.stages.items())
+        }
+        return {
+            "format": FORMAT,
+            "tool": "designer",
+            "complete": self.complete,
+            "stages": stages,
+            "files": files,
+            "provenance": self.provenance,
+        }
+
+
+class Folder:
+    """A design folder at ``path``, which need not exist yet.
+
+    Raises
+    ------
+    InputError : there is something else at that place, or its manifest cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.manifest = _read_manifest(path)
+        if self.manifest is None:
+            _check_free(path)
+
+    def __truediv__(self, name: str) -> Path:
+        return self.path / name
+
+    def state(self, stage: StageName, inputs: Mapping[str, Any]) -> State:
+        """What there is of a stage with these inputs."""
+        known = None if self.manifest is None else self.manifest.stages.get(stage)
+        if known is None:
+            return "new"
+        if known.hash != Stage(dict(inputs)).hash:
+            return "other"
+        return "same" if known.complete else "unfinished"
+
+    def decide(
+        self,
+        wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]],
+        *,
+        overwrite: bool,
+        resume: bool,
+    ) -> list[StageName]:
+        """Which of the wanted stages (inputs, names of files) are to be done.
+
+        Raises
+        ------
+        InputError : what is there is of other inputs, unfinished or changed, or a file that the
+            manifest does not list stands in the way, and the options do not say what to do.
+        """
+        todo: list[StageName] = []
+        for stage, (inputs, _) in wanted.items():
+            state = self.state(stage, inputs)
+            if state == "other" and not overwrite:
+                self._refuse(stage, inputs)
+            if state == "unfinished" and not (overwrite or resume):
+                raise InputError(
+                    self / MANIFEST,
+                    f"stages.{stage}",
+                    "unfinished work with the same inputs",
+                    "--resume to go on with it, or --overwrite to begin anew",
+                )
+            changed = self.changed(stage) if state == "same" else None
+            if changed is not None and not overwrite:
+                raise InputError(
+                    self / changed,
+                    "its sha256",
+                    "another than in manifest.json, or no file",
+                    "the file as it was written, or --overwrite to make it again",
+                )
+            if state != "same" or changed is not None or (todo and stage == "study"):
+                todo.append(stage)
+        listed = {} if self.manifest is None else self.manifest.files
+        for stage in todo:
+            for name in wanted[stage][1]:
+                if name not in listed and (self / name).exists():
+                    raise InputError(
+                        self / name,
+                        "the file",
+                        "a file that manifest.json does not list",
+                        "no file of this name: --overwrite replaces listed files only",
+                    )
+        return todo
+
+    def changed(self, stage: StageName) -> str | None:
+        """The first file of a finished stage that is not what the manifest says."""
+        assert self.manifest is not None
+        for name, (owner, digest) in sorted(self.manifest.files.items()):
+            if owner != stage or digest is None:  # None: a later stage was about to improve it
+                continue
+            try:
+                content = (self / name).read_bytes()
+            except OSError:
+                return name
+            if digest != file_hash(name, content):
+                return name
+        return None
+
+    def begin(
+        self, wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]], provenance: Any
+    ) -> None:
+        """Create the folder if need be, and mark these stages as unfinished.
+
+        A stage that depends on one that begins anew is forgotten; its files stay listed until
+        ``finish`` removes them.
+        """
+        manifest = self.manifest or Manifest()
+        with _writing(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+        if "design" in wanted and manifest.stages.get("study"):
+            del manifest.stages["study"]
+            manifest.files = {
+                n: ("replaced" if s == "study" else s, d) for n, (s, d) in manifest.files.items()
+            }
+        for stage, (inputs, names) in wanted.items():
+            manifest.files = {
+                n: ("replaced" if s == stage else s, d) for n, (s, d) in manifest.files.items()
+            }
+            manifest.stages[stage] = Stage(inputs)
+            manifest.files |= dict.fromkeys(names, (stage, None))
+        for name in manifest.files:  # what a killed process left behind
+            _partial(self / name).unlink(missing_ok=True)
+        manifest.provenance = provenance
+        self.manifest = manifest
+        self._save()
+
+    def write(self, name: str, content: str | bytes) -> None:
+        """Write one listed file, all at once."""
+        assert self.manifest is not None
+        stage, _ = self.manifest.files[name]
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        path = self / name
+        with _writing(path):
+            path.parent.mkdir(exist_ok=True)
+            partial = _partial(path)
+            partial.write_bytes(data)
+            os.replace(partial, path)
+        self.manifest.files[name] = (stage, file_hash(name, data))
+
+    def rewrite(self, name: str, content: str | bytes) -> None:
+        """Write a file of a finished stage anew; at no time does the manifest state a hash that
+        is not the file's."""
+        assert self.manifest is not None
+        stage, _ = self.manifest.files[name]
+        self.manifest.files[name] = (stage, None)
+        self._save()
+        self.write(name, content)
+        self._save()
+
+    def finish(self, stage: StageName) -> None:
+        """Mark a stage as complete and remove listed files that nothing writes any more."""
+        manifest = self.manifest
+        assert manifest is not None
+        for name, (owner, _) in list(manifest.files.items()):
+            if owner == stage:
+                manifest.files[name] = (owner, file_hash(name, (self / name).read_bytes()))
+        manifest.stages[stage].complete = True
+        gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
+        for name in gone:
+            (self / name).unlink(missing_ok=True)
+            del manifest.files[name]
+            with contextlib.suppress(OSError):  # a folder that is empty now
+                if "/" in name:
+                    (self / name).parent.rmdir()
+        self._save()
+
+    def json(self, name: str) -> dict[str, Any]:
+        """The object in one of the folder's JSON files."""
+        return read_json(self / name)
+
+    def _save(self) -> None:
+        assert self.manifest is not None
+        path = self / MANIFEST
+        with _writing(path):
+            partial = _partial(path)
+            with partial.open("w", encoding="ascii") as stream:
+                stream.write(dumps(self.manifest.as_dict()))
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.replace(partial, path)
+
+    def _refuse(self, stage: StageName, inputs: Mapping[str, Any]) -> None:
+        assert self.manifest is not None
+        known = self.manifest.stages[stage].inputs
+        differ = sorted(k for k in {*known, *inputs} if known.get(k) != inputs.get(k))
+        shown = ", ".join(f"{k} {_short(known.get(k))}" for k in differ)
+        wanted = ", ".join(f"{k} {_short(inputs.get(k))}" for k in differ)
+        raise InputError(
+            self / MANIFEST,
+            f"stages.{stage}.inputs",
+            shown,
+            f"{wanted}; or another folder, or --overwrite to replace what manifest.json lists",
+        )
+
+
+def _partial(path: Path) -> Path:
+    """Where a file is written before it is put in its place."""
+    return path.with_name(f".{path.name}.part")
+
+
+def file_hash(name: str, content: bytes) -> str:
+    """Hash of a file as the manifest states it: a JSON file's without its object ``cost``."""
+    if name.endswith(".json"):
+        try:
+            value = json.loads(content)
+            value.pop("cost", None)
+            content = json.dumps(value, sort_keys=True).encode("ascii")
+        except (ValueError, AttributeError):
+            pass
+    return sha256(content)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file of a folder; InputError where there is none."""
+    try:
+        value = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(path, "the file", error.strerror or str(error), "JSON") from None
+    except ValueError as error:
+        raise InputError(path, "the file", str(error), "JSON") from None
+    if not isinstance(value, dict):
+        raise InputError(path, "the file", type(value).__name__, "a JSON object")
+    if value.get("format") != FORMAT:
+        raise InputError(path, "format", value.get("format"), f"{FORMAT}")
+    return value
+
+
+def is_design_folder(path: Path) -> bool:
+    """Whether there is a folder with a manifest."""
+    return (path / MANIFEST).is_file()
+
+
+def _read_manifest(path: Path) -> Manifest | None:
+    file = path / MANIFEST
+    if not file.is_file():
+        return None
+    if file.stat().st_size > _MAX_MANIFEST:
+        raise InputError(file, "the file", "too large a file", "a manifest")
+    value = read_json(file)
+    try:
+        if value["tool"] != "designer":
+            raise ValueError
+        stages: dict[str, Stage] = {
+            name: Stage(dict(value["stages"][name]["inputs"]), value["stages"][name]["complete"])
+            for name in STAGES
+            if name in value["stages"]
+        }
+        files = {
+            _inside(path, name): (str(said["stage"]), said["sha256"])
+            for name, said in value["files"].items()
+        }
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise InputError(file, "the file", "something else", "a manifest of this tool") from None
+    return Manifest(stages, files, value.get("provenance", {}))
+
+
+def _inside(root: Path, name: str) -> str:
+    """The name of a listed file, if it lies inside the folder: a manifest is untrusted input."""
+    pure = PurePosixPath(name)
+    if pure.is_absolute() or ".." in pure.parts or not pure.parts or name == MANIFEST:
+        raise InputError(root / MANIFEST, "files", name, "names of files inside the folder")
+    place = (root / pure).parent.resolve()
+    if not place.is_relative_to(root.resolve()):
+        raise InputError(root / MANIFEST, "files", name, "names of files inside the folder")
+    return str(pure)
+
+
+def _check_free(path: Path) -> None:
+    """InputError unless a folder can be made here, or an empty one is here."""
+    if path.is_dir():
+        try:
+            taken = any(p.name != _partial(path / MANIFEST).name for p in path.iterdir())
+        except OSError as error:
+            raise _cannot_write(path, error) from None
+        if taken:
+            raise InputError(
+                path,
+                "--out",
+                "a folder with files and no manifest.json",
+                "a design folder, an empty folder, or a name that is free",
+            )
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputError(path, "--out", "a folder without write access", "one to write into")
+        return
+    nearest = path
+    while not _exists(nearest) and nearest != nearest.parent:
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise InputError(
+            path, "--out", f"{nearest} is no folder", "a path at which a folder can be made"
+        )
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise InputError(
+            path, "--out", f"no write access to {nearest}", "a path at which a folder can be made"
+        )
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists() or path.is_symlink()
+    except OSError:
+        return False
+
+
+class _writing:  # noqa: N801 - reads as a word in a with statement
+    """Turns a failure to write into an InputError that names the place."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, OSError):
+            raise _cannot_write(self._path, error) from None
+
+
+def _cannot_write(path: Path, error: OSError) -> InputError:
+    return InputError(path, "--out", error.strerror or str(error), "a place that can be written")
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text[:12] + "…" if len(text) > 40 else text

@@ -1,0 +1,241 @@
+"""Results as JSON objects, by the keys of docs/contract.md.
+
+JSON has no NaN and no infinity: both become null.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.api import Simulated, Study
+    from designer.modelfile import ModelFile
+    from designer.orbit import Orbit
+    from designer.pipeline import Checked
+    from designer.responses import ModelResponse
+    from designer.synthesis import Design
+    from designer.tolerance import Answer
+
+FORMAT = 1
+
+
+def dumps(value: object, *, indent: int | None = 2) -> str:
+    """Strict JSON in ASCII, ending in a newline; floats with all their digits."""
+    return json.dumps(plain(value), indent=indent, allow_nan=False) + "\n"
+
+
+def plain(value: object) -> Any:
+    """The value in dicts, lists, str, int, bool, finite float and None."""
+    if value is None or isinstance(value, bool | np.bool_):
+        return None if value is None else bool(value)
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, complex | np.complexfloating):
+        return [plain(float(value.real)), plain(float(value.imag))]
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | Sequence):
+        return [plain(v) for v in value]
+    raise TypeError(f"{type(value).__name__} has no JSON form")
+
+
+def synthesis_json(
+    modelfile: ModelFile,
+    design: Design,
+    found: Sequence[ModelResponse],
+    provenance: Mapping[str, Any],
+    seconds: float,
+) -> dict[str, Any]:
+    """What ``synthesise`` prints and ``design.json`` holds."""
+    from designer.setup_table import STATES, settings
+
+    errors, circuit = design.errors, design.circuit
+    return {
+        "format": FORMAT,
+        "title": modelfile.title,
+        "model": dict(design.model.__dict__),
+        "circuit": {
+            "opamp": circuit.opamp,
+            "gain": circuit.gain,
+            "bias": circuit.bias,
+            "supply": circuit.supply,
+            "saturation": circuit.saturation,
+        },
+        "parts": circuit.values,
+        "errors": errors.errors,
+        "max_error": errors.max_error,
+        "certificate": dict(design.certificate.__dict__),
+        "scales": {
+            "seconds": errors.scales.seconds,
+            "volts": dict(zip(STATES, errors.scales.volts, strict=True)),
+            "threshold": errors.scales.threshold,
+        },
+        "knobs": [
+            {
+                "omega": s.omega,
+                "frequency_hz": s.frequency_hz,
+                "amplitude_v_peak": s.amplitude_v_peak,
+                "offset_v": s.offset_v,
+                "expected": r.expected,
+                "found": r.found,
+            }
+            for s, r in zip(settings(design, found), found, strict=True)
+        ],
+        "dead_zone": _dead_zone(modelfile, design),
+        "distinct_values": design.distinct_values,
+        "conditions": design.conditions,
+        "solver": design.solver,
+        "provenance": provenance,
+        "cost": {"seconds": seconds, "synthesis_seconds": design.seconds},
+    }
+
+
+def study_json(
+    study: Study, provenance: Mapping[str, Any], cost: Mapping[str, float]
+) -> dict[str, Any]:
+    """What ``tolerance`` prints and ``tolerance.json`` holds."""
+    return {
+        "format": FORMAT,
+        "samples": study.plan.samples,
+        "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
+        "provenance": provenance,
+        "cost": dict(cost),
+    }
+
+
+def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``run`` prints, from the objects of the two files."""
+    cost = {"design": design["cost"], "study": study["cost"]}
+    return {
+        **design,
+        "samples": study["samples"],
+        "responses": study["responses"],
+        "provenance": study["provenance"],
+        "cost": cost,
+    }
+
+
+def simulate_json(
+    simulated: Sequence[Simulated], engine: str, provenance: Mapping[str, Any], seconds: float
+) -> dict[str, Any]:
+    """What ``simulate`` prints."""
+    return {
+        "format": FORMAT,
+        "engine": engine,
+        "responses": [
+            {
+                "omega": s.omega,
+                "expected": s.expected,
+                "found": s.found,
+                **orbit_json(s.orbit),
+                "others": [orbit_json(o) for o in s.others],
+                "cost": {"periods": s.orbit.periods, "seconds": s.seconds},
+            }
+            for s in simulated
+        ],
+        "provenance": provenance,
+        "cost": {"seconds": seconds},
+    }
+
+
+def orbit_json(orbit: Orbit) -> dict[str, Any]:
+    """An orbit in model units."""
+    known = len(orbit.extremes) > 0
+    return {
+        "response": orbit.response,
+        "status": str(orbit.status),
+        "symmetric": orbit.symmetric,
+        "asymmetry": orbit.asymmetry,
+        "x1_max": orbit.extremes[0, 1] if known else None,
+        "x1_min": orbit.extremes[0, 0] if known else None,
+        "impact_velocities": orbit.impact_velocities,
+        "multipliers": list(orbit.multipliers.astype(complex)),
+        "lyapunov": orbit.lyapunov,
+        "penetration": orbit.penetration,
+        "miss": orbit.miss,
+        "reason": orbit.reason,
+    }
+
+
+def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
+    model, ngspice = checked.model, checked.ngspice
+    answers = study.answers_to(index)
+    counted = study.yields[index]
+    row: dict[str, Any] = {
+        "omega": model.omega,
+        "expected": model.expected,
+        "found": model.found,
+        "model": model.orbit.response,
+        "circuit": checked.circuit.response,
+        "ngspice": None if ngspice is None else ngspice.response,
+        "ngspice_reason": "" if ngspice is None else ngspice.reason,
+        "engines_agree": checked.agrees,
+        "symmetric": model.orbit.symmetric,
+        "others": [o.response for o in model.others],
+        "yield": None,
+        "rate": None,
+        "reasons": {},
+        "agreement": {"asked": 0, "agreed": 0, "failed": 0},
+    }
+    if counted is None:
+        row["left_out"] = study.left_out[index]
+        return row
+    low, high = counted.interval
+    asked = [a for a in answers if a.ngspice]
+    row["yield"] = {
+        "ok": counted.ok,
+        "lost": counted.lost,
+        "grazing": counted.grazing,
+        "failed": counted.failed,
+        "samples": counted.samples,
+        "low": low,
+        "high": high,
+    }
+    row["rate"] = counted.rate
+    row["reasons"] = _reasons(answers)
+    row["agreement"] = {
+        "asked": len(asked),
+        "agreed": sum(a.agrees is True for a in asked),
+        "failed": sum(a.ngspice == "failed" for a in asked),
+    }
+    return row
+
+
+def _reasons(answers: Sequence[Answer]) -> dict[str, int]:
+    """Why boards do not show the response, most frequent first."""
+    met = Counter(
+        f"{a.verdict}: {_kind(a)}" if _kind(a) else str(a.verdict)
+        for a in answers
+        if a.verdict != "ok"
+    )
+    return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _kind(answer: Answer) -> str:
+    """The reason without its figures, so that like ones are counted together."""
+    if answer.reason.startswith("asymmetric by"):
+        return "asymmetric"
+    return answer.reason
+
+
+def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
+    if not design.circuit.stops:
+        return None
+    errors = design.errors
+    return {
+        "kind": modelfile.circuit.dead_zone,
+        "saturation": design.circuit.saturation,
+        "threshold": errors.scales.threshold,
+        "slope_error": errors.errors.get("stop slope"),
+        "null_error": errors.errors.get("dead-zone null"),
+    }

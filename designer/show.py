@@ -1,0 +1,184 @@
+"""Results as tables for people, on standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from designer.catalog import Catalog
+from designer.quantity import format_quantity
+
+
+def run(answer: Mapping[str, Any]) -> None:
+    """Parts and errors, then the responses."""
+    synthesised(answer)
+    tolerance(answer)
+
+
+def synthesised(answer: Mapping[str, Any]) -> None:
+    """The chosen parts, their error and the generator's settings."""
+    console = _console()
+    table = _table("Parts", "value", "parts")
+    kinds: dict[tuple[str, float], list[str]] = {}
+    for name, value in answer["parts"].items():
+        kinds.setdefault((name[0], value), []).append(name)
+    for (kind, value), names in sorted(kinds.items()):
+        _row(table, format_quantity(value, "F" if kind == "C" else "Ω"), " ".join(names))
+    console.print(table)
+    certificate = answer["certificate"]
+    _line(
+        console,
+        f"Largest coefficient error {100 * answer['max_error']:.3g} % "
+        f"({certificate['status']}, lower bound {100 * certificate['lower_bound']:.3g} %); "
+        f"{answer['distinct_values']} distinct values",
+    )
+    if answer["knobs"]:
+        table = _table("Generator", "ω", "expected", "frequency", "amplitude (peak, high-Z)")
+        for knob in answer["knobs"]:
+            _row(
+                table,
+                f"{knob['omega']:g}",
+                knob["expected"] or "-",
+                f"{knob['frequency_hz']:.4g} Hz",
+                f"{knob['amplitude_v_peak']:.4g} V",
+            )
+        console.print(table)
+
+
+def tolerance(answer: Mapping[str, Any]) -> None:
+    """The responses on each engine, and their yields."""
+    console = _console()
+    table = _table(
+        f"Responses, {answer['samples']} samples",
+        "ω",
+        "expected",
+        "model",
+        "circuit",
+        "ngspice",
+        "yield %",
+        "95 %",
+        "lost",
+        "grazing",
+        "failed",
+        gap=1,
+    )
+    for r in answer["responses"]:
+        y = r["yield"]
+        counted = ["-", r.get("left_out", ""), "", "", ""]
+        if y is not None:
+            rate = "-" if r["rate"] is None else f"{100 * r['rate']:.1f}"
+            counted = [
+                rate,
+                f"{100 * y['low']:.0f}–{100 * y['high']:.0f}",
+                str(y["lost"]),
+                str(y["grazing"]),
+                str(y["failed"]),
+            ]
+        found = r["model"] if r["found"] else f"{r['model']} (not what is wanted)"
+        _row(
+            table,
+            f"{r['omega']:g}",
+            r["expected"] or "-",
+            found,
+            r["circuit"],
+            r["ngspice"] or "-",
+            *counted,
+        )
+    console.print(table)
+
+
+def simulated(answer: Mapping[str, Any]) -> None:
+    """The responses on one engine."""
+    table = _table(
+        f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice",
+        "ω",
+        "expected",
+        "response",
+        "symmetric",
+        "x1 max",
+        "x1 min",
+        "others",
+    )
+    for r in answer["responses"]:
+        _row(
+            table,
+            f"{r['omega']:g}",
+            r["expected"] or "-",
+            r["response"],
+            {True: "yes", False: "no", None: "-"}[r["symmetric"]],
+            "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
+            "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
+            ", ".join(o["response"] for o in r["others"]) or "-",
+        )
+    _console().print(table)
+
+
+def catalog(held: Catalog) -> None:
+    """What can be bought."""
+    console = _console()
+    table = _table("Families", "name", "kind", "series", "range", "grade", "price class")
+    for family in held.families:
+        unit = "Ω" if family.kind == "resistor" else "F"
+        low, high = (format_quantity(end, unit) for end in family.range)
+        _row(
+            table,
+            family.name,
+            family.kind,
+            " ".join(family.series),
+            f"{low} to {high}",
+            f"{100 * family.grade:g} %",
+            str(family.price),
+        )
+    console.print(table)
+    table = _table("Op-amps", "name", "sections", "saturation", "gain-bandwidth", "price class")
+    for opamp in held.opamps:
+        _row(
+            table,
+            opamp.name,
+            str(opamp.sections),
+            f"{opamp.saturation.nominal:g} V at ± {opamp.rated_supply:g} V",
+            format_quantity(opamp.gbw.nominal, "Hz"),
+            str(opamp.price),
+        )
+    console.print(table)
+    for what, names in (
+        ("Diodes", [entry.name for entry in held.diodes]),
+        ("References", [entry.name for entry in held.references]),
+    ):
+        _line(console, f"{what}: {', '.join(names) or 'none'}")
+
+
+def files(folder: Path, reused: bool) -> None:
+    """Where the results are."""
+    how = "was there already, from the same inputs" if reused else "written"
+    _line(_console(), f"{folder}: {how}")
+
+
+def _console() -> Console:
+    """On standard error; wide enough for a row where there is no terminal to ask."""
+    return Console(stderr=True, width=None if sys.stderr.isatty() else 120)
+
+
+def _table(title: str, *columns: str, gap: int = 2) -> Table:
+    """No lines, so that the longest fits into 80 columns."""
+    table = Table(title=f"\n{title}", title_justify="left", box=None, padding=(0, gap, 0, 0))
+    for column in columns:
+        table.add_column(column)
+    return table
+
+
+def _row(table: Table, *cells: str) -> None:
+    table.add_row(*(Text(cell) for cell in cells))
+
+
+def _line(console: Console, text: str) -> None:
+    console.print(Text(text), soft_wrap=True)
+
+
+__all__: Sequence[str] = ("catalog", "files", "run", "simulated", "synthesised", "tolerance")

@@ -1,0 +1,44 @@
+"""The model file that ``designer new`` writes."""
+
+from __future__ import annotations
+
+TEXT = """\
+# A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
+# Numbers may carry units as text: "22.1k", "100nF", "1 kHz".
+
+format = 1
+title = "My model"
+
+# Two masses in a row: M1 moves between stops, M2 stands on a spring. Dimensionless parameters;
+# or a table [mechanical] with M1, M2, C1, C2, K0, K1, K2, B, P1, P2 in SI units instead.
+[model]
+m = 0.5         # M2/(M1 + M2), in (0, 1)
+k = 0.5         # K2/(K1 + K2), in (0, 1)
+k0 = 0.95       # K0/(K0 + K1), in [0, 1): stiffness of the stops; 0: no stops
+c = 0.5         # C2/(C1 + C2), in [0, 1)
+zeta = 0.1      # damping, > 0
+f20 = 0.0       # share of the force that acts on M2, in [0, 1]
+b = 0.25        # clearance, > 0
+sides = "both"  # stops on both sides
+
+# The responses that the board shall show: n-p-q, with n periods of the force, p impacts on the
+# upper stop and q on the lower one in that time. Leave `expect` out to take what comes.
+[[response]]
+omega = 1.55
+expect = "1-1-1"
+
+[[response]]
+omega = 0.85
+expect = "1-2-2"
+
+[circuit]
+opamp = "TL074C"                # `designer catalog` lists what there is
+supply = 15.0                   # V, both rails
+resistors = "E96"               # a series, or several: ["E24", "E96"]
+capacitors = "E12"
+resistor_grade = 0.01           # 1 %
+capacitor_grade = 0.01
+resistor_range = ["1k", "1M"]
+capacitor_range = ["1nF", "1µF"]
+frequency = [50, 1000]          # Hz, where omega = 1 may lie
+"""
