@@ -76,11 +76,11 @@ def size(
     nulls = np.zeros((0, 8))
     for room in THRESHOLD_ROOM:
         if len(nulls) == 0 or nulls[:, 6].min() > 1e-9:
-            nulls = _null_rows(target, heavy, inputs, base, gains, room)
+            nulls = _null_rows(target, resistors, heavy, inputs, base, gains, room)
     if len(heavy) <= FEW and (len(nulls) == 0 or nulls[:, 6].min() > 1e-9):
         # A coarse series reaches the null better with a free input resistor.
         inputs = heavy[(heavy >= base) & (heavy < 10.0 * base)]
-        nulls = _null_rows(target, heavy, inputs, base, gains, THRESHOLD_ROOM[-1])
+        nulls = _null_rows(target, resistors, heavy, inputs, base, gains, THRESHOLD_ROOM[-1])
     if len(nulls) == 0:
         return "dead-zone null"
     slopes, nulls, common = _best_groups(slopes, nulls)
@@ -109,11 +109,14 @@ def _slope_rows(target: DeadZoneTarget, resistors: Array, heavy: Array, base: fl
     feedback = resistors[(resistors >= target.load) & (resistors <= 100 * base)]
     i, j = (a.ravel() for a in np.meshgrid(np.arange(len(gain)), np.arange(len(feedback))))
     total = gain[i] * feedback[j] / base
-    fine = (total <= target.output_gain) & (total >= target.output_gain / 2.5)
-    i, j, total = i[fine], j[fine], total[fine]
-    if len(total) == 0 or len(heavy) == 0:
-        return np.zeros((0, 6))
     wanted = np.log(total / target.slope)
+    # R50 has to be on the list; of what is left, the larger slopes: they need less noise gain.
+    fine = (total <= target.output_gain) & (wanted <= np.log(heavy[-1]) + 0.05)
+    fine &= wanted >= np.log(heavy[0]) - 0.05
+    if not fine.any():
+        return np.zeros((0, 6))
+    fine &= total >= total[fine].max() / 2.5
+    i, j, total, wanted = i[fine], j[fine], total[fine], wanted[fine]
     r50, error = _nearest(np.log(heavy), wanted)
     rows = np.stack([r206[i], r207[i], feedback[j], heavy[r50], np.log(gain[i]), error], axis=1)
     rows = rows[error < 0.05]
@@ -122,6 +125,7 @@ def _slope_rows(target: DeadZoneTarget, resistors: Array, heavy: Array, base: fl
 
 def _null_rows(
     target: DeadZoneTarget,
+    resistors: Array,
     heavy: Array,
     inputs: Array,
     base: float,
@@ -136,8 +140,9 @@ def _null_rows(
     # U3B must still be linear where U3C reaches its limit.
     fine = (steep >= least) & (steep <= room * least) & (r203 / base >= 1.15)
     r200, r201, r203, steep = r200[fine], r201[fine], r203[fine], np.log(steep[fine])
-    low = heavy[heavy <= 20 * base]
-    r204, r205 = (a.ravel() for a in np.meshgrid(low, low))
+    # R204 alone carries the output's current; R205 may be as small as the list goes.
+    top = heavy[heavy <= 100 * base]
+    r204, r205 = (a.ravel() for a in np.meshgrid(top, resistors[resistors <= 20 * base]))
     loaded = r205 * base / (r205 + base)
     beta = np.log(loaded / (r204 + loaded))
     order = np.argsort(beta, kind="stable")

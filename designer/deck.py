@@ -103,7 +103,8 @@ def title_line(text: str) -> str:
     kept = "".join(
         ch if ch.isascii() and (ch.isalnum() or ch in " .,:()+-=/_") else " " for ch in text
     )
-    return "* " + (" ".join(kept.split())[:120] or "untitled")
+    # A word of ours first: ngspice takes comments that begin in certain ways for commands.
+    return "* title: " + (" ".join(kept.split())[:120] or "untitled")
 
 
 def _n(value: float) -> str:

@@ -111,8 +111,11 @@ def ratio_table(
     r = np.log(np.sort(resistors))
     c = np.log(np.sort(capacitors))
     deltas = _distinct((c[:, None] - c[None, :]).ravel())
+    # Where a join is cut, capacitors of like size stay: they are the most likely to be of use.
+    deltas = deltas[np.argsort(np.abs(deltas), kind="stable")]
     # e22 - e44: R9 against R2, window 2 eps.
-    d_i, r2_i = (a.ravel() for a in np.meshgrid(np.arange(len(deltas)), np.arange(len(r))))
+    grid = np.meshgrid(np.arange(len(deltas)), np.arange(len(r)), indexing="ij")
+    d_i, r2_i = (a.ravel() for a in grid)
     centre = r[r2_i] - deltas[d_i] + t.w2 - t.w9
     row, hit, full = window(r, centre, 2 * level)
     delta, r2, r9 = deltas[d_i[row]], r[r2_i[row]], r[hit]

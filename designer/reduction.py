@@ -30,6 +30,10 @@ class Solution:
     current: dict[str, Array]
 
 
+WORST_CONDITION = 1e14
+"""Of the scaled nodal equations: past it a net floats, whatever the solver says."""
+
+
 class Reduction:
     """The exact reduction of one board.
 
@@ -132,12 +136,7 @@ class Reduction:
                     G[row, self._nets[net]] += sign
             G[row, self._nets[s.output]] -= board.inverse_gain
             right[row, n + 1] = -board.offset.get(s.name, 0.0)
-        try:
-            y = np.linalg.solve(G, right)
-        except np.linalg.LinAlgError as error:
-            raise FloatingCircuit(f"singular nodal equations in mode {key}") from error
-        if not np.all(np.isfinite(y)):
-            raise FloatingCircuit(f"singular nodal equations in mode {key}")
+        y = _solved(G, right, key)
         voltage = {net: y[i] for net, i in self._nets.items()}
         voltage[GROUND] = np.zeros(n + 2)
         # The unknown is the current that leaves ``plus`` through the source: into the capacitor.
@@ -188,3 +187,26 @@ class Reduction:
         across = across + self.board.offset.get(s.name, 0.0) * one
         limit = (high if position > 0 else low) * self.board.inverse_gain
         return [(-position * (across - limit * one), 0)]
+
+
+def _solved(G: Array, right: Array, key: ModeKey) -> Array:
+    """G y = right with rows and columns brought to like size first."""
+    rows = np.abs(G).max(axis=1)
+    if rows.min() == 0.0:
+        raise FloatingCircuit(f"a net without any part, in mode {key}")
+    scaled = G / rows[:, None]
+    columns = np.abs(scaled).max(axis=0)
+    if columns.min() == 0.0:
+        raise FloatingCircuit(f"a net without any part, in mode {key}")
+    scaled /= columns
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError as error:
+        raise FloatingCircuit(f"singular nodal equations in mode {key}") from error
+    size = float(np.abs(scaled).sum(axis=0).max() * np.abs(inverse).sum(axis=0).max())
+    if not size < WORST_CONDITION:
+        raise FloatingCircuit(f"singular nodal equations in mode {key}")
+    y = inverse @ (right / rows[:, None])
+    # One step of refinement: the inverse alone loses digits.
+    y += inverse @ (right / rows[:, None] - scaled @ y)
+    return np.asarray(y / columns[:, None])

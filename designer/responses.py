@@ -131,11 +131,21 @@ def _find_one(model: Dimensionless, spec: Response, b: float) -> ModelResponse:
     assert spec.omega is not None
     flow = Flow(model.second_order().piecewise_linear(), Drive(spec.omega))
     met = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
-    wanted = next((o for o in met if matches(o, spec)), None)
-    orbit = wanted if wanted is not None else met[0]
-    others = tuple(o for o in met if o is not orbit)
-    if wanted is not None and spec.expect is not None:
-        expect = spec.expect
-        if (orbit.n, orbit.p, orbit.q) != (expect.n, expect.p, expect.q):
-            orbit = twin(flow, orbit) or orbit
-    return ModelResponse(spec, b, orbit, others, wanted is not None)
+    for orbit in met:
+        for candidate in _with_twin(flow, orbit, spec):
+            if matches(candidate, spec):
+                return ModelResponse(
+                    spec, b, candidate, tuple(o for o in met if o is not orbit), True
+                )
+    return ModelResponse(spec, b, met[0], tuple(met[1:]), False)
+
+
+def _with_twin(flow: Flow, orbit: Orbit, spec: Response) -> list[Orbit]:
+    """The orbit, and its mirror twin first where that is the one named by ``expect``."""
+    expect = spec.expect
+    if expect is None or (orbit.n, orbit.p, orbit.q) != (expect.n, expect.q, expect.p):
+        return [orbit]
+    if expect.p == expect.q:
+        return [orbit]
+    other = twin(flow, orbit)
+    return [orbit] if other is None else [other, orbit]

@@ -46,6 +46,14 @@ class Selection:
 
 
 @dataclass(frozen=True)
+class Shortfall:
+    """No completion: what leaves none, and whether every one was looked at."""
+
+    what: str
+    whole: bool
+
+
+@dataclass(frozen=True)
 class Pool:
     """What the program chooses from, each row's values in logarithms.
 
@@ -86,8 +94,8 @@ def select(
     t: Targets,
     bounds: Bounds,
     level: float,
-) -> Selection | str:
-    """The best completion with error at most ``level``, or the name of what leaves none.
+) -> Selection | Shortfall:
+    """The best completion with error at most ``level``, or what leaves none.
 
     prices : price class of each capacitor (k,); resistors of a grade cost the same.
     """
@@ -95,24 +103,23 @@ def select(
     c: Array = np.log(capacitors)
     groups, c2, c4 = groups_of(table, c, bounds)
     if len(groups) == 0:
-        return "frequency"
+        return Shortfall("frequency", table.complete)
     first, second = sides_of(groups, c2, c4, r, c, t, bounds, level)
     both = np.intersect1d(first.group, second.group)
+    whole = table.complete and first.whole and second.whole
     if len(both) == 0:
-        return "displacement integrators"
+        return Shortfall("displacement integrators", whole)
     own = np.stack([groups.r2, groups.r3, groups.r8, groups.r9, c2, c4], axis=1)
     pool = Pool(groups, own, first, second).take(
         np.flatnonzero(np.isin(first.group, both)), np.flatnonzero(np.isin(second.group, both))
     )
-    complete = table.complete and first.whole and second.whole
-    if pool.rows > LARGEST:
-        pool, complete = _fewest_kinds(pool), False
-    chosen = _solve(pool, t, bounds, level, None)
-    if chosen is None:
-        return "displacement integrators"
+    found = _least_error(pool, t, bounds, level)
+    if found is None:
+        return Shortfall("displacement integrators", whole and pool.rows <= LARGEST)
+    pool, chosen, complete = found[0], found[1], whole and found[0] is pool
     error = _error(pool.values(*chosen), t)
     if error > level * (1.0 + 1e-6) + 1e-9:
-        return "coefficients"
+        return Shortfall("coefficients", False)
     few = _promising(pool)
     cost = dict(zip(np.round(c, 9).tolist(), prices.tolist(), strict=True))
     again = _solve(few, t, bounds, error + 1e-9, cost)
@@ -125,6 +132,25 @@ def select(
         complete=complete,
         solver="HiGHS: optimal",
     )
+
+
+def _least_error(
+    pool: Pool, t: Targets, bounds: Bounds, level: float
+) -> tuple[Pool, tuple[int, int]] | None:
+    """The pool that the program was given, and its rows of least error.
+
+    A pool that is too large is cut to the rows with the fewest kinds; where none of them will do,
+    the cut is made wider.
+    """
+    if pool.rows <= LARGEST:
+        chosen = _solve(pool, t, bounds, level, None)
+        return None if chosen is None else (pool, chosen)
+    for wider in (1, 4, 16):
+        few = _fewest_kinds(pool, wider)
+        chosen = _solve(few, t, bounds, level, None)
+        if chosen is not None:
+            return few, chosen
+    return None
 
 
 def residual_system(v: dict[str, float], t: Targets) -> tuple[Array, Array]:
@@ -254,8 +280,8 @@ def _kinds_of(pool: Pool, side: Side) -> Array:
     return _distinct(np.concatenate([pool.own[side.group], _side_values(side)], axis=1))
 
 
-def _fewest_kinds(pool: Pool) -> Pool:
-    """The groups and rows with the fewest distinct values, within what the program can hold."""
+def _fewest_kinds(pool: Pool, wider: int) -> Pool:
+    """The groups and rows with the fewest distinct values; ``wider`` times the usual groups."""
     kinds = [_kinds_of(pool, side) for side in (pool.first, pool.second)]
     sides = (pool.first, pool.second)
     least = np.zeros(len(pool.own))
@@ -263,13 +289,15 @@ def _fewest_kinds(pool: Pool) -> Pool:
         best = np.full(len(pool.own), np.inf)
         np.minimum.at(best, side.group, count.astype(float))
         least += best
-    chosen = np.argsort(least, kind="stable")[:KEEP_GROUPS]
+    chosen = np.argsort(least, kind="stable")[: wider * KEEP_GROUPS]
     keep = []
     for side, count in zip(sides, kinds, strict=True):
         rows: list[int] = []
         for group in chosen:
             own = np.flatnonzero(side.group == group)
-            rows += [int(k) for k in own[np.argsort(count[own], kind="stable")[:KEEP_ROWS]]]
+            rows += [
+                int(k) for k in own[np.argsort(count[own], kind="stable")[: wider * KEEP_ROWS]]
+            ]
         keep.append(np.array(rows, dtype=np.intp))
     return pool.take(keep[0], keep[1])
 

@@ -34,6 +34,8 @@ LOAD, SIGNAL = 2e3, (4.7e3, 5e5)
 """Least load of an output [ohm]; range of the signal resistors [ohm], for load and for noise."""
 BASE = 1e4
 """Resistors that only set a level (inverters, inputs of the gain stages) [ohm]."""
+LEAST_GAIN = 1.25
+"""Of the saturating path, so that it does saturate where the clearance is never closed."""
 GENERATOR_PEAK = 5.0
 """Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
 PROOF_TOLERANCE = 1e-6
@@ -209,16 +211,17 @@ def _linear(
     binding = "signal resistors"
     level, lowest = FIRST_LEVEL, 0.0
     while level < LAST_LEVEL and len(signal):
+        searched = True
         table = ratio_table(signal, capacitors, targets, level, bounds.p_range)
         if len(table):
             answer = select(table, signal, capacitors, prices, targets, bounds, level)
             if isinstance(answer, Selection):
                 whole = answer.complete or answer.error <= free + PROOF_TOLERANCE
                 return answer, answer.error if whole else max(free, lowest), whole
-            binding = answer
+            binding, searched = answer.what, answer.whole
         elif binding == "signal resistors":
             binding = "coefficients"
-        if table.complete:
+        if table.complete and searched:
             lowest = level
         level = _next(level)
     raise Unreachable(
@@ -268,7 +271,7 @@ def _dead_zone(
             mu=model.mu,
             slope=model.mu * values["C2"] * float(relative[1]) / seconds,
             saturation=saturation,
-            threshold=model.b * top,
+            threshold=min(model.b * top, saturation / LEAST_GAIN),
             linear_gain=swing / (top * float(peaks.states[0])),
             output_gain=swing / (top * max(peaks.penetration, 0.02 * float(peaks.states[0]))),
             load=max(LOAD, float(resistors.min())) if spec.side_conditions else 0.0,

@@ -227,7 +227,7 @@ def _exact(
             verdict, reason = judge(orbit, question.spec, question.start)
             if len(orbit.start):
                 subject = Subject(reduction, excitation, orbit)
-        except (FloatingCircuit, ArithmeticError) as error:
+        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
             orbit, verdict, reason = Orbit(OrbitStatus.FAILED), Verdict.FAILED, str(error)
         out.append(
             (

@@ -79,7 +79,8 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         )
     laps = (len(strobes) - 1) // n
     first = marks[len(strobes) - 1 - laps * n]
-    inside = t >= first - 1e-12 * reading.period
+    slack = 1e-12 * reading.period
+    inside = (t >= first - slack) & (t <= marks[-1] + slack)
     u = waveforms.signals[reading.generator]
     u = np.interp(t, time, u)
     sides, times, velocities = [], [], []
@@ -169,7 +170,7 @@ def _asymmetry(t: Array, y: Array, end: float, n: int, period: float, peak: Arra
     if n % 2 == 0:
         return float("nan")
     grid = end - n * period * (1.0 - np.arange(128) / 128)
-    wave = np.stack([np.interp(grid, t, y[:, i]) for i in range(y.shape[1])], axis=1)
+    wave = _at(t, y, grid)
     return float((np.abs(np.roll(wave, -64, axis=0) + wave).max(axis=0) / peak).max())
 
 
