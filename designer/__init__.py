@@ -13,17 +13,16 @@ if TYPE_CHECKING:
     from designer.api import (
         RunResult,
         Simulated,
-        Study,
         Synthesis,
         run,
         simulate,
         synthesise,
-        tolerance_study,
     )
     from designer.catalog import Catalog, load_catalog
     from designer.errors import DesignerError, EnvironmentMissing, InputError, Unreachable
     from designer.model import Dimensionless, Mechanical
     from designer.modelfile import ModelFile, Response, parse_model_file, read_model_file
+    from designer.study import Study, tolerance_study
 
 __version__ = "0.1.0"
 
@@ -54,17 +53,16 @@ _HOMES = {
     "designer.api": (
         "RunResult",
         "Simulated",
-        "Study",
         "Synthesis",
         "run",
         "simulate",
         "synthesise",
-        "tolerance_study",
     ),
     "designer.catalog": ("Catalog", "load_catalog"),
     "designer.errors": ("DesignerError", "EnvironmentMissing", "InputError", "Unreachable"),
     "designer.model": ("Dimensionless", "Mechanical"),
     "designer.modelfile": ("ModelFile", "Response", "parse_model_file", "read_model_file"),
+    "designer.study": ("Study", "tolerance_study"),
 }
 
 

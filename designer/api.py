@@ -5,7 +5,6 @@ Nothing here writes a file or prints; ``designer.job`` does the same with a desi
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,28 +12,38 @@ from typing import Any, Literal
 
 import numpy as np
 
-from designer import gate, pipeline, tolerance
+from designer import attractor, gate, pipeline, waveform_orbit
 from designer.attractor import coexisting, settle, starts
-from designer.blocks import BlockStore
 from designer.catalog import Catalog, load_catalog
 from designer.deck import Excitation
-from designer.errors import EnvironmentMissing, InputError
-from designer.flow import Flow, FlowStatus
+from designer.errors import InputError
+from designer.flow import MAX_EVENTS, Flow, FlowStatus
+from designer.model import Dimensionless
 from designer.modelfile import ModelFile, Response
-from designer.ngspice import HOW_TO_INSTALL, SimulationFailed, Waveforms
-from designer.orbit import Orbit, OrbitStatus
-from designer.pipeline import Checked
+from designer.ngspice import SimulationFailed
+from designer.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
+from designer.pipeline import TRACE_POINTS, Checked, Trace
+from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.responses import STARTS, ModelResponse, circuit_flow, find, scale_of
+from designer.study import SAMPLES, SEED, Study, tolerance_study
 from designer.synthesis import Design
 from designer.system import Array, Drive
 from designer.tolerance import Answer, StudyPlan, Yield
-from designer.workers import SpiceJob, SpicePool
+from designer.workers import SpicePool
 
 Engine = Literal["model", "circuit", "ngspice"]
 ENGINES: tuple[Engine, ...] = ("model", "circuit", "ngspice")
-SAMPLES = 200
-SEED = 1
+SLOWEST, FASTEST = 1e-3, 1e3
+"""Drive frequencies that ``simulate`` takes: slower, one period has too many steps to wait for."""
+NEAR_TWIN = 0.02
+"""Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
+SHOWN_PERIODS = 30
+"""Drive periods of a trace of a response without a period."""
+ANSWERS = frozenset(
+    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
+)
+"""Statuses that answer the question where no response was wanted."""
 
 
 @dataclass(frozen=True)
@@ -46,36 +55,6 @@ class Synthesis:
     found: tuple[ModelResponse, ...]
     design: Design
     seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class Study:
-    """A tolerance study of the responses in ``checked``.
-
-    asked : for each question of the plan, the index of its response. left_out : why a response
-    is no question, by index.
-    """
-
-    checked: tuple[Checked, ...]
-    plan: StudyPlan
-    asked: tuple[int, ...]
-    left_out: dict[int, str]
-    answers: tuple[Answer, ...]
-
-    def answers_to(self, index: int) -> tuple[Answer, ...]:
-        """The answers for response number ``index``, by sample."""
-        if index not in self.asked:
-            return ()
-        question = self.asked.index(index)
-        return tuple(a for a in self.answers if a.question == question)
-
-    @property
-    def yields(self) -> tuple[Yield | None, ...]:
-        """For each response; None where it was left out."""
-        return tuple(
-            tolerance.count(self.answers_to(i)) if i in self.asked else None
-            for i in range(len(self.checked))
-        )
 
 
 @dataclass(frozen=True)
@@ -112,7 +91,13 @@ class RunResult:
 
 @dataclass(frozen=True)
 class Simulated:
-    """A response on one engine, in model units whatever the engine."""
+    """A response on one engine, in model units whatever the engine.
+
+    twins : mirror twin of the orbit and of each of ``others``; None where an orbit is its own
+    twin, or there is no mirror, or the engine was not asked (ngspice). b : the clearance; sides :
+    the stops there are. settings : of the engine for this response. traces : where asked, the
+    orbit and its twin over their periods, each from its start.
+    """
 
     omega: float
     expected: str | None
@@ -120,11 +105,16 @@ class Simulated:
     orbit: Orbit
     others: tuple[Orbit, ...]
     seconds: float
+    twins: tuple[Orbit | None, ...] = ()
+    b: float = float("nan")
+    sides: tuple[int, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+    traces: tuple[Trace, ...] = ()
 
-
-def cores() -> int:
-    """How many cores this process may use: the default of ``jobs``."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    @property
+    def twin(self) -> Orbit | None:
+        """The mirror twin of the orbit, if it has one."""
+        return self.twins[0] if self.twins else None
 
 
 def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesis:
@@ -139,72 +129,6 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
     with naming(modelfile):
         found, design = pipeline.design_for(modelfile, catalog)
     return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)
-
-
-def check(
-    synthesis: Synthesis, pool: SpicePool | None, progress: Progress | None = None
-) -> tuple[Checked, ...]:
-    """Every response of a design on the exact circuit and, with a pool, in ngspice."""
-    said = Progress() if progress is None else progress
-    return pipeline.check(
-        synthesis.design, synthesis.found, pool, lambda text: ignore(said.stage(text))
-    )
-
-
-def tolerance_study(
-    synthesis: Synthesis,
-    *,
-    samples: int = SAMPLES,
-    seed: int = SEED,
-    jobs: int | None = None,
-    pool: SpicePool | None = None,
-    checked: tuple[Checked, ...] | None = None,
-    store: Callable[[StudyPlan], BlockStore] | None = None,
-    progress: Progress | None = None,
-) -> Study:
-    """How many boards out of ``samples`` show each response, under ``bench-1``.
-
-    checked : of the same design, to save the time of the gate. pool : where ngspice runs; without
-    one ngspice is not asked. store : where blocks are read from and written to.
-    """
-    need_responses(synthesis.modelfile)
-    said = Progress() if progress is None else progress
-    jobs = cores() if jobs is None else jobs
-    at_least("--samples", samples, 1)
-    at_least("--seed", seed, 0)
-    at_least("--jobs", jobs, 1)
-    checked = check(synthesis, pool, said) if checked is None else checked
-    left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
-    asked = tuple(i for i in range(len(checked)) if i not in left_out)
-    plan = pipeline.plan_study(
-        synthesis.modelfile,
-        synthesis.design,
-        [checked[i] for i in asked],
-        synthesis.catalog,
-        samples=samples,
-        seed=seed,
-    )
-    blocks = None if store is None else store(plan)
-    answers: list[Answer] = []
-    steps = samples * len(asked)
-    if pool is not None:
-        steps += min(samples, tolerance.NGSPICE_SAMPLES) * sum(
-            q.settings is not None for q in plan.questions
-        )
-    step = said.stage(f"tolerance study, {samples} samples of {len(asked)} responses", steps)
-    for block in plan.blocks() if asked else ():
-        known = None if blocks is None else blocks.read(block)
-        if known is None:
-            known = tolerance.run_block(plan, block, pool, jobs, step)
-            if blocks is not None:
-                blocks.write(block, known)
-        else:
-            for answer in known:
-                step()
-                if answer.ngspice:
-                    step()
-        answers += known
-    return Study(checked, plan, asked, left_out, tuple(answers))
 
 
 def run(
@@ -243,96 +167,76 @@ def simulate(
     synthesis: Synthesis | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
+    traces: bool = False,
 ) -> tuple[Simulated, ...]:
     """The responses of a model file, or what is reached from rest at ``omegas``.
 
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
-    synthesis : of this model file; made where the engine needs one and None is given.
+    synthesis : of this model file; made where the engine needs one and None is given. traces :
+    keep the orbits and their mirror twins as traces too.
+
+    Raises
+    ------
+    InputError : a frequency outside ``SLOWEST`` to ``FASTEST``, or nothing to simulate.
     """
     said = Progress() if progress is None else progress
     for omega in omegas:
-        if not 0.0 < omega < np.inf:
-            raise InputError(None, "--omega", omega, "a finite number > 0")
+        _check_omega(None, "--omega", omega)
     if not omegas and not modelfile.responses:
         need_responses(modelfile, " (or --omega)")
     specs = [Response(float(w)) for w in omegas] or list(modelfile.responses)
+    file = str(modelfile.source) if modelfile.source else None
+    for number, spec in enumerate(specs, start=1):
+        if spec.omega is not None:
+            _check_omega(file, f"response[{number}].omega", spec.omega)
     if engine == "model":
         step = said.stage("responses of the model", len(specs))
-        return tuple(_timed(step, lambda s=s: _on_model(modelfile, s)) for s in specs)  # type: ignore[misc]
+        return tuple(
+            _timed(step, lambda s=s: _on_model(modelfile, s, traces))  # type: ignore[misc]
+            for s in specs
+        )
     if engine == "circuit":
         made = synthesis or synthesise(modelfile)
         step = said.stage("responses of the exact circuit", len(specs))
         return tuple(
-            _timed(step, lambda s=s: _on_circuit(made, s, bool(omegas)))  # type: ignore[misc]
+            _timed(step, lambda s=s: _on_circuit(made, s, bool(omegas), traces))  # type: ignore[misc]
             for s in specs
         )
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
         made = synthesis or synthesise(modelfile)
-        return _in_ngspice(made, specs, bool(omegas), pool, said)
+        return _in_ngspice(made, specs, bool(omegas), pool, said, traces)
+
+
+def engine_settings(engine: Engine) -> dict[str, Any]:
+    """What ``simulate`` states of an engine: tolerances, bounds and limits (docs/engine.md)."""
+    exact: dict[str, Any] = {
+        "flow": "exact, by modes",
+        "strobe_tolerance": attractor.STROBE_TOLERANCE,
+        "undecided_below": attractor.ENGINE_ERROR,
+        "symmetry_tolerance": SYMMETRY_TOLERANCE,
+        "largest_period": MAX_PERIOD,
+        "settling_periods": list(np.cumsum(attractor.STAGES)),
+        "starts": STARTS,
+        "most_events_a_period": MAX_EVENTS,
+    }
+    if engine != "ngspice":
+        return exact
+    return {
+        **exact,
+        "strobe_tolerance": waveform_orbit.STROBE_TOLERANCE,
+        "undecided_below": waveform_orbit.ENGINE_ERROR,
+        "gate_bound": gate.BOUND,
+        "discarded_periods": gate.DISCARD,
+    }
 
 
 # ---------------------------------------------------------------------------------------------
 
 
-def need_responses(modelfile: ModelFile, more: str = "") -> None:
-    """InputError unless the file wants a response."""
-    if not modelfile.responses:
-        raise InputError(
-            str(modelfile.source) if modelfile.source else None,
-            "response",
-            "nothing",
-            f"at least one table [[response]]{more}",
-        )
-
-
-def at_least(name: str, value: int, least: int) -> None:
-    """InputError unless an option is large enough."""
-    if value < least:
-        raise InputError(None, name, value, f"a whole number >= {least}")
-
-
-class naming:  # noqa: N801 - reads as a word in a with statement
-    """Names the model file in an InputError that names none."""
-
-    def __init__(self, modelfile: ModelFile) -> None:
-        self._source = modelfile.source
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if not isinstance(error, InputError) or error.file is not None or self._source is None:
-            return
-        raise type(error)(self._source, error.field, error.found, error.expected) from None
-
-
-def require_ngspice(pool: SpicePool) -> None:
-    """EnvironmentMissing before any long work; the worker that was started stays for it."""
-    from designer.spice_batch import program_version
-
-    program_version()
-    deck = "a resistor\nV1 a 0 1\nR1 a 0 1\n.tran 1 2\n.end\n"
-    for _, answer in pool.map([SpiceJob(deck, ("a",), 2.0, _length)]):
-        if isinstance(answer, SimulationFailed):
-            raise EnvironmentMissing(f"ngspice does not work: {answer.reason}; {HOW_TO_INSTALL}")
-
-
-def ignore(_: object) -> None:
-    """Nothing."""
-
-
-def _length(waveforms: Waveforms) -> int:
-    return len(waveforms.time)
-
-
-def _why_not(checked: Checked) -> str:
-    """Why a response cannot be a question of a study; "" where it can."""
-    if not checked.model.found:
-        return "the model does not show it"
-    if checked.circuit.status is not OrbitStatus.PERIODIC:
-        return f"the nominal circuit is {checked.circuit.response}"
-    return ""
+def _check_omega(file: str | None, name: str, omega: float) -> None:
+    if not SLOWEST <= omega <= FASTEST:
+        raise InputError(file, name, omega, f"a number from {SLOWEST:g} to {FASTEST:g}")
 
 
 def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated:
@@ -342,13 +246,79 @@ def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated
     return replace(result, seconds=time.perf_counter() - began)
 
 
-def _on_model(modelfile: ModelFile, spec: Response) -> Simulated:
+def _on_model(modelfile: ModelFile, spec: Response, traces: bool) -> Simulated:
     with naming(modelfile):
         (r,) = find(modelfile.model, [spec])
     model = replace(modelfile.model, b=r.b)
     flow = Flow(model.second_order().piecewise_linear(), Drive(r.omega))
     orbits = [_measured(flow, o) for o in (r.orbit, *r.others)]
-    return Simulated(r.omega, r.expected, r.found, orbits[0], tuple(orbits[1:]), 0.0)
+    twins = [_twin(flow, o) for o in orbits]
+    return Simulated(
+        r.omega,
+        r.expected,
+        r.found and _is(r, orbits[0]),
+        orbits[0],
+        tuple(orbits[1:]),
+        0.0,
+        tuple(twins),
+        r.b,
+        _sides(model),
+        _exact_settings(flow, orbits[0], 1.0),
+        _traces(flow, (orbits[0], twins[0]), np.ones(4), 1.0) if traces else (),
+    )
+
+
+def _sides(model: Dimensionless) -> tuple[int, ...]:
+    """The stops that exist: 1 upper, -1 lower."""
+    if model.k0 == 0.0:
+        return ()
+    return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[model.sides]
+
+
+def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
+    """The mirror twin of an orbit that is not its own.
+
+    Bias currents leave a circuit without an exact mirror; its twin is then the stable orbit next to
+    the mirror image, if there is one with the counts the other way round.
+    """
+    if orbit.symmetric is not False:
+        return None
+    if flow.system.mirror is not None:
+        return attractor.twin(flow, orbit)
+    image = -flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=2).strobes[1]
+    found = attractor.shoot(flow, image, orbit.n)
+    if found is None:
+        return None
+    near = attractor.describe(flow, found[0], orbit.n, found[1])
+    peak = np.abs(orbit.extremes).max(axis=1)
+    alike = (np.abs(near.extremes + orbit.extremes[:, ::-1]).max(axis=1) < NEAR_TWIN * peak).all()
+    swapped = (near.n, near.p, near.q) == (orbit.n, orbit.q, orbit.p)
+    return near if alike and swapped and near.symmetric is False and near.radius < 1.0 else None
+
+
+def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
+    """kernel : which one carries the strobes. undecided_below : contacts shallower and misses
+    nearer than this, in units of x1, count as grazing."""
+    peak = float(np.abs(orbit.extremes[0]).max()) if len(orbit.extremes) else float("nan")
+    return {
+        "kernel": "general" if flow._modal is None else "modal",
+        "undecided_below": attractor.ENGINE_ERROR * peak / unit,
+    }
+
+
+def _traces(
+    flow: Flow, orbits: Sequence[Orbit | None], volts: Array, seconds: float
+) -> tuple[Trace, ...]:
+    """Traces of the orbits in model units; none of what has no start."""
+    out = []
+    for orbit in orbits:
+        if orbit is None or not len(orbit.start):
+            continue
+        periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
+        run_ = flow.run(orbit.start, periods, mode=orbit.mode or None, points=TRACE_POINTS)
+        time_ = np.arange(len(run_.strobes)) * flow.drive.period / TRACE_POINTS
+        out.append(Trace(time_ / seconds, run_.strobes / volts))
+    return tuple(out)
 
 
 def _circuit_orbits(
@@ -367,16 +337,35 @@ def _circuit_orbits(
     return r, flow, orbits or [settle(flow, np.zeros(flow.system.size))]
 
 
-def _on_circuit(made: Synthesis, spec: Response, scan: bool) -> Simulated:
+def _on_circuit(made: Synthesis, spec: Response, scan: bool, traces: bool) -> Simulated:
     r, flow, orbits = _circuit_orbits(made, spec, scan)
     volts, seconds = made.design.volts(r.b), made.design.errors.scales.seconds
-    shown = [dimensionless(_measured(flow, o), volts, seconds) for o in orbits]
-    found = _is(r, orbits[0])
-    return Simulated(r.omega, r.expected, found, shown[0], _distinct(shown), 0.0)
+    measured = [_measured(flow, o) for o in orbits]
+    shown = [dimensionless(o, volts, seconds) for o in measured]
+    kept = _distinct(shown)
+    twins = {i: _twin(flow, measured[i]) for i in kept}
+    return Simulated(
+        r.omega,
+        r.expected,
+        _is(r, orbits[0]),
+        shown[0],
+        tuple(shown[i] for i in kept[1:]),
+        0.0,
+        tuple(None if t is None else dimensionless(t, volts, seconds) for t in twins.values()),
+        r.b,
+        _sides(made.design.model),
+        _exact_settings(flow, measured[0], float(volts[0])),
+        _traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
+    )
 
 
 def _in_ngspice(
-    made: Synthesis, specs: Sequence[Response], scan: bool, pool: SpicePool, said: Progress
+    made: Synthesis,
+    specs: Sequence[Response],
+    scan: bool,
+    pool: SpicePool,
+    said: Progress,
+    traces: bool,
 ) -> tuple[Simulated, ...]:
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
     began = time.perf_counter()
@@ -397,30 +386,59 @@ def _in_ngspice(
     out = []
     for r, excitation, count in rows:
         volts, scale = made.design.volts(r.b), made.design.errors.scales.seconds
-        asked = [Checked(r, r.orbit, excitation, next(results)).ngspice for _ in range(count)]
+        gates = [next(results) for _ in range(count)]
+        asked = [Checked(r, r.orbit, excitation, g).ngspice for g in gates]
         heard = [o for o in asked if o is not None] or [Orbit(OrbitStatus.FAILED)]
         shown = [dimensionless(o, volts, scale) for o in heard]
         out.append(
-            Simulated(r.omega, r.expected, _is(r, heard[0]), shown[0], _distinct(shown), seconds)
+            Simulated(
+                r.omega,
+                r.expected,
+                _is(r, heard[0]),
+                shown[0],
+                tuple(shown[i] for i in _distinct(shown)[1:]),
+                seconds,
+                b=r.b,
+                sides=_sides(made.design.model),
+                settings=_gate_settings(gates[0]) if gates else {},
+                traces=_spice_traces(gates[0], volts, scale) if gates and traces else (),
+            )
         )
     return tuple(out)
+
+
+def _gate_settings(result: gate.GateResult) -> dict[str, Any]:
+    return {
+        **result.settings.as_dict(),
+        "steps_a_period": result.tried[-1],
+        "gate_passed": result.passed,
+        "gate_difference": result.difference,
+    }
+
+
+def _spice_traces(result: gate.GateResult, volts: Array, seconds: float) -> tuple[Trace, ...]:
+    if isinstance(result.read, SimulationFailed) or result.read.trace is None:
+        return ()
+    time_, states = result.read.trace
+    return (Trace(time_ / seconds, states / volts),)
 
 
 def _is(r: ModelResponse, orbit: Orbit) -> bool:
     """Whether an engine shows what is wanted; anything that is an answer, where nothing is."""
     if orbit.status is not OrbitStatus.PERIODIC:
-        return r.spec.expect is None and orbit.status is OrbitStatus.APERIODIC
+        nothing = r.spec.expect is None and r.spec.symmetric is None
+        return nothing and orbit.status in ANSWERS
     symmetric = r.spec.symmetric is None or orbit.symmetric is r.spec.symmetric
     return symmetric and r.spec.accepts(orbit.n, orbit.p, orbit.q)
 
 
-def _distinct(orbits: Sequence[Orbit]) -> tuple[Orbit, ...]:
-    """The others, without those that look like one that is there."""
-    kept = [orbits[0]]
-    for o in orbits[1:]:
-        if not any(_alike(o, k) for k in kept):
-            kept.append(o)
-    return tuple(kept[1:])
+def _distinct(orbits: Sequence[Orbit]) -> list[int]:
+    """Which orbits to show: the first, and the others that do not look like one before them."""
+    kept = [0]
+    for i in range(1, len(orbits)):
+        if not any(_alike(orbits[i], orbits[k]) for k in kept):
+            kept.append(i)
+    return kept
 
 
 def _alike(a: Orbit, b: Orbit) -> bool:

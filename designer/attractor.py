@@ -2,8 +2,9 @@
 
 Settle for 20 drive periods, look for the period n at which the strobe nearly repeats, polish by
 Newton's method on the n-period map and accept only what converged, is stable, lies where the
-settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800, 4000 periods in all). Newton at once
-would be faster and wrong: it also lands on unstable orbits and on other attractors.
+settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800,
+4000 periods in all). Newton at once would be faster and wrong: it also lands on unstable orbits and
+on other attractors.
 """
 
 from __future__ import annotations

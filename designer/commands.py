@@ -100,13 +100,14 @@ def run(
     log: Log = None,
 ) -> int:
     """Everything: parts, circuit, check in ngspice, yield, report."""
-    with _session(verbose, quiet, log) as progress:
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer import job
 
         options = job.Options(seed, jobs, samples, overwrite, resume)
         options.check()
         modelfile, folder = job.source(model, out)
-        outcome = job.run_into(modelfile, folder, options, progress)
+        command = options.command("run", model, out)
+        outcome = job.run_into(modelfile, folder, options, progress, command)
     return _answer(outcome, json, quiet, "run")
 
 
@@ -124,7 +125,7 @@ def synthesise(
     log: Log = None,
 ) -> int:
     """Choose the parts and write the design folder."""
-    with _session(verbose, quiet, log) as progress:
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer import job
 
         options = job.Options(seed, jobs, overwrite=overwrite, resume=resume)
@@ -152,13 +153,14 @@ def tolerance(
     log: Log = None,
 ) -> int:
     """How many boards will work; writes into the design folder (a model file needs --out)."""
-    with _session(verbose, quiet, log) as progress:
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer import job
 
         options = job.Options(seed, jobs, samples, overwrite, resume)
         options.check()
         modelfile, folder = job.source(model, out)
-        outcome = job.run_into(modelfile, folder, options, progress)
+        command = options.command("tolerance", model, out)
+        outcome = job.run_into(modelfile, folder, options, progress, command)
     return _answer(outcome, json, quiet, "tolerance")
 
 
@@ -173,6 +175,13 @@ def simulate(
         EngineName.MODEL
     ),
     seed: Seed = 1,
+    plots: Annotated[
+        Path | None,
+        typer.Option("--plots", metavar="DIR", help="Draw each response: PNG and SVG."),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace pictures of the same names.")
+    ] = False,
     jobs: Jobs = None,
     json: Json = False,
     verbose: Verbose = False,
@@ -180,17 +189,21 @@ def simulate(
     log: Log = None,
 ) -> int:
     """The responses: those that the model file wants, or what is reached from rest at --omega."""
-    with _session(verbose, quiet, log) as progress:
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer import job
 
         job.Options(seed, jobs).check()
-        answer, found = job.simulate_answer(model, tuple(omega or ()), engine.value, jobs, progress)
+        answer, found = job.simulate_answer(
+            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite
+        )
     if json:
         _print_json(answer)
     elif not quiet:
         from designer import show
 
         show.simulated(answer)
+        if plots is not None:
+            show.pictures(plots, answer["files"])
     return 0 if found else 1
 
 
@@ -283,6 +296,15 @@ def _session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]
                 each.close()
             logger.handlers.clear()
             logger.addHandler(logging.NullHandler())
+
+
+@contextmanager
+def _compiling(progress: Progress) -> Iterator[None]:
+    """Says it when the engine has to be compiled."""
+    from designer.first_use import announced
+
+    with announced(progress.note):
+        yield
 
 
 def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:

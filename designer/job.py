@@ -5,20 +5,19 @@ Nothing here prints; ``designer.commands`` does.
 
 from __future__ import annotations
 
+import os
+import shlex
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import __version__, api, deck, matching, topology
+from designer import __version__, api, design_files, simulate_plots
 from designer.api import RunResult, Synthesis
 from designer.blocks import BlockStore, block_names
-from designer.bom import bill, bill_csv
 from designer.catalog import Catalog, load_catalog
-from designer.circuit import nominal_board
-from designer.coefficients import coefficient_errors
-from designer.deck import Excitation, SolverSettings
+from designer.design_files import load
 from designer.errors import InputError
 from designer.folder import (
     DESIGN,
@@ -30,41 +29,49 @@ from designer.folder import (
     StageName,
     is_design_folder,
 )
-from designer.jsonout import dumps, plain, run_json, simulate_json, study_json, synthesis_json
-from designer.modelfile import ModelFile, Response, read_model_file
-from designer.pipeline import Checked, nominal_reduction
+from designer.jsonout import dumps, plain, run_json, simulate_json, study_json
+from designer.modelfile import ModelFile, read_model_file
+from designer.pipeline import Checked
+from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.provenance import provenance
-from designer.responses import find, on_circuit, peaks
 from designer.selection import SOLVER
-from designer.setup_table import scales_csv, setup_csv
 from designer.spread import Spread
-from designer.synthesis import SWING_SHARE, Certificate, Design
+from designer.study import SAMPLES, SEED, check, tolerance_study
 from designer.workers import SpicePool
 
 MOST_SAMPLES = 1_000_000
-DECK_PERIODS = 20
-"""Drive periods that ``circuit.cir`` runs for."""
 
 
 @dataclass(frozen=True)
 class Options:
     """What the command line says about any verb that writes."""
 
-    seed: int = api.SEED
+    seed: int = SEED
     jobs: int | None = None
-    samples: int = api.SAMPLES
+    samples: int = SAMPLES
     overwrite: bool = False
     resume: bool = False
 
     def check(self) -> None:
         """InputError for a number that cannot be."""
-        api.at_least("--samples", self.samples, 1)
+        at_least("--samples", self.samples, 1)
         if self.samples > MOST_SAMPLES:
             raise InputError(None, "--samples", self.samples, f"at most {MOST_SAMPLES}")
-        api.at_least("--seed", self.seed, 0)
+        at_least("--seed", self.seed, 0)
         if self.jobs is not None:
-            api.at_least("--jobs", self.jobs, 1)
+            at_least("--jobs", self.jobs, 1)
+
+    def command(self, verb: str, model: Path, out: Path | None) -> str:
+        """The command line that makes the same results again.
+
+        Files by their last names, so that no path of this machine stands in it; without options
+        that change no result.
+        """
+        said = ["designer", verb, _base(model)]
+        said += [] if out is None else ["--out", _base(out)]
+        said += ["--samples", str(self.samples), "--seed", str(self.seed)]
+        return shlex.join(said)
 
 
 @dataclass(frozen=True)
@@ -125,23 +132,27 @@ def synthesise_into(
         return Outcome(answer, _all_found(answer), out, True)
     progress.stage("responses of the model, parts")
     made = api.synthesise(modelfile, catalog)
-    with api.naming(modelfile):
-        files = _design_files(made)
-    folder.begin(wanted, _design_provenance(made))
-    answer = _write_design(folder, made, files)
+    with naming(modelfile):
+        files = design_files.texts(made)
+    folder.begin(wanted, design_files.design_provenance(made))
+    answer = design_files.write(folder, made, files)
     folder.finish("design")
     return Outcome(answer, _all_found(answer), out, False)
 
 
-def run_into(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> Outcome:
+def run_into(
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress, command: str
+) -> Outcome:
     """The verbs ``run`` and ``tolerance``: design, check, study, report.
+
+    command : the command line as the report states it (``Options.command``).
 
     Raises
     ------
     EnvironmentMissing : there is work to do and no ngspice.
     """
     options.check()
-    api.need_responses(modelfile)
+    need_responses(modelfile)
     catalog = load_catalog()
     folder = Folder(out)
     wanted = _wanted(modelfile, catalog, options, study=True)
@@ -158,28 +169,28 @@ def run_into(modelfile: ModelFile, out: Path, options: Options, progress: Progre
     if not todo:
         answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
         return Outcome(answer, _satisfied(answer), out, True)
-    jobs = api.cores() if options.jobs is None else options.jobs
+    jobs = cores() if options.jobs is None else options.jobs
     began = time.perf_counter()
     with SpicePool(jobs) as pool:
         progress.stage("ngspice")
-        api.require_ngspice(pool)
+        require_ngspice(pool)
         progress.stage("responses of the model, parts")
         if "design" in todo:
             made = api.synthesise(modelfile, catalog)
-            with api.naming(modelfile):
-                files = _design_files(made)
-            folder.begin({s: wanted[s] for s in todo}, _design_provenance(made))
-            _write_design(folder, made, files)
+            with naming(modelfile):
+                files = design_files.texts(made)
+            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+            design_files.write(folder, made, files)
             folder.finish("design")
         else:
             made = load(folder, modelfile, catalog)
-            folder.begin({s: wanted[s] for s in todo}, _design_provenance(made))
+            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
         ready = time.perf_counter()
-        checked = api.check(made, pool, progress)
+        checked = check(made, pool, progress)
         if checked[0].gate is not None and checked[0].gate.passed:
-            folder.rewrite("circuit.cir", circuit_deck(made, checked[0]))
+            folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
         gated = time.perf_counter()
-        study = api.tolerance_study(
+        study = tolerance_study(
             made,
             samples=options.samples,
             seed=options.seed,
@@ -200,8 +211,9 @@ def run_into(modelfile: ModelFile, out: Path, options: Options, progress: Progre
     folder.write(TOLERANCE, dumps(study_json(study, said, cost)))
     progress.stage("report")
     from designer.report import write_report  # matplotlib is not needed before this
+    from designer.report_data import ReportData
 
-    write_report(result, folder / REPORTS[0], folder / REPORTS[1])
+    write_report(ReportData.of(result, command), folder / REPORTS[0], folder / REPORTS[1])
     assert folder.manifest is not None
     folder.manifest.provenance = said
     folder.finish("study")
@@ -215,8 +227,13 @@ def simulate_answer(
     engine: api.Engine,
     jobs: int | None,
     progress: Progress,
+    plots: Path | None = None,
+    overwrite: bool = False,
 ) -> tuple[dict[str, Any], bool]:
-    """The verb ``simulate``: its JSON object, and whether every wanted response was found."""
+    """The verb ``simulate``: its JSON object, and whether every wanted response was found.
+
+    plots : the directory for pictures; ``overwrite`` replaces those of the same names.
+    """
     began = time.perf_counter()
     made: Synthesis | None = None
     catalog = load_catalog()
@@ -226,57 +243,25 @@ def simulate_answer(
             made = load(Folder(path), modelfile, catalog)
     else:
         modelfile = read_model_file(path)
+    wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
+    names = simulate_plots.names([w for w in wanted if w is not None])
+    if plots is not None:
+        simulate_plots.check(plots, names, overwrite)
     simulated = api.simulate(
-        modelfile, omegas, engine=engine, synthesis=made, jobs=jobs, progress=progress
+        modelfile,
+        omegas,
+        engine=engine,
+        synthesis=made,
+        jobs=jobs,
+        progress=progress,
+        traces=plots is not None,
     )
-    said = provenance(modelfile, catalog.hash)
+    said = provenance(modelfile, catalog.hash, settings=api.engine_settings(engine))
     answer = simulate_json(simulated, engine, said, time.perf_counter() - began)
+    if plots is not None:
+        progress.stage("pictures")
+        answer["files"] = simulate_plots.write(plots, names, simulated, overwrite)
     return plain(answer), all(s.found for s in simulated)
-
-
-def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
-    """The design of a folder, rebuilt from its model and the values of its parts.
-
-    Nothing is chosen again; the errors are computed afresh and must be those that were written.
-    """
-    said, file = folder.json(DESIGN), folder / DESIGN
-    model, spec = modelfile.model, modelfile.circuit
-    found = find(model, modelfile.responses)
-    with api.naming(modelfile):
-        opamp = catalog.opamp(spec.opamp)
-    system = model.second_order()
-    try:
-        values = {str(name): float(value) for name, value in said["parts"].items()}
-        circuit = topology.build(
-            matching.terms(
-                system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()
-            ),
-            values,
-            opamp,
-            supply=float(said["circuit"]["supply"]),
-            saturation=float(said["circuit"]["saturation"]),
-            clearance="A" if model.k0 > 0.0 else None,
-        )
-        changes = {k: float(said["circuit"][k]) for k in ("gain", "bias")}
-        circuit = circuit.__class__(**{**circuit.__dict__, **changes})
-        swing = (SWING_SHARE * circuit.saturation, peaks(model, found).states)
-        errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
-        if abs(errors.max_error - float(said["max_error"])) > 1e-9:
-            raise ValueError("parts and max_error do not belong together")
-        design = Design(
-            model=model,
-            circuit=circuit,
-            errors=errors,
-            certificate=Certificate(**said["certificate"]),
-            conditions=dict(said["conditions"]),
-            solver=dict(said["solver"]),
-            seconds=float(said["cost"]["synthesis_seconds"]),
-        )
-    except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
-        raise InputError(
-            file, "parts", f"{type(error).__name__}: {error}", "the design of this folder's model"
-        ) from None
-    return Synthesis(modelfile, catalog, found, design)
 
 
 def read_design(path: Path, catalog: Catalog | None = None) -> Synthesis:
@@ -285,35 +270,11 @@ def read_design(path: Path, catalog: Catalog | None = None) -> Synthesis:
     return load(Folder(path), modelfile, load_catalog() if catalog is None else catalog)
 
 
-def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:
-    """``circuit.cir``: the first response (ω = 1 where there is none), from its own orbit.
-
-    checked : of the first response; its gate's settings are used.
-    """
-    modelfile, design = made.modelfile, made.design
-    first = made.found[0] if made.found else find(design.model, [Response(1.0)])[0]
-    excitation = Excitation(design.errors.scales.frequency(first.omega), design.amplitude(first.b))
-    if checked is None:
-        orbit = on_circuit(nominal_reduction(design).system(), design, first)
-    else:
-        orbit = checked.circuit
-    period = 1.0 / excitation.frequency
-    settings = SolverSettings("trap", period / 1000.0)
-    if checked is not None and checked.gate is not None:
-        settings = checked.gate.settings
-    text = deck.write(
-        design.circuit,
-        nominal_board(design.circuit),
-        excitation,
-        settings,
-        title=modelfile.title,
-        stop_time=DECK_PERIODS * period,
-        initial=orbit.start if len(orbit.start) else None,
-    )
-    nets = [*design.circuit.state_nets, *(["fv"] if design.circuit.stops else [])]
-    shown = " ".join(f"v({net})" for net in [*nets, design.circuit.generator.net])
-    # Without such a line the plain program runs nothing.
-    return text.replace("\n.end\n", f"\n.print tran {shown}\n.end\n")
+def _base(path: Path) -> str:
+    """The last name of a path, never an option; ``.`` and ``..`` by the names they stand for."""
+    name = os.path.basename(os.path.abspath(path)) or "."
+    name = name.encode("utf-8", "replace").decode("utf-8")  # a name that is no text
+    return f"./{name}" if name.startswith("-") else name
 
 
 def _made_from(folder: Folder) -> dict[str, Any]:
@@ -338,36 +299,6 @@ def _wanted(
         names = [TOLERANCE, *REPORTS, *block_names(options.samples)]
         wanted["study"] = ({**inputs, **more}, names)
     return wanted
-
-
-def _design_files(made: Synthesis) -> dict[str, str]:
-    """Everything of the design stage but ``design.json``; made before the folder is touched."""
-    modelfile, design = made.modelfile, made.design
-    return {
-        MODEL: modelfile.text,
-        "circuit.cir": circuit_deck(made),
-        "bom.csv": bill_csv(bill(design.circuit, modelfile.circuit, made.catalog)),
-        "setup.csv": setup_csv(design, made.found),
-        "scales.csv": scales_csv(modelfile, design, made.found),
-    }
-
-
-def _write_design(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str, Any]:
-    for name, text in files.items():
-        folder.write(name, text)
-    folder.write(
-        DESIGN,
-        dumps(
-            synthesis_json(
-                made.modelfile, made.design, made.found, _design_provenance(made), made.seconds
-            )
-        ),
-    )
-    return folder.json(DESIGN)
-
-
-def _design_provenance(made: Synthesis) -> dict[str, Any]:
-    return provenance(made.modelfile, made.catalog.hash, settings={"highs": SOLVER})
 
 
 def _study_provenance(

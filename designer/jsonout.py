@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
-    from designer.api import Simulated, Study
+    from designer.api import Simulated
     from designer.modelfile import ModelFile
     from designer.orbit import Orbit
     from designer.pipeline import Checked
     from designer.responses import ModelResponse
+    from designer.study import Study
     from designer.synthesis import Design
     from designer.tolerance import Answer
 
@@ -138,7 +139,12 @@ def simulate_json(
                 "expected": s.expected,
                 "found": s.found,
                 **orbit_json(s.orbit),
-                "others": [orbit_json(o) for o in s.others],
+                "twin": _twin_json(s.twin),
+                "others": [
+                    {**orbit_json(o), "twin": _twin_json(s.twins[i] if s.twins else None)}
+                    for i, o in enumerate(s.others, start=1)
+                ],
+                "engine": s.settings,
                 "cost": {"periods": s.orbit.periods, "seconds": s.seconds},
             }
             for s in simulated
@@ -150,21 +156,38 @@ def simulate_json(
 
 def orbit_json(orbit: Orbit) -> dict[str, Any]:
     """An orbit in model units."""
+    from designer.setup_table import STATES
+
     known = len(orbit.extremes) > 0
+    times = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
     return {
         "response": orbit.response,
         "status": str(orbit.status),
+        "n": orbit.n,
+        "p": orbit.p,
+        "q": orbit.q,
+        "start": orbit.start,
         "symmetric": orbit.symmetric,
         "asymmetry": orbit.asymmetry,
         "x1_max": orbit.extremes[0, 1] if known else None,
         "x1_min": orbit.extremes[0, 0] if known else None,
+        "extremes": dict(zip(STATES, orbit.extremes, strict=True)) if known else None,
         "impact_velocities": orbit.impact_velocities,
+        "impacts": [
+            {"time": t, "side": "upper" if side > 0 else "lower", "velocity": v}
+            for t, side, v in times
+        ],
         "multipliers": list(orbit.multipliers.astype(complex)),
         "lyapunov": orbit.lyapunov,
         "penetration": orbit.penetration,
         "miss": orbit.miss,
         "reason": orbit.reason,
     }
+
+
+def _twin_json(twin: Orbit | None) -> dict[str, Any] | None:
+    """A mirror twin: what it is called and where it starts; the rest follows by the mirror."""
+    return None if twin is None else {"response": twin.response, "start": twin.start}
 
 
 def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:

@@ -103,7 +103,9 @@ def simulated(answer: Mapping[str, Any]) -> None:
         "symmetric",
         "x1 max",
         "x1 min",
+        "twin",
         "others",
+        gap=1,
     )
     for r in answer["responses"]:
         _row(
@@ -114,9 +116,20 @@ def simulated(answer: Mapping[str, Any]) -> None:
             {True: "yes", False: "no", None: "-"}[r["symmetric"]],
             "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
             "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
+            "-" if r["twin"] is None else r["twin"]["response"],
             ", ".join(o["response"] for o in r["others"]) or "-",
         )
-    _console().print(table)
+    console = _console()
+    console.print(table)
+    for r in answer["responses"]:
+        if r["reason"]:
+            _line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+
+
+def pictures(folder: Path, names: Sequence[str]) -> None:
+    """Where the pictures are."""
+    said = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
+    _line(_console(), f"{folder}: {said}")
 
 
 def catalog(held: Catalog) -> None:
@@ -181,4 +194,12 @@ def _line(console: Console, text: str) -> None:
     console.print(Text(text), soft_wrap=True)
 
 
-__all__: Sequence[str] = ("catalog", "files", "run", "simulated", "synthesised", "tolerance")
+__all__: Sequence[str] = (
+    "catalog",
+    "files",
+    "pictures",
+    "run",
+    "simulated",
+    "synthesised",
+    "tolerance",
+)

@@ -172,6 +172,18 @@ def test_hostile_title_reaches_nothing(
     assert "<script>alert" not in (out / "report.md").read_text()
 
 
+def test_report_names_the_command_line_and_no_path(
+    finished: tuple[Path, subprocess.CompletedProcess[str]], home: Path
+) -> None:
+    out, _ = finished
+    said = f"designer run small.toml --out finished --samples {SAMPLES} --seed 1"
+    assert f"    {said}\n" in (out / "report.md").read_text()
+    for name in ("report.html", "report.md"):
+        text = (out / name).read_text()
+        assert said in text
+        assert str(home) not in text
+
+
 def test_deck_runs_in_plain_ngspice(
     finished: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
@@ -516,7 +528,7 @@ def test_killed_study_goes_on_and_ends_the_same(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     whole, done = finished
-    out = home / "killed"
+    out = home / "killed" / whole.name  # the report states the folder's name
     arguments = ["run", str(home / "small.toml"), "--out", str(out), "--samples", str(SAMPLES)]
     process = _process(*arguments, "--jobs", "1")
     _wait_for(out / "samples.parquet" / "block-000000.parquet", process)

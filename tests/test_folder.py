@@ -16,7 +16,7 @@ from designer.bom import csv_text, natural, safe_cell
 from designer.catalog import load_catalog
 from designer.errors import InputError
 from designer.folder import MANIFEST, Folder, StageName, file_hash
-from designer.job import read_design
+from designer.job import Options, read_design
 from designer.jsonout import dumps
 from designer.modelfile import read_model_file
 from designer.pipeline import design_for
@@ -232,3 +232,26 @@ def test_json_is_strict() -> None:
     assert text.isascii()
     with pytest.raises(TypeError):
         dumps({"a": object()})
+
+
+def test_the_command_line_holds_names_and_no_paths(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = tmp_path / "bench"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    options = Options(seed=7, jobs=3, samples=40, overwrite=True, resume=True)
+    rest = "--samples 40 --seed 7"
+    model = tmp_path / "my model.toml"
+    for out, said in (
+        (tmp_path / "out", "out"),
+        (Path("out/"), "out"),
+        (Path("."), "bench"),
+        (Path("../-x"), "./-x"),
+        (Path("/"), "."),
+        (Path("\udcff"), "'?'"),
+    ):
+        assert options.command("run", model, out) == (
+            f"designer run 'my model.toml' --out {said} {rest}"
+        )
+    assert options.command("tolerance", here, None) == f"designer tolerance bench {rest}"

@@ -351,7 +351,13 @@ WRONG_MECHANICAL = [
     ("Omega = 340.0", "Omega = 340\nomega = 1", "response[1].Omega", "omega and", "one of the two"),
     ("Omega = 340.0", "Omega = 0", "response[1].Omega", "0", "rad/s"),
     ("Omega = 340.0", 'Omega = "best"', "response[1].Omega", '"best"', "rad/s"),
-    ("Omega = 340.0\nexpect = \"1-1-1\"\n", 'expect = "1-1-1"\n', "response[1].omega", "nothing", "Omega in rad/s"),
+    (
+        'Omega = 340.0\nexpect = "1-1-1"\n',
+        'expect = "1-1-1"\n',
+        "response[1].omega",
+        "nothing",
+        "Omega in rad/s",
+    ),
     ("[mechanical]", MODEL + "[mechanical]", "mechanical", "[model] and", "one of the two"),
 ]
 

@@ -1,0 +1,134 @@
+"""The files of the design stage: what is written of a design, and how it is read again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from designer import deck, matching, topology
+from designer.api import Synthesis
+from designer.bom import bill, bill_csv
+from designer.catalog import Catalog
+from designer.circuit import nominal_board
+from designer.coefficients import coefficient_errors
+from designer.deck import Excitation, SolverSettings
+from designer.errors import InputError
+from designer.folder import DESIGN, MODEL, Folder
+from designer.jsonout import dumps, synthesis_json
+from designer.modelfile import ModelFile, Response
+from designer.pipeline import Checked, nominal_reduction
+from designer.preconditions import naming
+from designer.provenance import provenance
+from designer.responses import find, on_circuit, peaks
+from designer.selection import SOLVER
+from designer.setup_table import scales_csv, setup_csv
+from designer.synthesis import SWING_SHARE, Certificate, Design
+
+DECK_PERIODS = 20
+"""Drive periods that ``circuit.cir`` runs for."""
+
+
+def texts(made: Synthesis) -> dict[str, str]:
+    """Everything of the design stage but ``design.json``; made before the folder is touched."""
+    modelfile, design = made.modelfile, made.design
+    return {
+        MODEL: modelfile.text,
+        "circuit.cir": circuit_deck(made),
+        "bom.csv": bill_csv(bill(design.circuit, modelfile.circuit, made.catalog)),
+        "setup.csv": setup_csv(design, made.found),
+        "scales.csv": scales_csv(modelfile, design, made.found),
+    }
+
+
+def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str, Any]:
+    for name, text in files.items():
+        folder.write(name, text)
+    folder.write(
+        DESIGN,
+        dumps(
+            synthesis_json(
+                made.modelfile, made.design, made.found, design_provenance(made), made.seconds
+            )
+        ),
+    )
+    return folder.json(DESIGN)
+
+
+def design_provenance(made: Synthesis) -> dict[str, Any]:
+    return provenance(made.modelfile, made.catalog.hash, settings={"highs": SOLVER})
+
+
+def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
+    """The design of a folder, rebuilt from its model and the values of its parts.
+
+    Nothing is chosen again; the errors are computed afresh and must be those that were written.
+    """
+    said, file = folder.json(DESIGN), folder / DESIGN
+    model, spec = modelfile.model, modelfile.circuit
+    found = find(model, modelfile.responses)
+    with naming(modelfile):
+        opamp = catalog.opamp(spec.opamp)
+    system = model.second_order()
+    try:
+        values = {str(name): float(value) for name, value in said["parts"].items()}
+        circuit = topology.build(
+            matching.terms(
+                system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()
+            ),
+            values,
+            opamp,
+            supply=float(said["circuit"]["supply"]),
+            saturation=float(said["circuit"]["saturation"]),
+            clearance="A" if model.k0 > 0.0 else None,
+        )
+        changes = {k: float(said["circuit"][k]) for k in ("gain", "bias")}
+        circuit = circuit.__class__(**{**circuit.__dict__, **changes})
+        swing = (SWING_SHARE * circuit.saturation, peaks(model, found).states)
+        errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
+        if abs(errors.max_error - float(said["max_error"])) > 1e-9:
+            raise ValueError("parts and max_error do not belong together")
+        design = Design(
+            model=model,
+            circuit=circuit,
+            errors=errors,
+            certificate=Certificate(**said["certificate"]),
+            conditions=dict(said["conditions"]),
+            solver=dict(said["solver"]),
+            seconds=float(said["cost"]["synthesis_seconds"]),
+        )
+    except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        raise InputError(
+            file, "parts", f"{type(error).__name__}: {error}", "the design of this folder's model"
+        ) from None
+    return Synthesis(modelfile, catalog, found, design)
+
+
+def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:
+    """``circuit.cir``: the first response (ω = 1 where there is none), from its own orbit.
+
+    checked : of the first response; its gate's settings are used.
+    """
+    modelfile, design = made.modelfile, made.design
+    first = made.found[0] if made.found else find(design.model, [Response(1.0)])[0]
+    excitation = Excitation(design.errors.scales.frequency(first.omega), design.amplitude(first.b))
+    if checked is None:
+        orbit = on_circuit(nominal_reduction(design).system(), design, first)
+    else:
+        orbit = checked.circuit
+    period = 1.0 / excitation.frequency
+    settings = SolverSettings("trap", period / 1000.0)
+    if checked is not None and checked.gate is not None:
+        settings = checked.gate.settings
+    text = deck.write(
+        design.circuit,
+        nominal_board(design.circuit),
+        excitation,
+        settings,
+        title=modelfile.title,
+        stop_time=DECK_PERIODS * period,
+        initial=orbit.start if len(orbit.start) else None,
+    )
+    nets = [*design.circuit.state_nets, *(["fv"] if design.circuit.stops else [])]
+    shown = " ".join(f"v({net})" for net in [*nets, design.circuit.generator.net])
+    # Without such a line the plain program runs nothing.
+    return text.replace("\n.end\n", f"\n.print tran {shown}\n.end\n")

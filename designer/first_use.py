@@ -1,0 +1,67 @@
+"""Says when the exact engine is about to be compiled: a start that takes seconds, not a hang.
+
+The compiled code is kept in a cache, so this happens at the first use after an installation or an
+update, and at every use where nowhere may be written. numba announces each compilation, and only
+those: what is loaded from the cache is silent.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+CALLS_BACK = "llvmlite.binding.executionengine"
+TEXT = "compiling the exact engine (first use, about 10 s)…"
+
+
+@contextmanager
+def announced(say: Callable[[str], None]) -> Iterator[None]:
+    """Calls ``say`` with one line when the first kernel of this package is compiled inside."""
+    from numba.core import event
+
+    lock = threading.Lock()
+    said: list[str] = []
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            module = event.data["dispatcher"].py_func.__module__
+            with lock:
+                if said or not str(module).startswith("designer."):
+                    return
+                said.append(module)
+            say(TEXT)
+
+        def on_end(self, event: Any) -> None:
+            return None
+
+    with _heard(), event.install_listener("numba:compile", Listener()):
+        yield
+
+
+@contextmanager
+def _heard() -> Iterator[None]:
+    """Ctrl-C is put off for a moment while the compiler calls back through C, where it is lost."""
+    usual = signal.getsignal(signal.SIGINT)
+    main = threading.current_thread() is threading.main_thread()
+    if not main or usual is not signal.default_int_handler:
+        yield
+        return
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        inner = frame
+        while frame is not None:
+            if frame.f_globals.get("__name__") == CALLS_BACK:
+                threading.Timer(0.02, signal.raise_signal, (number,)).start()
+                return
+            frame = frame.f_back
+        signal.default_int_handler(number, inner)
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

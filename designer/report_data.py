@@ -1,0 +1,100 @@
+"""What a report is made from, and what follows from it about each response."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from designer.bom import bill
+from designer.modelfile import ModelFile
+from designer.pipeline import Checked
+from designer.synthesis import Design
+from designer.tolerance import Answer, StudyPlan, Verdict, Yield
+
+if TYPE_CHECKING:
+    from designer.api import RunResult
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """What a report is made from.
+
+    checked : every wanted response. plan, answers : the tolerance study, of some or all of them;
+    plan None where there was none. yields : one for each response (None where it was left out) or
+    one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
+    command : the command line that makes these results again.
+    """
+
+    modelfile: ModelFile
+    design: Design
+    checked: tuple[Checked, ...]
+    yields: tuple[Yield | None, ...] | None
+    answers: tuple[Answer, ...]
+    plan: StudyPlan | None
+    bom: Sequence[Mapping[str, str]]
+    provenance: Mapping[str, Any]
+    command: str
+
+    @classmethod
+    def of(cls, result: RunResult, command: str) -> ReportData:
+        """The data of a finished run."""
+        lines = bill(result.design.circuit, result.modelfile.circuit, result.catalog)
+        return cls(
+            modelfile=result.modelfile,
+            design=result.design,
+            checked=result.checked,
+            yields=result.yields,
+            answers=result.answers,
+            plan=result.plan,
+            bom=[line.cells() for line in lines],
+            provenance=result.provenance,
+            command=command,
+        )
+
+    @cached_property
+    def question_of(self) -> tuple[int | None, ...]:
+        """For each response its question in the plan; None where it was left out."""
+        free = dict(enumerate(self.plan.questions)) if self.plan is not None else {}
+        found: list[int | None] = []
+        for c in self.checked:
+            same = (
+                i
+                for i, q in free.items()
+                if q.spec == c.model.spec and q.excitation == c.excitation
+            )
+            number = next(same, None)
+            if number is not None:
+                del free[number]
+            found.append(number)
+        return tuple(found)
+
+    def answers_to(self, response: int) -> tuple[Answer, ...]:
+        """Answers for response number ``response``, by sample."""
+        number = self.question_of[response]
+        return tuple(a for a in self.answers if number is not None and a.question == number)
+
+    def yield_of(self, response: int) -> Yield | None:
+        """Its yield; None where it was left out or there was no study."""
+        if self.yields is None:
+            return None
+        if len(self.yields) == len(self.checked):
+            return self.yields[response]
+        number = self.question_of[response]
+        return self.yields[number] if number is not None and number < len(self.yields) else None
+
+    @cached_property
+    def all_on_one_board(self) -> Yield | None:
+        """Boards that show every response; None unless each was asked of each board."""
+        if len(self.checked) < 2 or None in self.question_of or not self.answers:
+            return None
+        boards: dict[int, set[Verdict]] = {}
+        for a in self.answers:
+            boards.setdefault(a.sample, set()).add(a.verdict)
+        order = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
+        worst = Counter(next(v for v in order if v in met) for met in boards.values())
+        return Yield(
+            worst[Verdict.OK], worst[Verdict.LOST], worst[Verdict.GRAZING], worst[Verdict.FAILED]
+        )

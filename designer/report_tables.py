@@ -1,0 +1,365 @@
+"""Tables of a report: cells as text."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from designer import report_words as words
+from designer.circuit import Resistor, Section
+from designer.gate import shortest_contact
+from designer.orbit import OrbitStatus
+from designer.pipeline import Checked, nominal_reduction
+from designer.report_data import ReportData
+from designer.synthesis import Design
+from designer.tolerance import Answer, Verdict, Yield
+
+REASONS_SHOWN = 5
+"""Kinds of loss that are named; the rest is counted."""
+
+_PARAMETERS = {
+    "m": "mass ratio M2/(M1 + M2)",
+    "k": "stiffness ratio K2/(K1 + K2)",
+    "k0": "stop stiffness K0/(K0 + K1)",
+    "c": "damping ratio C2/(C1 + C2)",
+    "zeta": "damping ζ = C1/(2 √(K1 M1))",
+    "f20": "share of the force on M2, P2/(P1 + P2)",
+    "b": "clearance B K1/(P1 + P2)",
+    "sides": "sides of M1 with a stop",
+}
+
+_UNITS = {
+    "M1": "kg", "M2": "kg", "C1": "N s/m", "C2": "N s/m", "K0": "N/m", "K1": "N/m", "K2": "N/m",
+    "B": "m", "P1": "N", "P2": "N",
+}  # fmt: skip
+
+_MEANINGS = {
+    "M": "mass", "C": "damper", "K": "spring", "K0": "stop's spring", "B": "clearance",
+    "P": "force amplitude on mass",
+}  # fmt: skip
+
+_CONDITIONS = {
+    "frequency_low_hz": ("frequency at ω = 1, at least", "Hz"),
+    "frequency_high_hz": ("frequency at ω = 1, at most", "Hz"),
+    "swing_v": ("peak of any state, at most", "V"),
+    "generator_peak_v": ("generator amplitude (peak), at most", "V"),
+    "signal_level_ratio": ("ratio of the states' peaks that belong together, at most", ""),
+    "signal_share_ratio": ("another state's peak over that of x₁, at most", ""),
+    "load_ohm": ("load of an output, at least", "Ω"),
+    "signal_resistor_low_ohm": ("signal resistors, at least", "Ω"),
+    "signal_resistor_high_ohm": ("signal resistors, at most", "Ω"),
+    "stop_resistor_r4_low_ohm": (
+        "R4, so that the stop's resistor is no heavier load, at least",
+        "Ω",
+    ),
+}
+
+_QUANTITY = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)([fpnµmkM]?[ΩFVW])(?!\w)")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as text; ``numeric`` : indices of the columns that are set flush right."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numeric: tuple[int, ...] = ()
+
+
+def model_table(data: ReportData) -> Table:
+    model = data.design.model
+    rows = [
+        ("ζ" if k == "zeta" else k, words.number(getattr(model, k)), t)
+        for k, t in _PARAMETERS.items()
+    ]
+    return Table(("parameter", "value", "what it is"), tuple(rows), (1,))
+
+
+def mechanical_table(data: ReportData) -> Table | None:
+    given = data.modelfile.mechanical
+    if given is None:
+        return None
+    rows = []
+    for name, unit in _UNITS.items():
+        kind = _MEANINGS.get(name) or f"{_MEANINGS[name[0]]} {name[1:]}"
+        rows.append((name, words.quantity(getattr(given, name), unit), kind))
+    return Table(("parameter", "value", "what it is"), tuple(rows), (1,))
+
+
+def response_table(data: ReportData) -> Table:
+    return Table(
+        (
+            "ω", "expected", "model", "exact circuit", "ngspice", "agree", "symmetric (model)",
+            "coexisting (model)",
+        ),
+        tuple(
+            (
+                words.number(c.model.omega),
+                _expected(c),
+                c.model.orbit.response + ("" if c.model.found else " (not what is wanted)"),
+                c.circuit.response,
+                "not asked" if c.ngspice is None else c.ngspice.response,
+                "yes" if c.agrees else "no",
+                words.yes(c.model.orbit.symmetric),
+                ", ".join(o.response for o in c.model.others) or "none met",
+            )
+            for c in data.checked
+        ),
+        (0,),
+    )  # fmt: skip
+
+
+def settings_table(data: ReportData) -> Table:
+    system = nominal_reduction(data.design).system() if data.checked else None
+    rows = []
+    for c in data.checked:
+        assert system is not None
+        contact = words.NONE
+        if len(c.circuit.impact_times):
+            contact = words.quantity(shortest_contact(c.circuit, system, c.excitation), "s", 3)
+        near = min(c.circuit.penetration, c.circuit.miss)
+        gate = c.gate
+        steps, method, difference = words.NONE, words.NONE, words.NONE
+        if gate is not None:
+            steps = f"{1.0 / (c.excitation.frequency * gate.settings.max_step):.0f}"
+            method = gate.settings.method + ("" if gate.passed else " (not passed)")
+            if math.isfinite(gate.difference):
+                difference = f"{100 * gate.difference:.2g} %"
+        rows.append(
+            (
+                words.number(c.model.omega),
+                words.number(c.model.b),
+                words.quantity(c.excitation.frequency, "Hz"),
+                words.quantity(c.excitation.amplitude, "V"),
+                contact,
+                words.quantity(near, "V", 3) if math.isfinite(near) else words.NONE,
+                steps,
+                method,
+                difference,
+            )
+        )
+    return Table(
+        (
+            "ω", "b", "frequency", "amplitude (peak)", "shortest contact", "nearest grazing",
+            "ngspice steps per period", "method", "largest difference",
+        ),
+        tuple(rows),
+        (0, 1, 2, 3, 4, 5, 6, 8),
+    )  # fmt: skip
+
+
+def yield_table(data: ReportData) -> Table | None:
+    if data.yields is None or not data.checked:
+        return None
+    rows = []
+    for i, c in enumerate(data.checked):
+        y = data.yield_of(i)
+        if y is None:
+            rows.append((words.name(c), *[words.NONE] * 6, f"left out: {_left_out(data, i)}"))
+            continue
+        rows.append((words.name(c), *_counts(y), _reasons(data.answers_to(i))))
+    if data.all_on_one_board is not None:
+        rows.append(("all on one board", *_counts(data.all_on_one_board), ""))
+    return Table(
+        (
+            "response", "ok", "lost", "grazing", "failed", "yield", "of 1000 boards (95 %)",
+            "what became of the others",
+        ),
+        tuple(rows),
+        (1, 2, 3, 4, 5, 6),
+    )  # fmt: skip
+
+
+def ngspice_table(data: ReportData) -> Table | None:
+    """How often ngspice, asked about the same boards, said the same as the exact circuit."""
+    rows = []
+    for i, c in enumerate(data.checked):
+        asked = [a for a in data.answers_to(i) if a.ngspice]
+        if not asked:
+            continue
+        failed = [a for a in asked if a.agrees is None]
+        why = Counter(a.ngspice_reason or "no reason given" for a in failed)
+        differ = Counter(f"{a.response} but {a.ngspice}" for a in asked if a.agrees is False)
+        said = [f"{t} ({n})" for t, n in sorted([*differ.items(), *why.items()])]
+        agreed = sum(a.agrees is True for a in asked)
+        rows.append(
+            (
+                words.name(c),
+                str(len(asked)),
+                str(agreed),
+                str(sum(differ.values())),
+                str(len(failed)),
+                ", ".join(said[:REASONS_SHOWN]),
+            )
+        )
+    if not rows:
+        return None
+    columns = ("response", "boards", "agreed", "differed", "failed", "circuit but ngspice; reasons")
+    return Table(columns, tuple(rows), (1, 2, 3, 4))
+
+
+def bom_table(data: ReportData) -> Table | None:
+    if not data.bom:
+        return None
+    shown = {
+        "quantity": "qty", "designators": "designators", "value": "value",
+        "part_number": "part number", "manufacturer": "manufacturer", "footprint": "footprint",
+        "rating": "rating", "grade": "grade", "price_class": "price class",
+    }  # fmt: skip
+    keys = [k for k in shown if any(k in row for row in data.bom)]
+    rows = tuple(tuple(_bom_cell(k, str(row.get(k, ""))) for k in keys) for row in data.bom)
+    return Table(
+        tuple(shown[k] for k in keys), rows, (0, keys.index("value")) if "value" in keys else (0,)
+    )
+
+
+def part_table(data: ReportData) -> Table:
+    """Resistors and capacitors by what they do."""
+    roles: dict[str, list[str]] = {}
+    for part in data.design.circuit.parts:
+        if not isinstance(part, Section):
+            unit = "Ω" if isinstance(part, Resistor) else "F"
+            said = f"{part.name}\u00a0=\u00a0{words.quantity(part.value, unit)}"
+            roles.setdefault(part.role, []).append(said)
+    return Table(("role", "parts"), tuple((r, ", ".join(p)) for r, p in roles.items()))
+
+
+def opamp_table(data: ReportData) -> Table:
+    sections = data.design.circuit.sections
+    return Table(
+        ("section", "package", "role"), tuple((s.name, s.package, s.role) for s in sections)
+    )
+
+
+def error_table(design: Design) -> Table:
+    wanted = design.model.second_order().state_matrix()
+    rows = []
+    for name, error in design.errors.errors.items():
+        term = words.TERM.fullmatch(name)
+        want = "0" if name == "dead-zone null" else words.NONE
+        if term is not None:
+            row, column = (2 * (int(term[i]) - 1) + len(term[i + 1]) for i in (1, 3))
+            want = words.number(float(wanted[row - 1, column]))
+        elif name == "stop slope":
+            want = words.number(design.model.mu)
+        rows.append((words.coefficient(name), want, words.error(error)))
+    return Table(("coefficient", "wanted", "ln(realised/wanted)"), tuple(rows), (1, 2))
+
+
+def scale_table(data: ReportData) -> Table:
+    design, scales = data.design, data.design.errors.scales
+    mechanical = data.modelfile.mechanical
+    rows = [
+        ("one unit of model time", words.quantity(scales.seconds, "s")),
+        ("generator frequency at ω = 1", words.quantity(scales.frequency(1.0), "Hz")),
+    ]
+    if mechanical is not None:
+        slow = mechanical.time_scale / scales.seconds
+        rows.append(("mechanism's time per circuit time", f"{words.number(slow)} s/s"))
+    if design.circuit.stops:
+        rows.append(("contact begins at (v1)", f"± {words.quantity(scales.threshold, 'V')}"))
+    for state, volts in zip(("x₁", "x₁′", "x₂", "x₂′"), scales.volts, strict=False):
+        rows.append((f"one unit of {state}", words.quantity(float(volts), "V")))
+        if mechanical is not None:
+            speed = state.endswith("′")
+            scale = mechanical.length_scale / (mechanical.time_scale if speed else 1.0)
+            unit = "m/s" if speed else "m"
+            rows.append((f"one volt of {state}", words.quantity(scale / float(volts), unit)))
+    gain = float(np.sum(design.errors.drive_gain))
+    if gain > 0.0:
+        rows.append(
+            ("generator for the model's force of 1", f"{words.quantity(1.0 / gain, 'V')} peak")
+        )
+        if mechanical is not None:
+            rows.append(("one generator volt", words.quantity(gain * mechanical.force_scale, "N")))
+    return Table(("scale", "value"), tuple(rows), (1,))
+
+
+def condition_table(design: Design) -> Table:
+    rows = tuple(_condition(k, v) for k, v in design.conditions.items())
+    return Table(("condition", "value"), rows, (1,))
+
+
+def provenance_table(data: ReportData) -> Table:
+    return Table(("what", "value"), tuple(_flat(data.provenance)))
+
+
+def _expected(c: Checked) -> str:
+    kind = {True: "symmetric", False: "asymmetric", None: ""}[c.model.spec.symmetric]
+    return ", ".join(t for t in (c.model.expected, kind) if t) or "any"
+
+
+def _counts(y: Yield) -> tuple[str, ...]:
+    rate = f"{100 * y.rate:.3g} %" if math.isfinite(y.rate) else words.NONE
+    return (str(y.ok), str(y.lost), str(y.grazing), str(y.failed), rate, _per_thousand(y))
+
+
+def _per_thousand(y: Yield) -> str:
+    low, high = (round(1000 * v) for v in y.interval)
+    if not math.isfinite(y.rate):
+        return words.NONE
+    return f"{round(1000 * y.rate)} ({low} to {high})"
+
+
+def _reasons(answers: Sequence[Answer]) -> str:
+    """Why boards do not show a response, most frequent first; figures in a reason do not count."""
+    met = Counter(
+        f"{a.verdict} {re.sub(r' by .*', '', a.reason)}".strip()
+        for a in answers
+        if a.verdict is not Verdict.OK
+    )
+    ranked = sorted(met.items(), key=lambda item: (-item[1], item[0]))
+    said = [f"{text} ({n})" for text, n in ranked[:REASONS_SHOWN]]
+    rest = ranked[REASONS_SHOWN:]
+    if rest:
+        said.append(f"{words.plural(len(rest), 'other outcome')} ({sum(n for _, n in rest)})")
+    return ", ".join(said)
+
+
+def _left_out(data: ReportData, i: int) -> str:
+    c = data.checked[i]
+    if not c.model.found:
+        return "the model does not show it"
+    if c.circuit.status is not OrbitStatus.PERIODIC:
+        return f"the nominal circuit is {words.orbit(c.circuit)}"
+    return "it is not part of the study"
+
+
+def _bom_cell(key: str, text: str) -> str:
+    if key == "grade" and text:
+        try:
+            return f"{100 * float(text):g} %"
+        except ValueError:
+            return text
+    if key == "footprint":
+        return text.rpartition(":")[2]  # the library's name says what the value says already
+    if key in ("value", "rating"):
+        return _QUANTITY.sub("\\1\u00a0\\2", text.replace(" ", "\u00a0"))
+    return text
+
+
+def _condition(name: str, value: float) -> tuple[str, str]:
+    text, unit = _CONDITIONS.get(name, (name.replace("_", " "), ""))
+    return text, words.quantity(value, unit) if unit else words.number(value)
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:
+    """Nested provenance as rows; ngspice's settings stand in a table of their own, cost nowhere."""
+    for key, value in values.items():
+        name = f"{prefix}{key}".replace("_", " ")
+        if key == "cost" or name == "settings ngspice" or value is None:
+            continue
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{name} ")
+        elif isinstance(value, float):
+            yield name, f"{value:g}"
+        elif isinstance(value, list | tuple):
+            yield name, ", ".join(str(v) for v in value)
+        else:
+            yield name, str(value)

@@ -1,0 +1,89 @@
+"""Names, numbers and short phrases of a report, the same wherever they stand."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+from designer.orbit import Orbit, OrbitStatus
+from designer.pipeline import Checked
+from designer.plots import EXACT
+from designer.quantity import format_quantity
+
+NONE = "–"
+
+TERM = re.compile(r"x(\d)('{1,2}) x(\d)('?)")
+
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def name(c: Checked) -> str:
+    return f"ω = {number(c.model.omega)} ({c.model.expected or c.model.orbit.response})"
+
+
+def orbit(met: Orbit) -> str:
+    return f"{met.response} ({met.reason})" if met.reason else met.response
+
+
+def problem(c: Checked) -> str:
+    """What is wrong with a response, in words; "" where it was found and all engines agree."""
+    said = []
+    ngspice, without = c.ngspice, replace(c, gate=None)
+    if not c.model.found:
+        said.append(f"the model shows {orbit(c.model.orbit)} instead")
+    if not without.agrees:
+        said.append(f"model {orbit(c.model.orbit)} and exact circuit {orbit(c.circuit)} differ")
+    if ngspice is not None and ngspice.status is OrbitStatus.FAILED:
+        said.append(f"ngspice gave no answer: {ngspice.reason or 'no reason given'}")
+    elif ngspice is not None and without.agrees and not c.agrees:
+        said.append(f"ngspice shows {orbit(ngspice)}, the exact circuit {orbit(c.circuit)}")
+    return f"{name(c)}: {'; '.join(said)}" if said else ""
+
+
+def coefficient(name: str) -> str:
+    term = TERM.fullmatch(name)
+    if term is None:
+        return {
+            "stop slope": "stiffness of a stop, over K1",
+            "dead-zone null": "stiffness left inside the clearance, over K1",
+        }.get(name, name)
+    left, right = name.split()
+    return f"{_pretty(right)} in the equation of {_pretty(left)}"
+
+
+def _pretty(state: str) -> str:
+    return state.replace("''", "″").replace("'", "′").translate(_SUBSCRIPTS)
+
+
+def yes(value: bool | None) -> str:
+    return {True: "yes", False: "no", None: NONE}[value]
+
+
+def all_of(number: int) -> str:
+    return "Both" if number == 2 else f"All {number}"
+
+
+def plural(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def number(value: object, digits: int = 4) -> str:
+    if not isinstance(value, int | float):
+        return str(value)
+    return f"{value:.{digits}g}" if math.isfinite(value) else NONE
+
+
+def error(value: float) -> str:
+    """A coefficient error, a logarithm, in per cent."""
+    if not math.isfinite(value):
+        return NONE
+    return "exact (< 1e-12)" if abs(value) < EXACT else f"{100 * value:.3g} %"
+
+
+def quantity(value: float, unit: str, digits: int = 4) -> str:
+    if not math.isfinite(value):
+        return NONE
+    text = format_quantity(value, unit, digits).removesuffix(unit)
+    figure = text.rstrip("fpnµmkMGT")
+    return f"{figure}\u00a0{text[len(figure) :]}{unit}"
