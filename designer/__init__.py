@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from designer.api import (
         RunResult,
-        Simulated,
         Synthesis,
         run,
-        simulate,
         synthesise,
     )
     from designer.catalog import Catalog, load_catalog
     from designer.errors import DesignerError, EnvironmentMissing, InputError, Unreachable
     from designer.model import Dimensionless, Mechanical
     from designer.modelfile import ModelFile, Response, parse_model_file, read_model_file
-    from designer.study import Study, tolerance_study
+    from designer.simulation import Simulated, simulate
+    from designer.study import Study, tolerance
 
 __version__ = "0.1.0"
 
@@ -46,23 +45,22 @@ __all__ = [
     "run",
     "simulate",
     "synthesise",
-    "tolerance_study",
+    "tolerance",
 ]
 
 _HOMES = {
     "designer.api": (
         "RunResult",
-        "Simulated",
         "Synthesis",
         "run",
-        "simulate",
         "synthesise",
     ),
     "designer.catalog": ("Catalog", "load_catalog"),
     "designer.errors": ("DesignerError", "EnvironmentMissing", "InputError", "Unreachable"),
     "designer.model": ("Dimensionless", "Mechanical"),
     "designer.modelfile": ("ModelFile", "Response", "parse_model_file", "read_model_file"),
-    "designer.study": ("Study", "tolerance_study"),
+    "designer.simulation": ("Simulated", "simulate"),
+    "designer.study": ("Study", "tolerance"),
 }
 
 

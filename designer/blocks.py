@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 
 from designer import __version__
 from designer.errors import InputError
-from designer.tolerance import (
+from designer.montecarlo import (
     BLOCK,
     NGSPICE_SAMPLES,
     REFINEMENTS,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import __version__, api, design_files, simulate_plots
+from designer import __version__, api, design_files, simulate_plots, simulation
 from designer.api import RunResult, Synthesis
 from designer.blocks import BlockStore, block_names
 from designer.catalog import Catalog, load_catalog
@@ -37,7 +37,7 @@ from designer.progress import Progress
 from designer.provenance import provenance
 from designer.selection import SOLVER
 from designer.spread import Spread
-from designer.study import SAMPLES, SEED, check, tolerance_study
+from designer.study import SAMPLES, SEED, check, tolerance
 from designer.workers import SpicePool
 
 MOST_SAMPLES = 1_000_000
@@ -190,7 +190,7 @@ def run_into(
         if checked[0].gate is not None and checked[0].gate.passed:
             folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
         gated = time.perf_counter()
-        study = tolerance_study(
+        study = tolerance(
             made,
             samples=options.samples,
             seed=options.seed,
@@ -224,7 +224,7 @@ def run_into(
 def simulate_answer(
     path: Path,
     omegas: tuple[float, ...],
-    engine: api.Engine,
+    engine: simulation.Engine,
     jobs: int | None,
     progress: Progress,
     plots: Path | None = None,
@@ -247,7 +247,7 @@ def simulate_answer(
     names = simulate_plots.names([w for w in wanted if w is not None])
     if plots is not None:
         simulate_plots.check(plots, names, overwrite)
-    simulated = api.simulate(
+    simulated = simulation.simulate(
         modelfile,
         omegas,
         engine=engine,
@@ -256,7 +256,7 @@ def simulate_answer(
         progress=progress,
         traces=plots is not None,
     )
-    said = provenance(modelfile, catalog.hash, settings=api.engine_settings(engine))
+    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine))
     answer = simulate_json(simulated, engine, said, time.perf_counter() - began)
     if plots is not None:
         progress.stage("pictures")

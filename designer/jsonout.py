@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
-    from designer.api import Simulated
     from designer.modelfile import ModelFile
+    from designer.montecarlo import Answer
     from designer.orbit import Orbit
     from designer.pipeline import Checked
     from designer.responses import ModelResponse
+    from designer.simulation import Simulated
     from designer.study import Study
     from designer.synthesis import Design
-    from designer.tolerance import Answer
 
 FORMAT = 1
 

@@ -21,8 +21,8 @@ from designer.plots import (
     MODEL,
     MUTED,
     NGSPICE,
-    _figure,
-    _limits,
+    axis_limits,
+    new_figure,
     say,
     styled,
 )
@@ -57,7 +57,7 @@ def phase_portrait(
     The model is a broad light line, the exact circuit a dashed one on it, ngspice dots; triangles
     mark where an impact begins; beyond ±b the mass is in contact. sides : the stops there are.
     """
-    figure = _figure(3.5, 3.5 if legend else 3.2)
+    figure = new_figure(3.5, 3.5 if legend else 3.2)
     axes = figure.subplots()
     _portrait(axes, checked, traces, sides)
     if legend:
@@ -72,7 +72,7 @@ def portrait_sheet(
     """Phase portraits of all responses as small multiples, each with limits of its own."""
     columns = max(1, min(3, len(shown)))
     rows = max(1, -(-len(shown) // columns))
-    figure = _figure(max(3.2 * columns, 3.5), 2.85 * rows + 0.35)
+    figure = new_figure(max(3.2 * columns, 3.5), 2.85 * rows + 0.35)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for i, (axes, (checked, traces)) in enumerate(zip(grid, shown, strict=False)):
         _portrait(axes, checked, traces, sides)
@@ -96,7 +96,7 @@ def time_traces(
     legend: bool = True,
 ) -> Figure:
     """x1(t) over the n periods of the response, with the stops shaded."""
-    figure = _figure(3.5, 2.15 if legend else 1.75)
+    figure = new_figure(3.5, 2.15 if legend else 1.75)
     axes = figure.subplots()
     model, period = checked.model, 2.0 * np.pi / checked.model.omega
     orbits = _orbits(checked)
@@ -118,7 +118,7 @@ def time_traces(
             axes.plot(cycles[at], x[at], **_look(name, orbits[name]))
         else:
             axes.plot(cycles, x, **_look(name, orbits[name]))
-    low, high = _limits(np.concatenate([*shown, [0.0]]), _gaps(checked, sides))
+    low, high = axis_limits(np.concatenate([*shown, [0.0]]), _gaps(checked, sides))
     axes.set_ylim(low, high)
     axes.set_xlim(0.0, span)
     for gap in _gaps(checked, sides):
@@ -138,7 +138,7 @@ def time_traces(
 def legend(*, ngspice: bool = True, sides: Sequence[int] = BOTH) -> Figure:
     """The key to portraits and traces, for a page that shows many without one."""
     names = [name for name in ENGINES if ngspice or name != "ngspice"]
-    figure = _figure(3.9, 0.48)
+    figure = new_figure(3.9, 0.48)
     figure.legend(handles=_keys(names, sides), loc="center left", ncols=3, borderpad=0.0)
     return figure
 
@@ -174,7 +174,7 @@ def _portrait(
         for states in [trace.states[:, :2]]
     }
     every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
-    xlim, ylim = _limits(every[:, 0], gaps), _limits(every[:, 1], ())
+    xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
     for gap in gaps:
         axes.axvspan(gap, xlim[1] if gap > 0 else xlim[0], color=CONTACT, lw=0, zorder=0)
         axes.axvline(gap, color=MUTED, lw=0.8, zorder=1)

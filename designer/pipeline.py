@@ -18,6 +18,7 @@ from designer.deck import Excitation
 from designer.flow import Flow
 from designer.gate import GateResult
 from designer.modelfile import ModelFile
+from designer.montecarlo import Answer, Question, StudyPlan, Yield, count
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
@@ -25,7 +26,6 @@ from designer.responses import ModelResponse, circuit_flow, find, on_circuit, pe
 from designer.spread import Spread
 from designer.synthesis import Design, synthesise
 from designer.system import Array, Drive
-from designer.tolerance import Answer, Question, StudyPlan, Yield, count
 from designer.workers import SpicePool
 
 TRACE_POINTS = 1024

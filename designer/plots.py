@@ -67,7 +67,7 @@ P = ParamSpec("P")
 
 
 @contextmanager
-def _style() -> Iterator[None]:
+def style() -> Iterator[None]:
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
@@ -77,7 +77,7 @@ def _style() -> Iterator[None]:
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     @wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with _style():
+        with style():
             return draw(*args, **kwargs)
 
     return inside
@@ -87,7 +87,7 @@ def to_svg(figure: Figure) -> str:
     """The figure as an SVG document with text as paths: nothing is loaded, no date, no version."""
     buffer = io.StringIO()
     nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-    with _style():
+    with style():
         figure.savefig(buffer, format="svg", metadata=nothing)
     text = buffer.getvalue()
     return _LONG.sub(_short, text[text.index("<svg") :])
@@ -95,7 +95,7 @@ def to_svg(figure: Figure) -> str:
 
 def to_png(figure: Figure, path: Path, dpi: float = 160.0) -> None:
     """Write the figure as PNG."""
-    with _style():
+    with style():
         figure.savefig(path, format="png", dpi=dpi, metadata={"Software": None})
 
 
@@ -104,7 +104,7 @@ def _short(attribute: re.Match[str]) -> str:
     return _DIGITS.sub(lambda m: f"{float(m[0]):.2f}", attribute[0])
 
 
-def _figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
     """Size in inches."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -116,7 +116,7 @@ def say(axes: Axes, text: str) -> None:
     axes.text(0.5, 0.5, text, ha="center", va="center", color=MUTED, transform=axes.transAxes)
 
 
-def _limits(values: Array, gaps: Sequence[float]) -> tuple[float, float]:
+def axis_limits(values: Array, gaps: Sequence[float]) -> tuple[float, float]:
     """Axis limits that show all values and all stops with a margin."""
     low, high = min(float(values.min()), *gaps, 0.0), max(float(values.max()), *gaps, 0.0)
     margin = 0.08 * (high - low) or 1.0

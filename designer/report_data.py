@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from designer.bom import bill
 from designer.modelfile import ModelFile
+from designer.montecarlo import Answer, StudyPlan, Verdict, Yield
 from designer.pipeline import Checked
 from designer.synthesis import Design
-from designer.tolerance import Answer, StudyPlan, Verdict, Yield
 
 if TYPE_CHECKING:
     from designer.api import RunResult

@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # matplotlib takes long to import; only drawing needs it
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from designer.api import Simulated
+    from designer.simulation import Simulated
 
 KINDS = ("phase", "time")
 FORMATS = ("png", "svg")
@@ -104,17 +104,17 @@ def write(
 
 def portrait(response: Simulated) -> Figure:
     """The orbit and its twin in the plane (x1, x1'); triangles where an impact begins."""
-    from designer.plots import CONTACT, MUTED, _figure, _limits, _style
+    from designer.plots import CONTACT, MUTED, axis_limits, new_figure, style
 
-    with _style():
-        figure = _figure(4.2, 4.0)
+    with style():
+        figure = new_figure(4.2, 4.0)
         axes = figure.subplots()
         gaps = _gaps(response)
         period = 2.0 * np.pi / response.omega
         last = MOST_PORTRAIT * period * (1.0 + 1e-9)
         curves = [t.states[t.time <= last, :2] for t in response.traces]
         every = np.concatenate(curves)
-        xlim, ylim = _limits(every[:, 0], gaps), _limits(every[:, 1], ())
+        xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
         for gap in gaps:
             axes.axvspan(gap, xlim[1] if gap > 0 else xlim[0], color=CONTACT, lw=0, zorder=0)
             axes.axvline(gap, color=MUTED, lw=0.8, zorder=1)
@@ -135,10 +135,10 @@ def time_trace(response: Simulated) -> Figure:
     """x1 over drive periods, orbit and twin; triangles where an impact begins."""
     from matplotlib.ticker import MaxNLocator
 
-    from designer.plots import CONTACT, MUTED, _figure, _limits, _style
+    from designer.plots import CONTACT, MUTED, axis_limits, new_figure, style
 
-    with _style():
-        figure = _figure(6.4, 3.0)
+    with style():
+        figure = new_figure(6.4, 3.0)
         axes = figure.subplots()
         gaps = _gaps(response)
         period = 2.0 * np.pi / response.omega
@@ -160,7 +160,7 @@ def time_trace(response: Simulated) -> Figure:
             for side in response.sides:
                 met = times[(sides == side) & (times <= span)]
                 _impacts(axes, met, np.full(len(met), side * response.b), side, look)
-        low, high = _limits(np.concatenate(shown), gaps)
+        low, high = axis_limits(np.concatenate(shown), gaps)
         for gap in gaps:
             axes.axhspan(gap, high if gap > 0 else low, color=CONTACT, lw=0, zorder=0)
             axes.axhline(gap, color=MUTED, lw=0.8, zorder=1)

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from designer import pipeline, tolerance
+from designer import montecarlo, pipeline
 from designer.blocks import BlockStore
+from designer.montecarlo import Answer, StudyPlan, Yield
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, need_responses
 from designer.progress import Progress
-from designer.tolerance import Answer, StudyPlan, Yield
 from designer.workers import SpicePool
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Study:
     def yields(self) -> tuple[Yield | None, ...]:
         """For each response; None where it was left out."""
         return tuple(
-            tolerance.count(self.answers_to(i)) if i in self.asked else None
+            montecarlo.count(self.answers_to(i)) if i in self.asked else None
             for i in range(len(self.checked))
         )
 
@@ -64,7 +64,7 @@ def check(
     return pipeline.check(synthesis.design, synthesis.found, pool, stage)
 
 
-def tolerance_study(
+def tolerance(
     synthesis: Synthesis,
     *,
     samples: int = SAMPLES,
@@ -101,14 +101,14 @@ def tolerance_study(
     answers: list[Answer] = []
     steps = samples * len(asked)
     if pool is not None:
-        steps += min(samples, tolerance.NGSPICE_SAMPLES) * sum(
+        steps += min(samples, montecarlo.NGSPICE_SAMPLES) * sum(
             q.settings is not None for q in plan.questions
         )
     step = said.stage(f"tolerance study, {samples} samples of {len(asked)} responses", steps)
     for block in plan.blocks() if asked else ():
         known = None if blocks is None else blocks.read(block)
         if known is None:
-            known = tolerance.run_block(plan, block, pool, jobs, step)
+            known = montecarlo.run_block(plan, block, pool, jobs, step)
             if blocks is not None:
                 blocks.write(block, known)
         else:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from designer.plots import EXACT, GRID, INK, MUTED, _figure, styled
-from designer.tolerance import Answer, Verdict, Yield
+from designer.montecarlo import Answer, Verdict, Yield
+from designer.plots import EXACT, GRID, INK, MUTED, new_figure, styled
 
 VERDICTS = {
     Verdict.OK: "#0072b2",
@@ -28,7 +28,7 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
     None : the response was left out of the study.
     """
     rows = max(len(labels), 1)
-    figure = _figure(7.4, 0.31 * rows + 1.15)
+    figure = new_figure(7.4, 0.31 * rows + 1.15)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.0))
     left.set_yticks(range(len(labels)), labels, color=INK)
     left.set_ylim(rows - 0.4, -0.6)
@@ -58,7 +58,7 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
 @styled
 def coefficient_chart(errors: Mapping[str, float]) -> Figure:
     """|error| of each coefficient on a logarithmic axis; below ``EXACT`` it stands as "exact"."""
-    figure = _figure(7.4, 0.24 * max(len(errors), 1) + 0.8)
+    figure = new_figure(7.4, 0.24 * max(len(errors), 1) + 0.8)
     axes = figure.subplots()
     percent = {k: 100.0 * abs(v) for k, v in errors.items()}
     real = [v for v in percent.values() if v >= 100.0 * EXACT and np.isfinite(v)]
@@ -112,7 +112,7 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
     stands where its new response has these.
     """
     rows = max(len(labels), 1)
-    figure = _figure(7.4, 0.38 * rows + 1.15)
+    figure = new_figure(7.4, 0.38 * rows + 1.15)
     left, right = figure.subplots(1, 2, sharey=True)
     left.set_yticks(range(len(labels)), labels, color=INK)
     left.set_ylim(rows - 0.4, -0.6)

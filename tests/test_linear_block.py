@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from designer import selection
 from designer.completion import Bounds
-from designer.errors import Unreachable
 from designer.linear_block import _ELEMENTARY, _SCALES, Targets, ratio_table, window
 from designer.model import Dimensionless
 from designer.modelfile import CircuitSpec

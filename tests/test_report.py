@@ -18,13 +18,13 @@ from designer.bom import bill
 from designer.catalog import Catalog, load_catalog
 from designer.errors import InputError
 from designer.modelfile import Expect, parse_model_file, read_model_file
+from designer.montecarlo import Verdict, run_block
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus, failed
 from designer.provenance import provenance
 from designer.report import render_html, render_markdown, write_report
 from designer.report_data import ReportData
 from designer.study import Study
-from designer.tolerance import Verdict, run_block
 from designer.workers import SpicePool
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"

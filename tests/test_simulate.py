@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from designer import api, cli, flow, parse_model_file, simulate_plots
+from designer import cli, flow, parse_model_file, simulate_plots, simulation
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.system import Drive
@@ -182,7 +182,7 @@ def test_pictures(tmp_path: Path, capfd: Captured) -> None:
 
 
 def test_the_drawn_twin_is_the_mirror_image(tmp_path: Path) -> None:
-    (found,) = api.simulate(parse_model_file(BASE), [1.43], traces=True)
+    (found,) = simulation.simulate(parse_model_file(BASE), [1.43], traces=True)
     one, two = (t.states for t in found.traces)
     half = (len(one) - 1) // 2
     assert np.abs(two[:half] + one[half:-1]).max() < 1e-8

@@ -18,11 +18,7 @@ from designer.deck import Excitation
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.modelfile import Expect, Response
-from designer.orbit import Orbit, OrbitStatus
-from designer.reduction import Reduction
-from designer.spread import Spread, draw
-from designer.system import Drive
-from designer.tolerance import (
+from designer.montecarlo import (
     BLOCK,
     Answer,
     Question,
@@ -33,6 +29,10 @@ from designer.tolerance import (
     judge,
     run_block,
 )
+from designer.orbit import Orbit, OrbitStatus
+from designer.reduction import Reduction
+from designer.spread import Spread, draw
+from designer.system import Drive
 from tests.test_coefficients import exact_for_paper
 from tests.test_reduction import circuit_of
 
