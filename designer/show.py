@@ -34,8 +34,8 @@ def synthesised(answer: Mapping[str, Any]) -> None:
     certificate = answer["certificate"]
     _line(
         console,
-        f"Largest coefficient error {100 * answer['max_error']:.3g} % "
-        f"({certificate['status']}, lower bound {100 * certificate['lower_bound']:.3g} %); "
+        f"Largest coefficient error {_error(answer['max_error'])} "
+        f"({certificate['status']}, lower bound {_error(certificate['lower_bound'])}); "
         f"{answer['distinct_values']} distinct values",
     )
     if answer["knobs"]:
@@ -203,3 +203,8 @@ __all__: Sequence[str] = (
     "synthesised",
     "tolerance",
 )
+
+
+def _error(value: float) -> str:
+    """A coefficient error in words: below 1e-12 it is rounding."""
+    return f"{100 * value:.3g} %" if value >= 1e-12 else "0 to rounding"

@@ -171,7 +171,7 @@ def _interval(axes: Axes, row: int, counted: Yield) -> None:
     if np.isfinite(counted.rate):
         rate = 100.0 * counted.rate
         axes.plot([rate], [row], "o", color=VERDICTS[Verdict.OK], mec="white", mew=0.7, ms=6)
-        axes.text(118.0, row, f"{rate:.0f} %", ha="right", va="center", size=8)
+        axes.text(118.0, row, f"{rate:.3g} %", ha="right", va="center", size=8)
     else:
         axes.text(118.0, row, "open", ha="right", va="center", color=MUTED, size=8)
 
