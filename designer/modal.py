@@ -7,15 +7,20 @@ to the general kernel.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from designer import modal_kernel as kernel
-from designer.modal_kernel import PARTS, ModalTables
+from designer.modal_kernel import LAST, NODES, PARTS, TERMS, ModalTables
 from designer.system import Array, Drive, Mode, ModeKey, PiecewiseLinearSystem
 
-STEP = 0.9
-"""h · max(|lambda|, omega): longer steps fail the hull more often."""
+Complex = NDArray[np.complex128]
+STEP = 0.4
+"""h · max(|lambda|, omega): longer steps fail the proof more often."""
 WORST_CONDITION = 1e4
+TURNS = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0.0, np.pi, 8, endpoint=False)])
 
 
 def tables(system: PiecewiseLinearSystem, drive: Drive) -> ModalTables | None:
@@ -29,24 +34,34 @@ def tables(system: PiecewiseLinearSystem, drive: Drive) -> ModalTables | None:
     if row is None:
         return None
     C, on_drive, limits = row
-    out = ModalTables(
-        data=np.zeros((3, kernel.WIDTH)),
-        change=np.zeros((3, 3, 4, 7)),
-        to_modal=np.zeros((3, 4, 7)),
-        to_state=np.zeros((3, 4, 7)),
-    )
-    out.data[:, kernel.LIMIT : kernel.LIMIT + 2] = limits
+    data = np.zeros((3, kernel.WIDTH))
+    data[:, kernel.LIMIT : kernel.LIMIT + 2] = limits
+    to_modal, to_state = np.zeros((3, 4, 7)), np.zeros((3, 4, 7))
+    known: dict[bytes, Oscillators | None] = {}  # both contacts have the same A
     for i, mode in modes.items():
-        if not _fill(out, i, mode, drive, C, on_drive):
+        key = mode.A.tobytes()
+        parts = known[key] if key in known else known.setdefault(key, _oscillators(mode.A))
+        forced = _forced(mode, drive)
+        if parts is None or forced is None:
             return None
+        to_state[i, :, :4], to_state[i, :, 4:] = parts.back, forced
+        to_modal[i, :, :4], to_modal[i, :, 4:] = parts.G, -parts.G @ forced
+        wave = np.append(C @ parts.back, C @ forced[:, :2] + [on_drive, 0.0])
+        _fill(data[i], parts, drive.omega, wave, float(C @ forced[:, 2]))
+    change = np.zeros((3, 3, 4, 7))
     for i in modes:
         for j in modes:
             if i != j:
-                out.change[i, j, :, :4] = out.to_modal[j, :, :4] @ out.to_state[i, :, :4]
-                out.change[i, j, :, 4:] = (
-                    out.to_modal[j, :, :4] @ out.to_state[i, :, 4:] + out.to_modal[j, :, 4:]
-                )
-    return out
+                change[i, j] = to_modal[j, :, :4] @ to_state[i]
+                change[i, j, :, 4:] += to_modal[j, :, 4:]
+    for first, matrices in (
+        (kernel.MODAL, to_modal),
+        (kernel.STATE, to_state),
+        (kernel.CHANGE, change),
+    ):
+        columns = matrices.swapaxes(-1, -2).reshape(3, -1)
+        data[:, first : first + columns.shape[1]] = columns
+    return ModalTables(data.ravel())
 
 
 def keys(system: PiecewiseLinearSystem) -> list[ModeKey]:
@@ -87,55 +102,104 @@ def _displacement(modes: dict[int, Mode], drive: Drive) -> tuple[Array, float, A
     return C, D * drive.amplitude, limits
 
 
-def _fill(out: ModalTables, i: int, mode: Mode, drive: Drive, C: Array, on_drive: float) -> bool:
-    """Tables of one mode; False where the modal form cannot be trusted."""
-    factors, forced = _quadratics(mode.A), _forced(mode, drive)
-    if factors is None or forced is None:
-        return False
+@dataclass(frozen=True)
+class Oscillators:
+    """A mode's homogeneous motion: g = G x, x = back g, with y'' + p y' + q y = 0 twice in g.
+
+    factors : (p, q) of each; rate : largest modulus of an eigenvalue.
+    """
+
+    factors: list[tuple[float, float]]
+    G: Array
+    back: Array
+    rate: float
+
+
+def _oscillators(A: Array) -> Oscillators | None:
+    """None where the modal form cannot be trusted."""
+    roots: Complex = np.linalg.eigvals(A).astype(complex)
+    factors = _quadratics(roots)
+    if factors is None:
+        return None
     G = np.zeros((4, 4))
-    companion = np.zeros((4, 4))
-    quad = np.zeros((2, 3))
     for k, (p, q) in enumerate(factors):
-        left = _left_vector(mode.A, p, q)
-        G[2 * k], G[2 * k + 1] = left, left @ mode.A
-        companion[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[0.0, 1.0], [-q, -p]]
-        quad[k] = 0.5 * p, q, q - 0.25 * p * p
-        if p < 0.0 or q <= 0.0 or abs(quad[k, 2]) < 1e-8 * q:
-            return False
+        if p < 0.0 or q <= 0.0 or abs(q - 0.25 * p * p) < 1e-8 * q:
+            return None
+        left = _left_vector(A, p, q)
+        G[2 * k], G[2 * k + 1] = left, left @ A
     scale = np.linalg.norm(G, axis=1)
     if np.linalg.cond(G / scale[:, None]) > WORST_CONDITION:
-        return False
-    back = np.linalg.inv(G)
-    out.to_state[i, :, :4], out.to_state[i, :, 4:] = back, forced
-    out.to_modal[i, :, :4], out.to_modal[i, :, 4:] = G, -G @ forced
-    w = drive.omega
-    h = STEP / max(float(np.abs(np.linalg.eigvals(mode.A)).max()), w)
-    times = h * np.arange(PARTS + 1) / PARTS
-    row = C @ back
-    wave = C @ forced + np.array([on_drive, 0.0, 0.0])
-    rate = np.where(quad[:, 2] > 0.0, np.sqrt(quad[:, 1]), quad[:, 0] + np.sqrt(abs(quad[:, 2])))
+        return None
+    back: Array = np.asarray(np.linalg.inv(G), dtype=np.float64)
+    return Oscillators(factors, G, back, float(np.abs(roots).max()))
+
+
+def _fill(data: Array, parts: Oscillators, w: float, row: Array, centre: float) -> None:
+    """Tables of one mode with displacement row · state + centre, under a drive of frequency w."""
+    factors = parts.factors
+    M = np.zeros((6, 6))  # state' = M state, the drive's sine and cosine last
+    M[4, 5], M[5, 4] = w, -w
+    for k, (p, q) in enumerate(factors):
+        M[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[0.0, 1.0], [-q, -p]]
+    h = STEP / max(parts.rate, w)
+    part = h / PARTS
+    powers = [np.eye(6)]  # M^k
+    for _ in range(TERMS - 1):
+        powers.append(powers[-1] @ M)
+    series = np.array(powers) / np.cumprod([1.0, *range(1, TERMS)])[:, None, None]
+    times = np.arange(LAST + 1, dtype=np.float64) * part
+    jump = np.zeros((LAST + 1, 6, 6))
+    for k, (p, q) in enumerate(factors):
+        jump[:, 2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = _closed(p, q, times)
+    sin, cos = np.sin(w * times), np.cos(w * times)
+    jump[:, 4, 4], jump[:, 4, 5], jump[:, 5, 4], jump[:, 5, 5] = cos, sin, -sin, cos
+    shape = np.stack([row, row @ M])
+    near = np.zeros((TERMS, 8))
+    near[:, :6] = series[:, [1, 0, 3, 2, 4, 5], [1, 1, 3, 3, 5, 5]]
     columns = {
-        kernel.STEP: np.array([h]),
-        kernel.OMEGA: np.array([w]),
-        kernel.QUAD: quad,
-        kernel.SHAPE: np.stack([row, row @ companion]),
-        kernel.FORCED: np.stack([wave, np.array([-w * wave[1], w * wave[0], 0.0])]),
-        # |d⁴y| <= |lambda|⁴ amplitude; where overdamped the faster exponential bounds both.
-        kernel.BOUND: np.append(
-            rate**4 * (np.abs(row[0::2]) + rate * np.abs(row[1::2])),
-            w**4 * float(np.hypot(wave[0], wave[1])),
+        kernel.STEP: np.array([h, part, 1.0 / part]),
+        kernel.REST: np.array([h**4 / 288.0]),
+        kernel.QUAD: np.array(factors),
+        kernel.CENTRE: np.array([centre]),
+        kernel.BOUND: _fourth(row, powers, factors),
+        kernel.SCAN: np.moveaxis(shape @ jump[::PARTS], 0, -1).swapaxes(0, 1),
+        kernel.LOCAL: (row @ series).T,
+        kernel.NEAR: near,
+        kernel.JUMP: np.concatenate(
+            [
+                jump[:, 0:2, 0:2].reshape(-1, 4),
+                jump[:, 2:4, 2:4].reshape(-1, 4),
+                jump[:, 4, 5:3:-1],
+            ],
+            axis=1,
         ),
-        kernel.PROP: np.stack([_closed(q, times) for q in quad], axis=1),
-        kernel.TURN: np.stack([np.sin(w * times), np.cos(w * times)], axis=1),
     }
+    assert columns[kernel.SCAN].shape == (6, 2, NODES)
     for first, values in columns.items():
-        out.data[i, first : first + values.size] = values.ravel()
-    return True
+        data[first : first + values.size] = values.ravel()
 
 
-def _quadratics(A: Array) -> list[tuple[float, float]] | None:
+def _fourth(row: Array, powers: list[Array], factors: list[tuple[float, float]]) -> Array:
+    """(9,) rows over each oscillator whose moduli add up to a bound of |d⁴ row·state/dt⁴|.
+
+    The fourth derivative z of each part obeys the oscillator's own equation, so from now on
+    |z| <= |z(0)| + |z'(0) + p/2 z(0)| · max |impulse response|.
+    """
+    fourth, fifth = row @ powers[4], row @ powers[5]
+    out = []
+    for k, (p, q) in enumerate(factors):
+        own = slice(2 * k, 2 * k + 2)
+        D = q - 0.25 * p * p
+        w = np.sqrt(abs(D))
+        slowest = 0.5 * p - (w if D < 0.0 else 0.0)
+        # |exp(-σ t) sin(w t)/w| <= min(1/w, t exp(-σ t)), and sinh alike with the slower root.
+        reach = min(1.0 / w, np.exp(-1.0) / slowest if slowest > 0.0 else np.inf)
+        out += [*fourth[own], *(reach * (fifth[own] + 0.5 * p * fourth[own]))]
+    return np.array([*out, np.hypot(fourth[4], fourth[5])])
+
+
+def _quadratics(roots: Complex) -> list[tuple[float, float]] | None:
     """The characteristic polynomial as two real quadratics λ² + p λ + q, or None if they meet."""
-    roots = np.linalg.eigvals(A)
     oscillating = sorted(
         (z for z in roots if z.imag > 1e-12 * abs(z)), key=lambda z: (abs(z), z.real)
     )
@@ -163,14 +227,10 @@ def _left_vector(A: Array, p: float, q: float) -> Array:
     u, _, _ = np.linalg.svd(N)
     candidates = u[:, 2:].T
     # Of the two-dimensional space take the vector best apart from its own image.
-    best, spread = candidates[0], -1.0
-    for angle in np.linspace(0.0, np.pi, 8, endpoint=False):
-        v = np.cos(angle) * candidates[0] + np.sin(angle) * candidates[1]
-        w = v @ A
-        apart = 1.0 - abs(float(v @ w)) / float(np.linalg.norm(w))
-        if apart > spread:
-            best, spread = v, apart
-    return np.asarray(best)
+    vectors = TURNS @ candidates
+    images = vectors @ A
+    along = np.abs((vectors * images).sum(axis=1)) / np.sqrt((images * images).sum(axis=1))
+    return np.asarray(vectors[np.argmin(along)])
 
 
 def _forced(mode: Mode, drive: Drive) -> Array | None:
@@ -186,14 +246,15 @@ def _forced(mode: Mode, drive: Drive) -> Array | None:
     return np.stack([P, Q, K], axis=1)
 
 
-def _closed(quad: Array, t: Array) -> Array:
-    """(k, 4) the 2 x 2 propagators over times t (k,), by rows (NumPy twin of the kernel's)."""
-    sigma, q, D = quad
+def _closed(p: float, q: float, t: Array) -> Array:
+    """(k, 2, 2) the propagators of y'' + p y' + q y = 0 over times t (k,)."""
+    sigma, D = 0.5 * p, q - 0.25 * p * p
     w = np.sqrt(abs(D))
     if D > 0.0:
         fade = np.exp(-sigma * t)
         c, s = fade * np.cos(w * t), fade * np.sin(w * t) / w
-    else:
+    else:  # not cosh and sinh: they overflow where the product does not
         slow, fast = np.exp((w - sigma) * t), np.exp(-(w + sigma) * t)
         c, s = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
-    return np.stack([c + sigma * s, s, -q * s, c - sigma * s], axis=1)
+    rows = [[c + sigma * s, s], [-q * s, c - sigma * s]]
+    return np.moveaxis(np.array(rows), -1, 0)

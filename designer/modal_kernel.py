@@ -1,11 +1,10 @@
 """Compiled fast path of the exact flow: four states, one stop pair, modal coordinates.
 
-Within a mode the homogeneous motion is two independent scalar oscillators, y'' + p y' + q y = 0,
-one for each real quadratic factor of the characteristic polynomial; a step is two 2 x 2 products
-and one rotation of the drive. No complex numbers, no case for critical or overdamped modes but in
-the propagator itself. Each step's proof that no boundary is crossed is the Bernstein hull of the
-cubic Hermite interpolant with its remainder M4 h⁴/384, where M4 follows from the modal amplitudes
-at the mode's entry, which cannot grow for p >= 0; where the hull fails, the step is halved.
+Within a mode the homogeneous motion is two scalar oscillators, y'' + p y' + q y = 0, one for each
+real quadratic factor of the characteristic polynomial; the kernel only multiplies tables. A block
+of seven steps is looked at together: displacement and rate at its eight nodes are one product with
+the modal state. That no boundary is crossed in a step is proved by its cubic Hermite interpolant
+and a bound M4 of the fourth derivative; where that fails, the step is halved.
 
 The general kernel (``designer.flow_kernel``) is the reference that this must equal. Everything
 that these functions call stands in this file, or a stale compiled cache would survive an edit.
@@ -13,7 +12,6 @@ that these functions call stands in this file, or a stale compiled cache would s
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
@@ -27,8 +25,15 @@ Int = NDArray[np.int64]
 
 DONE, TOO_MANY_EVENTS, DIVERGED = 0, 2, 3
 """Return codes, those of ``flow_kernel``."""
-PARTS = 32
-"""A step's tabulated parts; within half a part the Taylor series of ``_nudge`` is exact."""
+STEPS = 7
+"""Steps of a block."""
+NODES = STEPS + 1
+"""A loop over displacement and rate at all nodes is long enough for LLVM to vectorise it."""
+PARTS = 8
+"""Tabulated parts of a step: |lambda| times half a part is 1/40."""
+TERMS = 8
+"""Taylor terms about a part: (1/40)**8/8! is 4e-18."""
+LAST = STEPS * PARTS
 FINEST = 1e-10
 """Of a step: below it an undecided tangency is taken for none."""
 
@@ -46,168 +51,213 @@ def _compile(function: Function) -> Function:
     return compiled  # type: ignore[no-any-return]
 
 
-# Columns of ``ModalTables.data``: one array for all, since a compiled call pays for each array.
+# Columns of ``ModalTables.data`` within the WIDTH of one mode. One flat array for all, since a
+# compiled call pays for each array and each dimension; "state" is g (4,), sine, cosine.
 STEP = 0
-LIMIT = 1
+"""Length h of a step, of a part, and parts per unit of time."""
+LIMIT = 3
 """(2,) displacement below and above which the mode is left."""
-OMEGA = 3
-QUAD = 4
-"""(2, 3) sigma = p/2, q, and D = q - sigma² of each oscillator."""
-SHAPE = 10
-"""(2, 4) rows of the guarded displacement and its rate over the modal state."""
-FORCED = 18
-"""(2, 3) the same over (sin, cos, 1)."""
-BOUND = 24
-"""(3,) factors of M4: the two modal amplitudes, 1."""
-PROP = 27
-"""(PARTS + 1, 2, 4) propagators over multiples of step/PARTS, by rows."""
-TURN = PROP + 8 * (PARTS + 1)
-"""(PARTS + 1, 2) sine and cosine of the drive's phase over the same."""
-WIDTH = TURN + 2 * (PARTS + 1)
+REST = 5
+"""h⁴/288: times M4, what the middle Bernstein coefficients must keep from a limit."""
+QUAD = 6
+"""(2, 2) p and q of each oscillator."""
+CENTRE = 10
+"""Constant term of the displacement."""
+BOUND = 11
+"""(2, 4) two rows over each oscillator whose moduli add up to M4, and M4 of the drive."""
+SCAN = 20
+"""(6, 2, NODES) displacement and rate over the state, at each node of a block."""
+LOCAL = SCAN + 12 * NODES
+"""(6, TERMS) Taylor coefficients of the displacement over the state."""
+NEAR = LOCAL + 6 * TERMS
+"""(TERMS, 8) Taylor coefficients of s1', s1, s2', s2, sin, cos (s the impulse response), 0, 0."""
+JUMP = NEAR + 8 * TERMS
+"""(LAST + 1, 10) propagators of both oscillators by rows, sine and cosine of the drive's turn."""
+STATE = JUMP + 10 * (LAST + 1)
+"""(7, 4) x over (state, 1), by columns."""
+MODAL = STATE + 28
+"""(7, 4) g over (x, sin, cos, 1), by columns."""
+CHANGE = MODAL + 28
+"""(3, 7, 4) g of each other mode over (state, 1), by columns."""
+WIDTH = CHANGE + 84
+
+# Places in the scratch array.
+G, POINT, SMALL, COEF, F, D, STACK = 0, 8, 16, 24, 32, 32 + NODES, 48
+ROOM = 84
+"""Intervals that the bisection may hold."""
 
 
 class ModalTables(NamedTuple):
-    """What the kernel knows; first axis: mode 0 open, 1 upper contact, 2 lower contact.
-
-    data : (3, WIDTH), see the columns above.
-    change : (3, 3, 4, 7) next modal state from (modal state, sin, cos, 1); [m, m] unused.
-    to_modal : (3, 4, 7) modal state from (x, sin, cos, 1); to_state : (3, 4, 7) back.
-    """
+    """data : (3 · WIDTH,), mode 0 open, 1 upper contact, 2 lower contact; see the columns above."""
 
     data: Float
-    change: Float
-    to_modal: Float
-    to_state: Float
+
+
+# ``m & 3`` and the like tell the compiler that an index is not negative: no wrap-around.
 
 
 @_compile
-def _propagator(data: Float, m: int, k: int, t: float, out: Float) -> None:
-    """2 x 2 propagator of oscillator k, y'' + 2 sigma y' + q y = 0, over any time t, by rows."""
-    sigma, q, d = data[m, QUAD + 3 * k], data[m, QUAD + 3 * k + 1], data[m, QUAD + 3 * k + 2]
-    w = math.sqrt(abs(d))
-    if d > 0.0:
-        fade = math.exp(-sigma * t)
-        c, s = fade * math.cos(w * t), fade * math.sin(w * t) / w
-    else:  # not cosh and sinh: they overflow where the product does not
-        slow, fast = math.exp((w - sigma) * t), math.exp(-(w + sigma) * t)
-        c, s = 0.5 * (slow + fast), 0.5 * (slow - fast) / w
-    out[0] = c + sigma * s
-    out[1] = s
-    out[2] = -q * s
-    out[3] = c - sigma * s
+def _jump(data: Float, m: int, part: int, work: Float) -> None:
+    """POINT = state ``part`` parts after G."""
+    o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
+    a, b, c, d = work[G], work[G + 1], work[G + 2], work[G + 3]
+    sn, cs, sw, cw = work[G + 4], work[G + 5], data[o + 8], data[o + 9]
+    work[POINT] = data[o] * a + data[o + 1] * b
+    work[POINT + 1] = data[o + 2] * a + data[o + 3] * b
+    work[POINT + 2] = data[o + 4] * c + data[o + 5] * d
+    work[POINT + 3] = data[o + 6] * c + data[o + 7] * d
+    work[POINT + 4] = sn * cw + cs * sw
+    work[POINT + 5] = cs * cw - sn * sw
 
 
 @_compile
-def _nudge(data: Float, m: int, t: float, out: Float) -> None:
-    """Carry out (6,), g with sine and cosine, over a time |t| <= h/PARTS/2: Taylor to order 7.
+def _expand(data: Float, m: int, t: float, work: Float) -> float:
+    """Time of the part nearest to t; COEF = Taylor series of displacement - CENTRE about it."""
+    o = (m & 3) * WIDTH
+    part = int(t * data[o + STEP + 2] + 0.5)
+    _jump(data, m, part, work)
+    for k in range(TERMS):
+        total = 0.0
+        for j in range(6):
+            total += data[o + LOCAL + TERMS * j + k] * work[POINT + j]
+        work[COEF + k] = total
+    return float(part * data[o + STEP + 1])
 
-    |lambda| t <= 0.011, so the first term left out is below 1e-20 of the state.
+
+@_compile
+def _value(work: Float, s: float) -> tuple[float, float, float]:
+    """Displacement, rate and half the acceleration a time s from the expanded part."""
+    f = work[COEF + TERMS - 1]
+    d = e = 0.0
+    for k in range(TERMS - 2, -1, -1):
+        e = e * s + d
+        d = d * s + f
+        f = f * s + work[COEF + k]
+    return f, d, e
+
+
+@_compile
+def _carry(data: Float, m: int, part: int, phi: Float) -> None:
+    """phi (4, k), in modal coordinates, ← ``part`` parts on."""
+    o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
+    for j in range(phi.shape[1]):
+        a, b, c, d = phi[0, j], phi[1, j], phi[2, j], phi[3, j]
+        phi[0, j], phi[1, j] = data[o] * a + data[o + 1] * b, data[o + 2] * a + data[o + 3] * b
+        phi[2, j], phi[3, j] = data[o + 4] * c + data[o + 5] * d, data[o + 6] * c + data[o + 7] * d
+
+
+@_compile
+def _turn(data: Float, o: int, phi: Float) -> None:
+    """phi ← the 4 x 4 matrix that stands at o, by columns, times phi."""
+    o &= 0xFFFF
+    for j in range(phi.shape[1]):
+        a, b, c, d = phi[0, j], phi[1, j], phi[2, j], phi[3, j]
+        for i in range(4):
+            phi[i, j] = data[o + i] * a + data[o + 4 + i] * b
+            phi[i, j] += data[o + 8 + i] * c + data[o + 12 + i] * d
+
+
+@_compile
+def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
+    """G ← the state a time t on, 0 <= t <= STEPS · h; phi ← its tangent vectors."""
+    o = (m & 3) * WIDTH
+    part = int(t * data[o + STEP + 2] + 0.5)
+    _jump(data, m, part, work)
+    s = t - part * data[o + STEP + 1]
+    for i in range(8):
+        total = data[o + NEAR + 8 * (TERMS - 1) + i]
+        for k in range(TERMS - 2, -1, -1):
+            total = total * s + data[o + NEAR + 8 * k + i]
+        work[SMALL + i] = total
+    p1, q1, p2, q2 = data[o + QUAD], data[o + QUAD + 1], data[o + QUAD + 2], data[o + QUAD + 3]
+    r1, s1, r2, s2 = work[SMALL], work[SMALL + 1], work[SMALL + 2], work[SMALL + 3]
+    a, b, c, d = work[POINT], work[POINT + 1], work[POINT + 2], work[POINT + 3]
+    work[G], work[G + 1] = (r1 + p1 * s1) * a + s1 * b, r1 * b - q1 * s1 * a
+    work[G + 2], work[G + 3] = (r2 + p2 * s2) * c + s2 * d, r2 * d - q2 * s2 * c
+    sn, cs, sw, cw = work[POINT + 4], work[POINT + 5], work[SMALL + 4], work[SMALL + 5]
+    work[G + 4], work[G + 5] = sn * cw + cs * sw, cs * cw - sn * sw
+    if phi.shape[0] > 0:
+        _carry(data, m, part, phi)
+        for j in range(phi.shape[1]):
+            a, b, c, d = phi[0, j], phi[1, j], phi[2, j], phi[3, j]
+            phi[0, j], phi[1, j] = (r1 + p1 * s1) * a + s1 * b, r1 * b - q1 * s1 * a
+            phi[2, j], phi[3, j] = (r2 + p2 * s2) * c + s2 * d, r2 * d - q2 * s2 * c
+
+
+@_compile
+def _apply(data: Float, o: int, work: Float, place: int) -> None:
+    """work[place : place + 4] ← the (4, 7) matrix that stands at o, by columns, times (G, 1)."""
+    o &= 0xFFFF
+    place &= 0xFF
+    a, b, c, d, sn, cs = work[G], work[G + 1], work[G + 2], work[G + 3], work[G + 4], work[G + 5]
+    for i in range(4):
+        drive = data[o + 16 + i] * sn + data[o + 20 + i] * cs + data[o + 24 + i]
+        free = data[o + i] * a + data[o + 4 + i] * b
+        work[place + i] = free + (data[o + 8 + i] * c + data[o + 12 + i] * d) + drive
+
+
+@_compile
+def _fourth(data: Float, m: int, work: Float) -> float:
+    """A bound of |d⁴ displacement/dt⁴| from here on: a mode's motion cannot grow."""
+    o = (m & 3) * WIDTH + BOUND
+    a, b, c, d = work[G], work[G + 1], work[G + 2], work[G + 3]
+    first = abs(data[o] * a + data[o + 1] * b) + abs(data[o + 2] * a + data[o + 3] * b)
+    second = abs(data[o + 4] * c + data[o + 5] * d) + abs(data[o + 6] * c + data[o + 7] * d)
+    return float(first + second + data[o + 8])
+
+
+@_compile
+def _scan(data: Float, m: int, work: Float) -> None:
+    """F, D = displacement and rate at the nodes."""
+    o = (m & 3) * WIDTH + SCAN
+    a, b, c, d, sn, cs = work[G], work[G + 1], work[G + 2], work[G + 3], work[G + 4], work[G + 5]
+    n = 2 * NODES
+    for k in range(n):
+        i = o + k
+        first = data[i] * a + data[i + n] * b
+        second = data[i + 2 * n] * c + data[i + 3 * n] * d
+        work[F + k] = first + second + data[i + 4 * n] * sn + data[i + 5 * n] * cs
+
+
+@_compile
+def _suspect(data: Float, m: int, m4: float, count: int, work: Float, k: int) -> int:
+    """First step from k on, below count, that is not proved to stay within the limits.
+
+    With end values at or within a limit and both middle Bernstein coefficients at least r within,
+    the distance is at least 3 r s (1 - s) - M4 h⁴/24 s² (1 - s)² >= 0 for r = M4 h⁴/288.
     """
-    for k in range(2):
-        p, q = 2.0 * data[m, QUAD + 3 * k], data[m, QUAD + 3 * k + 1]
-        y, v = out[2 * k], out[2 * k + 1]
-        d0, d1 = y, v
-        weight = t
-        for n in range(1, 8):
-            d2 = -p * d1 - q * d0
-            y += weight * d1
-            v += weight * d2
-            d0, d1 = d1, d2
-            weight *= t / (n + 1)
-        out[2 * k], out[2 * k + 1] = y, v
-    a = data[m, OMEGA] * t
-    b = a * a
-    s = a * (1.0 - b / 6.0 * (1.0 - b / 20.0 * (1.0 - b / 42.0)))
-    c = 1.0 - b / 2.0 * (1.0 - b / 12.0 * (1.0 - b / 30.0 * (1.0 - b / 56.0)))
-    sn, cs = out[4], out[5]
-    out[4] = sn * c + cs * s
-    out[5] = cs * c - sn * s
-
-
-@_compile
-def _jump(data: Float, m: int, part: int, g: Float, sn: float, cs: float, out: Float) -> None:
-    """Modal state and drive ``part`` parts of a step on, into out (6,)."""
-    for k in range(2):
-        a, b = g[2 * k], g[2 * k + 1]
-        out[2 * k] = data[m, PROP + 8 * part + 4 * k] * a + data[m, PROP + 8 * part + 4 * k + 1] * b
-        out[2 * k + 1] = (
-            data[m, PROP + 8 * part + 4 * k + 2] * a + data[m, PROP + 8 * part + 4 * k + 3] * b
-        )
-    sw, cw = data[m, TURN + 2 * part], data[m, TURN + 2 * part + 1]
-    out[4] = sn * cw + cs * sw
-    out[5] = cs * cw - sn * sw
-
-
-@_compile
-def _at(data: Float, m: int, g: Float, sn: float, cs: float, t: float, out: Float) -> None:
-    """Modal state and drive a time 0 <= t <= h on, into out (6,)."""
-    width = data[m, STEP] / PARTS
-    part = int(t / width + 0.5)
-    _jump(data, m, part, g, sn, cs, out)
-    _nudge(data, m, t - part * width, out)
-
-
-@_compile
-def _row(data: Float, m: int, k: int, g: Float, sn: float, cs: float) -> float:
-    """Guarded displacement (k = 0) or its rate (k = 1). Indices, not views: a view costs more."""
-    return (
-        data[m, SHAPE + 4 * k] * g[0]
-        + data[m, SHAPE + 4 * k + 1] * g[1]
-        + data[m, SHAPE + 4 * k + 2] * g[2]
-        + data[m, SHAPE + 4 * k + 3] * g[3]
-        + data[m, FORCED + 3 * k] * sn
-        + data[m, FORCED + 3 * k + 1] * cs
-        + data[m, FORCED + 3 * k + 2]
-    )
-
-
-@_compile
-def _fourth(data: Float, m: int, g: Float) -> float:
-    """A bound of |d⁴ displacement/dt⁴| from here on: the envelopes do not grow.
-
-    Of an oscillator the amplitude; where it is overdamped the sum of both exponentials.
-    """
-    total = data[m, BOUND + 2]
-    for k in range(2):
-        sigma, d = data[m, QUAD + 3 * k], data[m, QUAD + 3 * k + 2]
-        y = g[2 * k]
-        u = g[2 * k + 1] + sigma * y
-        if d > 0.0:
-            total += data[m, BOUND + k] * math.sqrt(y * y + u * u / d)
-        else:
-            w = math.sqrt(-d)
-            total += data[m, BOUND + k] * 0.5 * (abs(y + u / w) + abs(y - u / w))
-    return total
+    o = (m & 3) * WIDTH
+    third, rest = data[o + STEP] / 3.0, m4 * data[o + REST]
+    low, high = data[o + LIMIT] - data[o + CENTRE], data[o + LIMIT + 1] - data[o + CENTRE]
+    low, high = low + rest, high - rest
+    while k < count:
+        i = F + (k & 7)
+        end = work[i + 1]
+        b1, b2 = work[i] + third * work[i + NODES], end - third * work[i + NODES + 1]
+        if not (low <= b1 <= high and low <= b2 <= high and low <= end <= high):
+            break
+        k += 1
+    return k
 
 
 @_compile
 def _crossing(
-    data: Float,
-    m: int,
-    g: Float,
-    sn: float,
-    cs: float,
-    h: float,
-    m4: float,
-    ends: Float,
-    target: float,
-    sign: float,
-    stack: Float,
-    point: Float,
+    data: Float, m: int, k: int, m4: float, target: float, sign: float, work: Float
 ) -> float:
-    """First time in [0, h] at which sign · (displacement - target) rises through 0, or -1.
-
-    ends : (4,) displacement and rate at both ends.
-    """
-    # stack rows: a, b, f(a), f'(a), f(b), f'(b)
-    stack[0, 0], stack[0, 1] = 0.0, h
-    stack[0, 2], stack[0, 3] = sign * (ends[0] - target), sign * ends[1]
-    stack[0, 4], stack[0, 5] = sign * (ends[2] - target), sign * ends[3]
+    """First time in step k at which sign · (displacement - target) rises through 0, or -1."""
+    h = data[(m & 3) * WIDTH + STEP]
+    target -= data[(m & 3) * WIDTH + CENTRE]
+    k &= 7
+    # Rows of the stack: a, b, f(a), f'(a), f(b), f'(b).
+    work[STACK], work[STACK + 1] = k * h, (k + 1) * h
+    work[STACK + 2], work[STACK + 3] = sign * (work[F + k] - target), sign * work[D + k]
+    work[STACK + 4], work[STACK + 5] = sign * (work[F + k + 1] - target), sign * work[D + k + 1]
     top = 1
     while top > 0:
         top -= 1
-        a, b = stack[top, 0], stack[top, 1]
-        fa, da, fb, db = stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5]
+        o = STACK + 6 * (top & 127)
+        a, b = work[o], work[o + 1]
+        fa, da, fb, db = work[o + 2], work[o + 3], work[o + 4], work[o + 5]
         w = b - a
         rest = m4 * w * w * w * w / 384.0
         b1, b2 = fa + w * da / 3.0, fb - w * db / 3.0
@@ -221,98 +271,51 @@ def _crossing(
             if fb <= 0.0:
                 continue
             if fa > 0.0:
-                return a
-            return _newton(data, m, g, sn, cs, a, b, fa, da, fb, db, target, sign, point)
+                return float(a)
+            return _newton(data, m, o, target, sign, work)
         if max(max(da, db), middle) + slack < 0.0:
             continue
-        if w < FINEST * h or top + 2 >= stack.shape[0]:
+        if w < FINEST * h or top + 2 >= ROOM:
             continue
         t = 0.5 * (a + b)
-        _at(data, m, g, sn, cs, t, point)
-        f = sign * (_row(data, m, 0, point, point[4], point[5]) - target)
-        d = sign * _row(data, m, 1, point, point[4], point[5])
-        stack[top, 0], stack[top, 1] = t, b
-        stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5] = f, d, fb, db
-        top += 1
-        stack[top, 0], stack[top, 1] = a, t
-        stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5] = fa, da, f, d
-        top += 1
+        f, d, _ = _value(work, t - _expand(data, m, t, work))
+        f, d = sign * (f - target), sign * d
+        work[o], work[o + 1] = t, b
+        work[o + 2], work[o + 3], work[o + 4], work[o + 5] = f, d, fb, db
+        work[o + 6], work[o + 7] = a, t
+        work[o + 8], work[o + 9], work[o + 10], work[o + 11] = fa, da, f, d
+        top += 2
     return -1.0
 
 
 @_compile
-def _newton(
-    data: Float,
-    m: int,
-    g: Float,
-    sn: float,
-    cs: float,
-    a: float,
-    b: float,
-    fa: float,
-    da: float,
-    fb: float,
-    db: float,
-    target: float,
-    sign: float,
-    point: Float,
-) -> float:
-    """Root in [a, b], where the displacement rises: the cubic's, then Newton on the exact one."""
+def _newton(data: Float, m: int, o: int, target: float, sign: float, work: Float) -> float:
+    """Root in the interval at o, where it rises: the cubic's, then the Taylor polynomial's."""
+    o &= 0xFFFF
+    a, b, fa, da = work[o], work[o + 1], work[o + 2], work[o + 3]
+    fb, db = work[o + 4], work[o + 5]
+    h = data[(m & 3) * WIDTH + STEP]
     w = b - a
     s = fa / (fa - fb)
     c2 = 3.0 * (fb - fa) - w * (2.0 * da + db)
     c3 = 2.0 * (fa - fb) + w * (da + db)
-    for _ in range(4):
-        f = fa + s * (w * da + s * (c2 + s * c3))
-        d = w * da + s * (2.0 * c2 + 3.0 * s * c3)
-        step = f / d
-        s -= step
-        if abs(step) < 1e-9:
-            break
-    s = min(max(s, 0.0), 1.0)
-    t = a + s * w
+    for _ in range(2):
+        s -= (fa + s * (w * da + s * (c2 + s * c3))) / (w * da + s * (2.0 * c2 + 3.0 * s * c3))
+    t = a + min(max(s, 0.0), 1.0) * w
     for _ in range(60):
-        _at(data, m, g, sn, cs, t, point)
-        f = sign * (_row(data, m, 0, point, point[4], point[5]) - target)
-        d = sign * _row(data, m, 1, point, point[4], point[5])
-        if f > 0.0:
-            b = t
-        else:
-            a = t
-        u = t - f / d
+        f, d, e = _value(work, t - _expand(data, m, t, work))
+        f, d, e = sign * (f - target), sign * d, sign * e
+        a, b = (a, t) if f > 0.0 else (t, b)
+        step = f / d
+        bend = step * e / d
+        u = t - step * (1.0 + bend)  # Chebyshev's third-order step
         if not (a <= u <= b):
             u = 0.5 * (a + b)
-        # Newton squares the error: the next one would be rounding.
-        if abs(u - t) < 1e-7 * data[m, STEP]:
-            return u
+        elif abs(bend) < 1e-3 or abs(step) < 1e-7 * h:
+            # What is left is bend² of the step, and a time's error costs the state its square.
+            return float(u)
         t = u
-    return t
-
-
-@_compile
-def _carry(data: Float, to_modal: Float, to_state: Float, m: int, t: float, phi: Float) -> None:
-    """phi ← (linear flow of mode m over t) phi, in state coordinates."""
-    column = np.empty(4)
-    modal = np.empty(4)
-    first = np.empty(4)
-    second = np.empty(4)
-    _propagator(data, m, 0, t, first)
-    _propagator(data, m, 1, t, second)
-    for j in range(phi.shape[1]):
-        for i in range(4):
-            total = 0.0
-            for k in range(4):
-                total += to_modal[m, i, k] * phi[k, j]
-            modal[i] = total
-        column[0] = first[0] * modal[0] + first[1] * modal[1]
-        column[1] = first[2] * modal[0] + first[3] * modal[1]
-        column[2] = second[0] * modal[2] + second[1] * modal[3]
-        column[3] = second[2] * modal[2] + second[3] * modal[3]
-        for i in range(4):
-            total = 0.0
-            for k in range(4):
-                total += to_state[m, i, k] * column[k]
-            phi[i, j] = total
+    return float(t)
 
 
 @_compile
@@ -331,97 +334,67 @@ def advance(
     cursor : (2,) mode and periods done, both written. impacts : (periods, 2) lower, upper,
     written. phi : (4, k) tangent vectors in state coordinates, (0, 0) for none.
     """
-    data, change = tables.data, tables.change
-    to_modal, to_state = tables.to_modal, tables.to_state
+    data = tables.data
     m = cursor[0]
-    g = np.empty(4)
-    after = np.empty(6)
-    point = np.empty(6)
-    ends = np.empty(4)
-    stack = np.empty((84, 6))
-    sn, cs = 0.0, 1.0
+    work = np.zeros(STACK + 6 * (ROOM + 2))
     for i in range(4):
-        total = to_modal[m, i, 4] * sn + to_modal[m, i, 5] * cs
-        total += to_modal[m, i, 6]
-        for k in range(4):
-            total += to_modal[m, i, k] * x[k]
-        g[i] = total
-    ends[0] = _row(data, m, 0, g, sn, cs)
-    ends[1] = _row(data, m, 1, g, sn, cs)
-    m4 = _fourth(data, m, g)
-    stay, t, events = 0.0, 0.0, 0
-    done = 0
-    while done < strobes.shape[0] - 1:
-        h = data[m, STEP]
-        whole = period - t > h
-        if whole:
-            _jump(data, m, PARTS, g, sn, cs, after)
-        else:
-            h = period - t
-            _at(data, m, g, sn, cs, h, after)
-        ends[2] = _row(data, m, 0, after, after[4], after[5])
-        ends[3] = _row(data, m, 1, after, after[4], after[5])
-        b1, b2 = ends[0] + h * ends[1] / 3.0, ends[2] - h * ends[3] / 3.0
-        rest = m4 * h * h * h * h / 384.0
-        high = max(max(ends[0], b1), max(b2, ends[2])) + rest
-        low = min(min(ends[0], b1), min(b2, ends[2])) - rest
+        work[G + i] = x[i]
+    work[G + 5] = 1.0
+    _apply(data, m * WIDTH + MODAL, work, G)
+    if phi.shape[0] > 0:
+        _turn(data, m * WIDTH + MODAL, phi)
+    t, events, done, code = 0.0, 0, 0, DONE
+    while done < strobes.shape[0] - 1 and code == DONE:
+        o = (m & 3) * WIDTH
+        h, low, high = data[o + STEP], data[o + LIMIT], data[o + LIMIT + 1]
+        left = period - t
+        m4 = _fourth(data, m, work)
+        _scan(data, m, work)
+        count = min(STEPS, int(left / h) + 1)
         first, side = -1.0, 0
-        if high >= data[m, LIMIT + 1]:
-            first = _crossing(
-                data, m, g, sn, cs, h, m4, ends, data[m, LIMIT + 1], 1.0, stack, point
-            )
-            side = 1
-        if low <= data[m, LIMIT]:
-            other = _crossing(data, m, g, sn, cs, h, m4, ends, data[m, LIMIT], -1.0, stack, point)
-            if other >= 0.0 and (first < 0.0 or other < first):
-                first, side = other, -1
-        if first >= 0.0:
-            _at(data, m, g, sn, cs, first, after)
+        k = _suspect(data, m, m4, count, work, 0)
+        while k < count:
+            if high < np.inf:
+                first, side = _crossing(data, m, k, m4, high, 1.0, work), 1
+            if low > -np.inf:
+                other = _crossing(data, m, k, m4, low, -1.0, work)
+                if other >= 0.0 and (first < 0.0 or other < first):
+                    first, side = other, -1
+            if first >= 0.0:
+                break
+            k = _suspect(data, m, m4, count, work, k + 1)
+        if 0.0 <= first <= left:
+            _move(data, m, first, work, phi)
             t += first
-            stay += first
-            if phi.shape[0] > 0:
-                _carry(data, to_modal, to_state, m, stay, phi)
-            stay = 0.0
             n = 0
             if m == 0:
                 n = 1 if side > 0 else 2
                 impacts[done, 1 if side > 0 else 0] += 1
-            sn, cs = after[4], after[5]
-            for i in range(4):
-                total = change[m, n, i, 4] * sn + change[m, n, i, 5] * cs
-                total += change[m, n, i, 6]
-                for k in range(4):
-                    total += change[m, n, i, k] * after[k]
-                g[i] = total
+            _apply(data, o + CHANGE + 28 * n, work, G)
+            if phi.shape[0] > 0:
+                _turn(data, o + CHANGE + 28 * n, phi)
             m = n
-            m4 = _fourth(data, m, g)
-            ends[0] = _row(data, m, 0, g, sn, cs)
-            ends[1] = _row(data, m, 1, g, sn, cs)
             events += 1
             if events > max_events:
-                cursor[0], cursor[1] = m, done
-                return TOO_MANY_EVENTS
-            continue
-        for i in range(4):
-            g[i] = after[i]
-        sn, cs = after[4], after[5]
-        ends[0], ends[1] = ends[2], ends[3]
-        stay += h
-        if whole:
-            t += h
-            continue
-        t, events = 0.0, 0
-        done += 1
-        sn, cs = 0.0, 1.0
-        for i in range(4):
-            total = to_state[m, i, 5] + to_state[m, i, 6]
-            for k in range(4):
-                total += to_state[m, i, k] * g[k]
-            strobes[done, i] = total
-        if not (abs(strobes[done, 0]) < 1e12):
-            cursor[0], cursor[1] = m, done
-            return DIVERGED
+                code = TOO_MANY_EVENTS
+        elif first < 0.0 and STEPS * h < left:
+            _jump(data, m, LAST, work)
+            for i in range(6):
+                work[G + i] = work[POINT + i]
+            if phi.shape[0] > 0:
+                _carry(data, m, LAST, phi)
+            t += STEPS * h
+        else:
+            _move(data, m, left, work, phi)
+            t, events = 0.0, 0
+            done += 1
+            work[G + 4], work[G + 5] = 0.0, 1.0
+            _apply(data, o + STATE, work, POINT)
+            for i in range(4):
+                strobes[done, i] = work[POINT + i]
+            if not (abs(strobes[done, 0]) < 1e12):
+                code = DIVERGED
     if phi.shape[0] > 0:
-        _carry(data, to_modal, to_state, m, stay, phi)
+        _turn(data, m * WIDTH + STATE, phi)
     cursor[0], cursor[1] = m, done
-    return DONE
+    return code
