@@ -16,14 +16,13 @@ of a step that still cannot be decided counts as grazing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+from designer.compiled import compiled
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
@@ -32,19 +31,6 @@ ORDER = 18
 DONE, UNKNOWN_MODE, TOO_MANY_EVENTS, DIVERGED = 0, 1, 2, 3
 """Return codes of ``advance``."""
 FINEST = 1e-10
-
-
-def _compile(function: Function) -> Function:
-    options: dict[str, Any] = {
-        "nogil": True,
-        "fastmath": {"contract", "nsz", "arcp"},
-        "error_model": "numpy",
-    }
-    try:
-        compiled = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # nowhere to keep compiled code: compile for this process only
-        compiled = numba.njit(**options)(function)
-    return compiled  # type: ignore[no-any-return]
 
 
 class Tables(NamedTuple):
@@ -87,7 +73,7 @@ class Log(NamedTuple):
     clipped: Float
 
 
-@_compile
+@compiled
 def _value(c: Float, s: float) -> float:
     total = 0.0
     for k in range(c.shape[0] - 1, -1, -1):
@@ -95,7 +81,7 @@ def _value(c: Float, s: float) -> float:
     return total
 
 
-@_compile
+@compiled
 def _slope(c: Float, s: float) -> float:
     total = 0.0
     for k in range(c.shape[0] - 1, 0, -1):
@@ -103,7 +89,7 @@ def _slope(c: Float, s: float) -> float:
     return total
 
 
-@_compile
+@compiled
 def _curvature_bound(c: Float, end: float) -> float:
     """Bound of |p''| on [0, end]."""
     total = 0.0
@@ -112,7 +98,7 @@ def _curvature_bound(c: Float, end: float) -> float:
     return total
 
 
-@_compile
+@compiled
 def _root(c: Float, a: float, b: float) -> float:
     """The root of p in [a, b], where p is monotone and changes sign: Newton kept by bisection."""
     rising = _value(c, b) > _value(c, a)
@@ -135,7 +121,7 @@ def _root(c: Float, a: float, b: float) -> float:
     return s
 
 
-@_compile
+@compiled
 def _first_rise(c: Float, end: float, graze: Float) -> float:
     """First s in [0, end] where p goes from negative to positive; -1.0 if there is none."""
     bound = _curvature_bound(c, end)
@@ -166,7 +152,7 @@ def _first_rise(c: Float, end: float, graze: Float) -> float:
     return -1.0
 
 
-@_compile
+@compiled
 def _stationary(c: Float, end: float, found: Float) -> int:
     """Writes the points of [0, end] where p' = 0 into ``found``; returns how many."""
     n = c.shape[0]
@@ -201,7 +187,7 @@ def _stationary(c: Float, end: float, found: Float) -> int:
     return count
 
 
-@_compile
+@compiled
 def _partial(taylor: Float, z: Float, s: float, out: Float) -> None:
     """out = Σ s^k (M h)^k/k! z, by columns of the table."""
     n = z.shape[0]
@@ -217,7 +203,7 @@ def _partial(taylor: Float, z: Float, s: float, out: Float) -> None:
         weight *= s
 
 
-@_compile
+@compiled
 def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, work: Float) -> None:
     """phi ← (state block of exp(M s h)) phi; s = 1 uses the propagator."""
     for i in range(n):
@@ -238,7 +224,7 @@ def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, wor
             phi[i, j] = total
 
 
-@_compile
+@compiled
 def _measure(
     tables: Tables, mode: int, z: Float, n: int, end: float, depth: Float, log: Log
 ) -> None:
@@ -278,7 +264,7 @@ def _measure(
                 log.graze[1] = min(log.graze[1], -v)
 
 
-@_compile
+@compiled
 def advance(
     tables: Tables,
     z: Float,

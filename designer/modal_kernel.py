@@ -12,14 +12,13 @@ that these functions call stands in this file, or a stale compiled cache would s
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+from designer.compiled import compiled
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
@@ -36,19 +35,6 @@ TERMS = 8
 LAST = STEPS * PARTS
 FINEST = 1e-10
 """Of a step: below it an undecided tangency is taken for none."""
-
-
-def _compile(function: Function) -> Function:
-    options: dict[str, Any] = {
-        "nogil": True,
-        "fastmath": {"contract", "nsz", "arcp"},
-        "error_model": "numpy",
-    }
-    try:
-        compiled = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # nowhere to keep compiled code: compile for this process only
-        compiled = numba.njit(**options)(function)
-    return compiled  # type: ignore[no-any-return]
 
 
 # Columns of ``ModalTables.data`` within the WIDTH of one mode. One flat array for all, since a
@@ -96,7 +82,7 @@ class ModalTables(NamedTuple):
 # ``m & 3`` and the like tell the compiler that an index is not negative: no wrap-around.
 
 
-@_compile
+@compiled
 def _jump(data: Float, m: int, part: int, work: Float) -> None:
     """POINT = state ``part`` parts after G."""
     o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
@@ -110,7 +96,7 @@ def _jump(data: Float, m: int, part: int, work: Float) -> None:
     work[POINT + 5] = cs * cw - sn * sw
 
 
-@_compile
+@compiled
 def _expand(data: Float, m: int, t: float, work: Float) -> float:
     """Time of the part nearest to t; COEF = Taylor series of displacement - CENTRE about it."""
     o = (m & 3) * WIDTH
@@ -124,7 +110,7 @@ def _expand(data: Float, m: int, t: float, work: Float) -> float:
     return float(part * data[o + STEP + 1])
 
 
-@_compile
+@compiled
 def _value(work: Float, s: float) -> tuple[float, float, float]:
     """Displacement, rate and half the acceleration a time s from the expanded part."""
     f = work[COEF + TERMS - 1]
@@ -136,7 +122,7 @@ def _value(work: Float, s: float) -> tuple[float, float, float]:
     return f, d, e
 
 
-@_compile
+@compiled
 def _carry(data: Float, m: int, part: int, phi: Float) -> None:
     """phi (4, k), in modal coordinates, ← ``part`` parts on."""
     o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
@@ -146,7 +132,7 @@ def _carry(data: Float, m: int, part: int, phi: Float) -> None:
         phi[2, j], phi[3, j] = data[o + 4] * c + data[o + 5] * d, data[o + 6] * c + data[o + 7] * d
 
 
-@_compile
+@compiled
 def _turn(data: Float, o: int, phi: Float) -> None:
     """phi ← the 4 x 4 matrix that stands at o, by columns, times phi."""
     o &= 0xFFFF
@@ -157,7 +143,7 @@ def _turn(data: Float, o: int, phi: Float) -> None:
             phi[i, j] += data[o + 8 + i] * c + data[o + 12 + i] * d
 
 
-@_compile
+@compiled
 def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
     """G ← the state a time t on, 0 <= t <= STEPS · h; phi ← its tangent vectors."""
     o = (m & 3) * WIDTH
@@ -184,7 +170,7 @@ def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
             phi[2, j], phi[3, j] = (r2 + p2 * s2) * c + s2 * d, r2 * d - q2 * s2 * c
 
 
-@_compile
+@compiled
 def _apply(data: Float, o: int, work: Float, place: int) -> None:
     """work[place : place + 4] ← the (4, 7) matrix that stands at o, by columns, times (G, 1)."""
     o &= 0xFFFF
@@ -196,7 +182,7 @@ def _apply(data: Float, o: int, work: Float, place: int) -> None:
         work[place + i] = free + (data[o + 8 + i] * c + data[o + 12 + i] * d) + drive
 
 
-@_compile
+@compiled
 def _fourth(data: Float, m: int, work: Float) -> float:
     """A bound of |d⁴ displacement/dt⁴| from here on: a mode's motion cannot grow."""
     o = (m & 3) * WIDTH + BOUND
@@ -206,7 +192,7 @@ def _fourth(data: Float, m: int, work: Float) -> float:
     return float(first + second + data[o + 8])
 
 
-@_compile
+@compiled
 def _scan(data: Float, m: int, work: Float) -> None:
     """F, D = displacement and rate at the nodes."""
     o = (m & 3) * WIDTH + SCAN
@@ -219,7 +205,7 @@ def _scan(data: Float, m: int, work: Float) -> None:
         work[F + k] = first + second + data[i + 4 * n] * sn + data[i + 5 * n] * cs
 
 
-@_compile
+@compiled
 def _suspect(data: Float, m: int, m4: float, count: int, work: Float, k: int) -> int:
     """First step from k on, below count, that is not proved to stay within the limits.
 
@@ -240,7 +226,7 @@ def _suspect(data: Float, m: int, m4: float, count: int, work: Float, k: int) ->
     return k
 
 
-@_compile
+@compiled
 def _crossing(
     data: Float, m: int, k: int, m4: float, target: float, sign: float, work: Float
 ) -> float:
@@ -288,7 +274,7 @@ def _crossing(
     return -1.0
 
 
-@_compile
+@compiled
 def _newton(data: Float, m: int, o: int, target: float, sign: float, work: Float) -> float:
     """Root in the interval at o, where it rises: the cubic's, then the Taylor polynomial's."""
     o &= 0xFFFF
@@ -318,7 +304,7 @@ def _newton(data: Float, m: int, o: int, target: float, sign: float, work: Float
     return float(t)
 
 
-@_compile
+@compiled
 def advance(
     tables: ModalTables,
     x: Float,
