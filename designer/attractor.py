@@ -65,7 +65,8 @@ def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
         start=x,
         mode=mode or (),
         lyapunov=exponent,
-        reason=f"no period up to {MAX_PERIOD} and no chaos after {spent} drive periods",
+        reason=f"no period up to {MAX_PERIOD} and no chaos after {spent} drive periods: "
+        "quasi-periodic, of a longer period, or very slow",
         periods=spent,
     )
 

@@ -227,8 +227,12 @@ class Folder:
         manifest = self.manifest
         assert manifest is not None
         for name, (owner, _) in list(manifest.files.items()):
-            if owner == stage:
+            if owner != stage:
+                continue
+            if (self / name).exists():
                 manifest.files[name] = (owner, file_hash(name, (self / name).read_bytes()))
+            else:  # planned and not needed: a study of no response has no samples
+                del manifest.files[name]
         manifest.stages[stage].complete = True
         gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
         for name in gone:

@@ -24,7 +24,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.responses import ModelResponse, circuit_flow, find, on_circuit, peaks
 from designer.spread import Spread
-from designer.synthesis import Design, synthesise
+from designer.synthesis import Design, check_choices, synthesise
 from designer.system import Array, Drive
 from designer.workers import SpicePool
 
@@ -88,6 +88,7 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     ------
     InputError, Unreachable : see ``responses.find`` and ``synthesis.synthesise``.
     """
+    check_choices(modelfile.model, modelfile.circuit, catalog)
     found = find(modelfile.model, modelfile.responses)
     return found, synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found)

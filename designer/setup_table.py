@@ -21,7 +21,7 @@ COLUMNS = (
     "start",
 )
 LOAD = "high-Z"
-START = "any; how to reach it from power-up is not yet studied"
+START = "from the nominal orbit; how to reach it from power-up is not yet studied"
 STATES = ("x1", "x1'", "x2", "x2'")
 
 
@@ -56,9 +56,9 @@ def setup_csv(design: Design, found: Sequence[ModelResponse]) -> str:
             "amplitude_vpp": repr(2.0 * s.amplitude_v_peak),
             "offset_v": repr(s.offset_v),
             "load": LOAD,
-            "start": START,
+            "start": START + _coexisting(r),
         }
-        for s in settings(design, found)
+        for s, r in zip(settings(design, found), found, strict=True)
     ]
     return csv_text(COLUMNS, rows)
 
@@ -105,3 +105,9 @@ def _amplitudes(
         name = f"metres per volt of {s}" if i % 2 == 0 else f"metres per second per volt of {s}"
         rows.append((name, (speed if i % 2 else length) / v, "m/s/V" if i % 2 else "m/V", b))
     return [*rows, ("newtons per generator volt", gain * mechanical.force_scale, "N/V", b)]
+
+
+def _coexisting(response: ModelResponse) -> str:
+    """What else a start may end on."""
+    others = ", ".join(o.response for o in response.others)
+    return f"; a start may also end on {others}" if others else ""

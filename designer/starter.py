@@ -30,10 +30,14 @@ expect = "1-1-1"
 [[response]]
 omega = 0.85
 expect = "1-2-2"
+# symmetric = true              # only a symmetric orbit (false: only an asymmetric one) will do
+# twin = "exact"                # 1-1-2 only, not its mirror twin 1-2-1
+# b = 0.3                       # at a clearance of its own
 
 [circuit]
 opamp = "TL074C"                # `designer catalog` lists what there is
 supply = 15.0                   # V, both rails
+saturation = 13.0               # V; without it the catalogue's figure for the op-amp
 resistors = "E96"               # a series, or several: ["E24", "E96"]
 capacitors = "E12"
 resistor_grade = 0.01           # 1 %
@@ -41,4 +45,8 @@ capacitor_grade = 0.01
 resistor_range = ["1k", "1M"]
 capacitor_range = ["1nF", "1µF"]
 frequency = [50, 1000]          # Hz, where omega = 1 may lie
+dead_zone = "saturation"        # the stage that makes the clearance
+objective = "match"
+composites = false              # no resistors in series or parallel
+side_conditions = true          # swing, load, signal levels; false: the match alone
 """

@@ -104,7 +104,7 @@ def tolerance(
         steps += min(samples, montecarlo.NGSPICE_SAMPLES) * sum(
             q.settings is not None for q in plan.questions
         )
-    step = said.stage(f"tolerance study, {samples} samples of {len(asked)} responses", steps)
+    step = said.stage(f"tolerance study, {samples} boards, responses: {len(asked)}", steps)
     for block in plan.blocks() if asked else ():
         known = None if blocks is None else blocks.read(block)
         if known is None:

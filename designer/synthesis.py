@@ -112,7 +112,7 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
     Unreachable : no choice of parts meets the conditions; names the one that binds.
     """
     began = time.perf_counter()
-    _check(model, spec)
+    check_choices(model, spec, catalog)
     opamp = catalog.opamp(spec.opamp)
     saturation = spec.saturation or opamp.saturation_at(spec.supply)
     resistors = catalog.values(
@@ -158,8 +158,14 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
     )
 
 
-def _check(model: Dimensionless, spec: CircuitSpec) -> None:
-    """What this version builds; the rest of the contract is refused, not half done."""
+def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> None:
+    """Refuse what cannot be built before anything is computed.
+
+    Raises
+    ------
+    InputError : an unknown op-amp, or a choice of the contract that this version does not build.
+    """
+    catalog.opamp(spec.opamp)
     refusals = {
         "circuit.dead_zone": (spec.dead_zone != "saturation", spec.dead_zone, '"saturation"'),
         "circuit.objective": (spec.objective != "match", spec.objective, '"match"'),

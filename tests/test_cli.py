@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -556,3 +557,19 @@ def test_ctrl_c_is_exit_130(home: Path) -> None:
     assert "--resume" in stderr
     assert _strict((out / "manifest.json").read_text())["complete"] is False
     assert not list(out.rglob("*.part"))
+
+
+def test_a_response_that_the_model_does_not_show_ends_the_folder_properly(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """No response can be studied: no samples, yet a finished folder, an answer, status 1."""
+    model = tmp_path / "wrong.toml"
+    text = Path(_model(tmp_path)).read_text(encoding="utf-8")
+    model.write_text(re.sub(r'expect = "[^"]*"', 'expect = "1-5-5"', text), encoding="utf-8")
+    arguments = ["run", str(model), "--out", str(tmp_path / "out"), "--samples", "3", "--json"]
+    assert cli.status(arguments) == 1
+    (response,) = _strict(capfd.readouterr().out)["responses"]
+    assert response["expected"] == "1-5-5"
+    assert response["yield"] is None
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["complete"] is True
+    assert cli.status(arguments) == 1  # reused, not refused
