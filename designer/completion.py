@@ -15,6 +15,9 @@ import numpy as np
 from designer.linear_block import RatioTable, Targets, window
 from designer.system import Array, Index, Mask
 
+MOST_GROUPS = 10_000
+"""Groups that are completed: each is joined with every resistor, so memory follows."""
+
 
 @dataclass(frozen=True)
 class Bounds:
@@ -59,14 +62,21 @@ class Side:
         return Side(**columns, whole=self.whole)
 
 
-def groups_of(table: RatioTable, c: Array, bounds: Bounds) -> tuple[RatioTable, Array, Array]:
-    """Rows of the table with every pair of capacitors that has their ratio and is in the band."""
+def groups_of(table: RatioTable, c: Array, bounds: Bounds) -> tuple[RatioTable, Array, Array, bool]:
+    """Rows of the table with every pair of capacitors that has their ratio and is in the band.
+
+    At most ``MOST_GROUPS``, those of least error; the last entry says whether that is all.
+    """
+    whole = len(table) * len(c) <= 50 * MOST_GROUPS
+    table = table.take(np.arange(min(len(table), 50 * MOST_GROUPS // len(c))))
     row, pick = (a.ravel() for a in np.meshgrid(np.arange(len(table)), np.arange(len(c))))
     c4 = c[pick] + table.delta[row]
     sold = np.isin(np.round(c4, 9), np.round(c, 9))
     seconds = np.exp(table.alpha[row] + c[pick])
     good = sold & (seconds >= bounds.seconds[0]) & (seconds <= bounds.seconds[1])
-    return table.take(row[good]), np.asarray(c[pick[good]]), c4[good]
+    keep = np.sort(np.flatnonzero(good)[np.argsort(row[good], kind="stable")[:MOST_GROUPS]])
+    whole = whole and len(keep) == int(good.sum())
+    return table.take(row[keep]), np.asarray(c[pick[keep]]), c4[keep], whole
 
 
 def sides_of(

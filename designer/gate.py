@@ -18,7 +18,7 @@ from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
-from designer.orbit import Orbit, OrbitStatus
+from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.system import Array, Drive, PiecewiseLinearSystem
 from designer.waveform_orbit import Read, Reading, read
@@ -81,9 +81,11 @@ class Subject:
 
 
 def job(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> SpiceJob[Read]:
-    """The run of one subject: ``DISCARD`` periods and at least 4n (six or more) to judge."""
-    n = max(subject.orbit.n, 1)
-    periods = DISCARD + max(4 * n, 6)
+    """The run of one subject: ``DISCARD`` periods and at least 4n (six or more) to judge.
+
+    Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
+    """
+    periods = DISCARD + max(4 * (subject.orbit.n or MAX_PERIOD), 6)
     stop = periods * subject.period
     upper, lower = contact_rows(subject.system)
     reading = Reading(

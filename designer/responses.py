@@ -16,6 +16,12 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.synthesis import Design, Peaks
 from designer.system import Array, Drive, PiecewiseLinearSystem
 
+SLOWEST, FASTEST = 1e-3, 1e3
+"""Dimensionless drive frequencies: slower, one period has too many steps to wait for."""
+ANSWERS = frozenset(
+    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
+)
+"""Statuses that answer the question where no response was wanted."""
 STARTS = 16
 """Initial states tried for each response: rest and a Sobol set."""
 SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
@@ -67,15 +73,22 @@ def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelRespons
                 list(spec.b),
                 "a number: this version does not choose",
             )
+        check_omega(f"response[{number}].omega", spec.omega)
         b = model.b if spec.b is None else spec.b
         out.append(_find_one(replace(model, b=b), spec, b))
     return tuple(out)
 
 
+def check_omega(name: str, omega: float, file: str | None = None) -> None:
+    """Raises InputError for a frequency outside ``SLOWEST`` to ``FASTEST``."""
+    if not SLOWEST <= omega <= FASTEST:
+        raise InputError(file, name, omega, f"a number from {SLOWEST:g} to {FASTEST:g}")
+
+
 def matches(orbit: Orbit, spec: Response) -> bool:
-    """Whether an orbit is the one wanted."""
+    """Whether an orbit is the one wanted; anything that is an answer, where nothing is."""
     if orbit.status is not OrbitStatus.PERIODIC:
-        return spec.expect is None and spec.symmetric is None
+        return spec.expect is None and spec.symmetric is None and orbit.status in ANSWERS
     if not spec.accepts(orbit.n, orbit.p, orbit.q):
         return False
     return spec.symmetric is None or orbit.symmetric is spec.symmetric

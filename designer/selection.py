@@ -101,12 +101,12 @@ def select(
     """
     r: Array = np.log(resistors)
     c: Array = np.log(capacitors)
-    groups, c2, c4 = groups_of(table, c, bounds)
+    groups, c2, c4, all_of_them = groups_of(table, c, bounds)
     if len(groups) == 0:
-        return Shortfall("frequency", table.complete)
+        return Shortfall("frequency", table.complete and all_of_them)
     first, second = sides_of(groups, c2, c4, r, c, t, bounds, level)
     both = np.intersect1d(first.group, second.group)
-    whole = table.complete and first.whole and second.whole
+    whole = table.complete and all_of_them and first.whole and second.whole
     if len(both) == 0:
         return Shortfall("displacement integrators", whole)
     own = np.stack([groups.r2, groups.r3, groups.r8, groups.r9, c2, c4], axis=1)

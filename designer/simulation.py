@@ -16,7 +16,6 @@ from designer import attractor, gate, pipeline, waveform_orbit
 from designer.api import Synthesis, synthesise
 from designer.attractor import coexisting, settle, starts
 from designer.deck import Excitation
-from designer.errors import InputError
 from designer.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.model import Dimensionless
 from designer.modelfile import ModelFile, Response
@@ -25,22 +24,24 @@ from designer.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.pipeline import TRACE_POINTS, Checked, Trace
 from designer.preconditions import cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
-from designer.responses import STARTS, ModelResponse, circuit_flow, find, scale_of
+from designer.responses import (
+    STARTS,
+    ModelResponse,
+    check_omega,
+    circuit_flow,
+    find,
+    matches,
+    scale_of,
+)
 from designer.system import Array, Drive
 from designer.workers import SpicePool
 
 Engine = Literal["model", "circuit", "ngspice"]
 ENGINES: tuple[Engine, ...] = ("model", "circuit", "ngspice")
-SLOWEST, FASTEST = 1e-3, 1e3
-"""Drive frequencies that ``simulate`` takes: slower, one period has too many steps to wait for."""
 NEAR_TWIN = 0.02
 """Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
 SHOWN_PERIODS = 30
 """Drive periods of a trace of a response without a period."""
-ANSWERS = frozenset(
-    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
-)
-"""Statuses that answer the question where no response was wanted."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +94,14 @@ def simulate(
     """
     said = Progress() if progress is None else progress
     for omega in omegas:
-        _check_omega(None, "--omega", omega)
+        check_omega("--omega", omega)
     if not omegas and not modelfile.responses:
         need_responses(modelfile, " (or --omega)")
     specs = [Response(float(w)) for w in omegas] or list(modelfile.responses)
     file = str(modelfile.source) if modelfile.source else None
     for number, spec in enumerate(specs, start=1):
         if spec.omega is not None:
-            _check_omega(file, f"response[{number}].omega", spec.omega)
+            check_omega(f"response[{number}].omega", spec.omega, file)
     if engine == "model":
         step = said.stage("responses of the model", len(specs))
         return tuple(
@@ -146,11 +147,6 @@ def engine_settings(engine: Engine) -> dict[str, Any]:
 # ---------------------------------------------------------------------------------------------
 
 
-def _check_omega(file: str | None, name: str, omega: float) -> None:
-    if not SLOWEST <= omega <= FASTEST:
-        raise InputError(file, name, omega, f"a number from {SLOWEST:g} to {FASTEST:g}")
-
-
 def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated:
     began = time.perf_counter()
     result = work()
@@ -168,7 +164,7 @@ def _on_model(modelfile: ModelFile, spec: Response, traces: bool) -> Simulated:
     return Simulated(
         r.omega,
         r.expected,
-        r.found and _is(r, orbits[0]),
+        r.found and matches(orbits[0], r.spec),
         orbits[0],
         tuple(orbits[1:]),
         0.0,
@@ -259,7 +255,7 @@ def _on_circuit(made: Synthesis, spec: Response, scan: bool, traces: bool) -> Si
     return Simulated(
         r.omega,
         r.expected,
-        _is(r, orbits[0]),
+        matches(orbits[0], r.spec),
         shown[0],
         tuple(shown[i] for i in kept[1:]),
         0.0,
@@ -306,7 +302,7 @@ def _in_ngspice(
             Simulated(
                 r.omega,
                 r.expected,
-                _is(r, heard[0]),
+                matches(heard[0], r.spec),
                 shown[0],
                 tuple(shown[i] for i in _distinct(shown)[1:]),
                 seconds,
@@ -333,15 +329,6 @@ def _spice_traces(result: gate.GateResult, volts: Array, seconds: float) -> tupl
         return ()
     time_, states = result.read.trace
     return (Trace(time_ / seconds, states / volts),)
-
-
-def _is(r: ModelResponse, orbit: Orbit) -> bool:
-    """Whether an engine shows what is wanted; anything that is an answer, where nothing is."""
-    if orbit.status is not OrbitStatus.PERIODIC:
-        nothing = r.spec.expect is None and r.spec.symmetric is None
-        return nothing and orbit.status in ANSWERS
-    symmetric = r.spec.symmetric is None or orbit.symmetric is r.spec.symmetric
-    return symmetric and r.spec.accepts(orbit.n, orbit.p, orbit.q)
 
 
 def _distinct(orbits: Sequence[Orbit]) -> list[int]:

@@ -58,6 +58,7 @@ def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
     limits = circuit.saturation * (
         1.0 + spread.saturation * rng.uniform(-1.0, 1.0, size=(len(names), 2))
     )
+    limits = np.minimum(limits, circuit.supply)  # no output passes its rail
     return Board(
         values=values,
         offset=dict(zip(names, (float(v) for v in offsets), strict=True)),

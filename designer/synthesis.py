@@ -38,14 +38,20 @@ LEAST_GAIN = 1.25
 """Of the saturating path, so that it does saturate where the clearance is never closed."""
 GENERATOR_PEAK = 5.0
 """Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
+MOST_CUT = 4
+"""Levels whose tables had to be cut, one after the other, before the search gives up."""
+LEAST_SIGNAL = 10.0
+"""Peak of x1 over the op-amp's largest offset: below it a circuit shows offsets, not dynamics."""
 PROOF_TOLERANCE = 1e-6
 FREES = {
     "frequency": "widen circuit.frequency or circuit.capacitor_range",
     "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
     "signal resistors": "widen circuit.resistor_range, or set circuit.side_conditions = false",
     "coefficients": "add a series to circuit.resistors or circuit.capacitors, or widen the ranges",
-    "stop slope": "widen circuit.resistor_range downwards: R50 is the stop's stiffness",
-    "dead-zone null": "add a series to circuit.resistors",
+    "stop slope": "widen circuit.resistor_range (R50 is the stop) or take a finer series",
+    "stop stiffness": "a smaller model.k0 or a wider circuit.resistor_range: R4 is too small",
+    "dead-zone null": "a finer series, or a larger model.b: the threshold may be too small a part "
+    "of the swing for the gain of the saturating path",
 }
 
 
@@ -147,6 +153,8 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
     values |= _drive(model, errors, values, resistors)
     circuit = _build(model, values, opamp, spec, saturation)
     errors = _errors(circuit, model, swing, peaks)
+    if spec.side_conditions:
+        _check_signal(errors, peaks, opamp)
     return Design(
         model=model,
         circuit=circuit,
@@ -165,7 +173,15 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
     ------
     InputError : an unknown op-amp, or a choice of the contract that this version does not build.
     """
-    catalog.opamp(spec.opamp)
+    opamp = catalog.opamp(spec.opamp)
+    low, high = opamp.supply.min or 0.0, opamp.supply.max or np.inf
+    if not low <= spec.supply <= high:
+        raise InputError(
+            None, "circuit.supply", spec.supply, f"{low:g} to {high:g} V, the rails of {opamp.name}"
+        )
+    limit = spec.saturation or opamp.saturation_at(spec.supply)
+    if not 0.0 < limit <= spec.supply:
+        raise InputError(None, "circuit.saturation", limit, f"above 0 and up to {spec.supply:g} V")
     refusals = {
         "circuit.dead_zone": (spec.dead_zone != "saturation", spec.dead_zone, '"saturation"'),
         "circuit.objective": (spec.objective != "match", spec.objective, '"match"'),
@@ -179,6 +195,18 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
     for name, (wrong, found, expected) in refusals.items():
         if wrong:
             raise InputError(None, name, found, f"{expected} (all that this version builds)")
+
+
+def _check_signal(errors: CoefficientErrors, peaks: Peaks, opamp: OpAmp) -> None:
+    """Refuse a circuit whose displacement is as small as an op-amp's offset."""
+    volts = float(errors.scales.volts[0] * peaks.states[0])
+    if volts < LEAST_SIGNAL * opamp.offset_limit:
+        raise Unreachable(
+            None,
+            "model.b",
+            f"a peak of x1 of {volts:.2g} V beside offsets up to {opamp.offset_limit:g} V",
+            "a clearance that is reached, a larger circuit.saturation, or a better op-amp",
+        )
 
 
 def _bounds(model: Dimensionless, spec: CircuitSpec, peaks: Peaks, resistors: Array) -> Bounds:
@@ -215,8 +243,15 @@ def _linear(
     if spec.side_conditions:
         signal = resistors[(resistors >= SIGNAL[0]) & (resistors <= SIGNAL[1])]
     binding = "signal resistors"
-    level, lowest = FIRST_LEVEL, 0.0
-    while level < LAST_LEVEL and len(signal):
+    if len(signal) and bounds.stop > signal[-1]:
+        raise Unreachable(
+            None,
+            "circuit",
+            "no choice of parts; what binds: stop stiffness",
+            FREES["stop stiffness"],
+        )
+    level, lowest, cut = FIRST_LEVEL, 0.0, 0
+    while cut < MOST_CUT and level < LAST_LEVEL and len(signal):
         searched = True
         table = ratio_table(signal, capacitors, targets, level, bounds.p_range)
         if len(table):
@@ -229,6 +264,7 @@ def _linear(
             binding = "coefficients"
         if table.complete and searched:
             lowest = level
+        cut += not (table.complete and searched)
         level = _next(level)
     raise Unreachable(
         None,
@@ -363,7 +399,7 @@ def _nearest(values: Array, wanted: float) -> float:
 def _certificate(reached: float, bound: float, chosen: Selection, proved: bool) -> Certificate:
     join = (
         "empty join of the scale-free combinations of the coefficient errors below the bound, "
-        "every value of the catalogue considered"
+        "every value of the chosen series in the ranges of the conditions considered"
     )
     if proved and reached <= bound + PROOF_TOLERANCE:
         return Certificate("optimal", bound, f"{join}; completed by {chosen.solver}")
@@ -376,6 +412,7 @@ def _conditions(spec: CircuitSpec, bounds: Bounds, swing: float) -> dict[str, fl
         "frequency_high_hz": spec.frequency[1],
         "swing_v": swing,
         "generator_peak_v": GENERATOR_PEAK,
+        "stop_resistor_r4_low_ohm": float(bounds.stop),
     }
     if spec.side_conditions:
         kept |= {
@@ -384,6 +421,5 @@ def _conditions(spec: CircuitSpec, bounds: Bounds, swing: float) -> dict[str, fl
             "load_ohm": LOAD,
             "signal_resistor_low_ohm": SIGNAL[0],
             "signal_resistor_high_ohm": SIGNAL[1],
-            "stop_resistor_r4_low_ohm": float(bounds.stop),
         }
     return kept

@@ -70,10 +70,11 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
     peak = np.maximum(np.abs(y).max(axis=0), 1e-12)
     n = _period(strobes, peak)
     if n == 0:
-        enough = len(strobes) > 4
-        status = OrbitStatus.APERIODIC if enough else OrbitStatus.NOT_SETTLED
+        tried = (len(strobes) - 1) // 4
+        status = OrbitStatus.APERIODIC if tried >= MAX_PERIOD else OrbitStatus.NOT_SETTLED
+        reason = f"no period up to {min(tried, MAX_PERIOD)} in {len(strobes)} strobes"
         return Read(
-            Orbit(status, start=strobes[-1], periods=last, reason="no period in the strobes"),
+            Orbit(status, start=strobes[-1], periods=last, reason=reason),
             strobes,
             _tail(t, y, marks, reading, len(strobes) - 1),
         )

@@ -20,6 +20,7 @@ from designer.attractor import (
     starts,
     twin,
 )
+from designer.errors import InputError
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.modelfile import Expect, Response
@@ -371,3 +372,10 @@ def test_an_orbit_is_a_fixed_point_whatever_the_start(omega: float, seed: int) -
     for divisor in (d for d in range(1, orbit.n) if orbit.n % d == 0):
         gap = np.abs(flow.run(orbit.start, divisor).strobes[-1] - orbit.start)
         assert (gap > 1e-8 * peak).any(), "n is the least period"
+
+
+@pytest.mark.parametrize("omega", [1e-5, 1e4])
+def test_frequencies_beyond_the_engine_are_refused_by_every_verb(omega: float) -> None:
+    model = Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25)
+    with pytest.raises(InputError, match="omega"):
+        find(model, [Response(omega=omega)])

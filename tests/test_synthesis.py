@@ -15,6 +15,7 @@ from designer.errors import InputError, Unreachable
 from designer.model import Dimensionless
 from designer.modelfile import CircuitSpec, Response, read_model_file
 from designer.responses import find, peaks
+from designer.spread import Spread, draw
 from designer.synthesis import LOAD, SIGNAL, Design, Peaks, synthesise
 from tests.oracles import Plain, coefficient_error
 
@@ -253,3 +254,34 @@ def test_fewer_conditions_reach_at_least_as_much(
     without = CircuitSpec(resistors=(series,), side_conditions=False)
     bare = synthesise(model, without, CATALOG, held)
     assert bare.errors.max_error <= with_them.errors.max_error + 1e-9
+
+
+@pytest.mark.parametrize("supply", [100.0, 2.0])
+def test_rails_that_the_op_amp_does_not_stand_are_refused(supply: float) -> None:
+    with pytest.raises(InputError, match="supply"):
+        synthesise(PAPER, CircuitSpec(supply=supply), CATALOG, PAPER_PEAKS)
+
+
+def test_a_stop_that_no_resistor_makes_is_refused_at_once() -> None:
+    stiff = replace(PAPER, k0=0.9999)
+    with pytest.raises(Unreachable, match="stop stiffness"):
+        synthesise(stiff, CircuitSpec(), CATALOG, PAPER_PEAKS)
+
+
+def test_a_signal_as_small_as_the_offset_is_refused() -> None:
+    wide = replace(PAPER, b=1e6)
+    with pytest.raises(Unreachable, match=r"model\.b"):
+        synthesise(wide, CircuitSpec(), CATALOG, PAPER_PEAKS)
+
+
+def test_no_drawn_output_passes_its_rail() -> None:
+    """OPA4192 is rail to rail: 5 % above its saturation would be beyond the supply."""
+    spec = CircuitSpec(opamp="OPA4192", supply=15.0)
+    design = synthesise(PAPER, spec, CATALOG, PAPER_PEAKS)
+    spread = Spread.bench_1(CATALOG.opamp("OPA4192"), 0.01, 0.01)
+    rails = [draw(design.circuit, spread, 1, i).rails.values() for i in range(20)]
+    assert max(high for board in rails for _, high in board) <= 15.0
+
+
+PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
+PAPER_PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), 0.202)

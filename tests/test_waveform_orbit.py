@@ -113,7 +113,7 @@ def test_a_period_two_orbit_is_not_period_one_or_four() -> None:
 def test_chaos_is_aperiodic() -> None:
     flow = flow_at(1.2)
     x = flow.run(np.zeros(4), 200).strobes[-1]
-    got = read(waveforms(flow, x, 40), reading_of(1.2)).orbit
+    got = read(waveforms(flow, x, 70), reading_of(1.2)).orbit
     assert got.status is OrbitStatus.APERIODIC
     assert got.n == 0
     assert got.reason
