@@ -20,6 +20,9 @@ Complex = NDArray[np.complex128]
 STEP = 0.4
 """h · max(|lambda|, omega): longer steps fail the proof more often."""
 WORST_CONDITION = 1e4
+WORST_RESONANCE = 1e5
+"""Of the equations of the forced motion: near an undamped resonance that motion is huge, and the
+state is its small difference from the homogeneous one."""
 TURNS = np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0.0, np.pi, 8, endpoint=False)])
 
 
@@ -234,11 +237,11 @@ def _left_vector(A: Array, p: float, q: float) -> Array:
 
 
 def _forced(mode: Mode, drive: Drive) -> Array | None:
-    """(4, 3) particular solution over (sin, cos, 1), or None at an undamped resonance."""
+    """(4, 3) particular solution over (sin, cos, 1), or None near an undamped resonance."""
     w = drive.omega
     B = drive.amplitude * mode.B
     M = mode.A @ mode.A + w * w * np.eye(4)
-    if np.linalg.cond(M) > 1e12 or np.linalg.cond(mode.A) > 1e12:
+    if max(np.linalg.cond(M), np.linalg.cond(mode.A)) > WORST_RESONANCE:
         return None
     Q = np.linalg.solve(M, -w * B)
     P = mode.A @ Q / w

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -379,3 +381,19 @@ def test_frequencies_beyond_the_engine_are_refused_by_every_verb(omega: float) -
     model = Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25)
     with pytest.raises(InputError, match="omega"):
         find(model, [Response(omega=omega)])
+
+
+def test_the_exponent_is_the_divergence_of_two_trajectories() -> None:
+    """Benettin's method: a second trajectory 1e-7 away, brought back every period."""
+    flow = flow_at(1.2)
+    x = flow.run(REST, 300).strobes[-1]
+    exponent, _, _ = lyapunov(flow, x, None, 4000)
+    gap, grown, periods = 1e-7, 0.0, 4000
+    away = x + gap * np.array([1.0, 0.0, 0.0, 0.0])
+    for period in range(periods + 50):
+        x, away = flow.run(x, 1).strobes[-1], flow.run(away, 1).strobes[-1]
+        distance = float(np.linalg.norm(away - x))
+        if period >= 50:
+            grown += math.log(distance / gap)
+        away = x + (away - x) * (gap / distance)
+    assert exponent == pytest.approx(grown / (periods * flow.drive.period), rel=0.05)
