@@ -10,6 +10,7 @@ on other attractors.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import qmc
@@ -52,7 +53,7 @@ def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
         found, cost = _polish(flow, run)
         spent += cost
         if found is not None:
-            return _with_cost(found, spent)
+            return replace(found, periods=spent)
         if stage >= 3:
             exponent, x, mode = lyapunov(flow, x, mode, 300)
             spent += 300
@@ -320,8 +321,3 @@ def _closes_in(
     before = float((np.abs(run.strobes[-1] - x) / peak).max())
     after = float((np.abs(later.strobes[-1] - x) / peak).max())
     return after <= max(10.0 * factor * before, STROBE_TOLERANCE)
-
-
-def _with_cost(orbit: Orbit, periods: int) -> Orbit:
-    values = {**orbit.__dict__, "periods": periods}
-    return Orbit(**values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from designer import deck, matching, topology
@@ -81,8 +82,8 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             saturation=float(said["circuit"]["saturation"]),
             clearance="A" if model.k0 > 0.0 else None,
         )
-        changes = {k: float(said["circuit"][k]) for k in ("gain", "bias")}
-        circuit = circuit.__class__(**{**circuit.__dict__, **changes})
+        gain, bias = (float(said["circuit"][k]) for k in ("gain", "bias"))
+        circuit = replace(circuit, gain=gain, bias=bias)
         swing = (SWING_SHARE * circuit.saturation, peaks(model, found).states)
         errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
         if abs(errors.max_error - float(said["max_error"])) > 1e-9:

@@ -7,7 +7,7 @@ prints; ``designer.folder`` and the command line do.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from designer.workers import SpicePool
 
 TRACE_POINTS = 1024
 """Points of a drawn orbit per drive period."""
+SHOWN_PERIODS = 30
+"""Drive periods of a trace of a response without a period."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +141,8 @@ def plan_study(
 ) -> StudyPlan:
     """The Monte Carlo study of these responses under ``bench-1``.
 
-    Responses that the nominal circuit does not show periodically are left out: there is no
-    nominal orbit to start from.
+    Every one of ``checked`` is a question; who calls leaves out what the nominal circuit does not
+    show periodically (``study.tolerance``), since there is no nominal orbit to start from.
     """
     spec = modelfile.circuit
     return StudyPlan(
@@ -170,11 +172,11 @@ def traces(design: Design, checked: Checked) -> dict[str, Trace]:
     out: dict[str, Trace] = {}
     b = checked.model.b
     volts, seconds = design.volts(b), design.errors.scales.seconds
-    model = design.model.__class__(**{**design.model.__dict__, "b": b})
+    model = replace(design.model, b=b)
     flow = Flow(model.second_order().piecewise_linear(), Drive(checked.model.omega))
-    out["model"] = _trace(flow, checked.model.orbit, np.ones(4), 1.0)
+    out["model"] = trace_of(flow, checked.model.orbit, np.ones(4), 1.0)
     circuit = circuit_flow(nominal_reduction(design).system(), design, checked.model)
-    out["circuit"] = _trace(circuit, checked.circuit, volts, seconds)
+    out["circuit"] = trace_of(circuit, checked.circuit, volts, seconds)
     read = checked.gate.read if checked.gate is not None else None
     if read is not None and not isinstance(read, SimulationFailed) and read.trace is not None:
         time, states = read.trace
@@ -182,9 +184,10 @@ def traces(design: Design, checked: Checked) -> dict[str, Trace]:
     return out
 
 
-def _trace(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
-    periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else 30
+def trace_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
+    """An orbit over its n periods in model units; from rest where it has no start."""
+    periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
     start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
-    run = flow.run(start, periods, points=TRACE_POINTS)
+    run = flow.run(start, periods, mode=orbit.mode or None, points=TRACE_POINTS)
     time = np.arange(len(run.strobes)) * flow.drive.period / TRACE_POINTS
     return Trace(time / seconds, run.strobes / volts)

@@ -9,6 +9,7 @@ computed afresh.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cvxpy as cp
 import numpy as np
@@ -43,6 +44,14 @@ class Selection:
     error: float
     complete: bool
     solver: str
+
+
+class Choice(NamedTuple):
+    """Row of the first and of the second side, and the solver's word for it."""
+
+    first: int
+    second: int
+    status: str
 
 
 @dataclass(frozen=True)
@@ -116,27 +125,29 @@ def select(
     found = _least_error(pool, t, bounds, level)
     if found is None:
         return Shortfall("displacement integrators", whole and pool.rows <= LARGEST)
-    pool, chosen, complete = found[0], found[1], whole and found[0] is pool
-    error = _error(pool.values(*chosen), t)
+    complete = whole and found[0] is pool and found[1].status == cp.OPTIMAL
+    pool, chosen = found
+    logs = pool.values(chosen.first, chosen.second)
+    error = _error(logs, t)
     if error > level * (1.0 + 1e-6) + 1e-9:
         return Shortfall("coefficients", False)
     few = _promising(pool)
     cost = dict(zip(np.round(c, 9).tolist(), prices.tolist(), strict=True))
     again = _solve(few, t, bounds, error + 1e-9, cost)
-    logs = pool.values(*chosen)
-    if again is not None and _error(few.values(*again), t) <= error + 2e-9:
-        logs = few.values(*again)
+    if again is not None:
+        fewer = few.values(again.first, again.second)
+        logs = fewer if _error(fewer, t) <= error + 2e-9 else logs
     return Selection(
         values={name: float(np.exp(v)) for name, v in logs.items()},
         error=_error(logs, t),
         complete=complete,
-        solver="HiGHS: optimal",
+        solver=f"HiGHS: {chosen.status}",
     )
 
 
 def _least_error(
     pool: Pool, t: Targets, bounds: Bounds, level: float
-) -> tuple[Pool, tuple[int, int]] | None:
+) -> tuple[Pool, Choice] | None:
     """The pool that the program was given, and its rows of least error.
 
     A pool that is too large is cut to the rows with the fewest kinds; where none of them will do,
@@ -180,8 +191,8 @@ def _error(logs: dict[str, float], t: Targets) -> float:
 
 def _solve(
     pool: Pool, t: Targets, bounds: Bounds, level: float, cost: dict[float, float] | None
-) -> tuple[int, int] | None:
-    """Rows (i, j) of least error, or with ``cost`` of fewest kinds and least price; or None."""
+) -> Choice | None:
+    """Rows of least error, or with ``cost`` of fewest kinds and least price; or None."""
     first, second, own = pool.first, pool.second, pool.own
     z1 = cp.Variable(len(first), boolean=True)
     z2 = cp.Variable(len(second), boolean=True)
@@ -221,7 +232,7 @@ def _solve(
     for z in (z1, z2):
         if z.value is None or abs(z.value.sum() - 1.0) > 1e-6 or abs(z.value.max() - 1.0) > 1e-6:
             return None
-    return int(np.argmax(z1.value)), int(np.argmax(z2.value))
+    return Choice(int(np.argmax(z1.value)), int(np.argmax(z2.value)), str(problem.status))
 
 
 _PARTS = ("R1", "R2", "R3", "R4", "R5", "R7", "R8", "R9", "R10", "R11", "C1", "C2", "C3", "C4")

@@ -21,7 +21,7 @@ from designer.model import Dimensionless
 from designer.modelfile import ModelFile, Response
 from designer.ngspice import SimulationFailed
 from designer.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
-from designer.pipeline import TRACE_POINTS, Checked, Trace
+from designer.pipeline import Checked, Trace, trace_of
 from designer.preconditions import cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.responses import (
@@ -40,8 +40,6 @@ Engine = Literal["model", "circuit", "ngspice"]
 ENGINES: tuple[Engine, ...] = ("model", "circuit", "ngspice")
 NEAR_TWIN = 0.02
 """Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
-SHOWN_PERIODS = 30
-"""Drive periods of a trace of a response without a period."""
 
 
 @dataclass(frozen=True)
@@ -218,15 +216,11 @@ def _traces(
     flow: Flow, orbits: Sequence[Orbit | None], volts: Array, seconds: float
 ) -> tuple[Trace, ...]:
     """Traces of the orbits in model units; none of what has no start."""
-    out = []
-    for orbit in orbits:
-        if orbit is None or not len(orbit.start):
-            continue
-        periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
-        run_ = flow.run(orbit.start, periods, mode=orbit.mode or None, points=TRACE_POINTS)
-        time_ = np.arange(len(run_.strobes)) * flow.drive.period / TRACE_POINTS
-        out.append(Trace(time_ / seconds, run_.strobes / volts))
-    return tuple(out)
+    return tuple(
+        trace_of(flow, orbit, volts, seconds)
+        for orbit in orbits
+        if orbit is not None and len(orbit.start)
+    )
 
 
 def _circuit_orbits(

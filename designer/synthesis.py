@@ -8,7 +8,7 @@ values among its best. The finished circuit is then reduced and its error comput
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -143,7 +143,8 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
         for name in topology.inverter_resistors(state):
             values[name] = base
     solver = {"linear block": chosen.solver}
-    values |= _drive_placeholder(model, resistors)
+    # R6 and R12 do not enter the coefficients; ``_drive`` sizes them afterwards.
+    values |= dict.fromkeys(("R6", "R12"), float(resistors[-1]))
     if model.k0 > 0.0:
         zone = _dead_zone(model, opamp, saturation, swing, peaks, resistors, base, values, spec)
         values |= zone.values
@@ -301,7 +302,7 @@ def _dead_zone(
     spec: CircuitSpec,
 ) -> dead_zone.DeadZone:
     """Size the stage for the scales of the linear block alone."""
-    linear = Dimensionless(**{**model.__dict__, "k0": 0.0})
+    linear = replace(model, k0=0.0)
     errors = coefficient_errors(
         _build(linear, values, opamp, spec, saturation), linear.second_order()
     )
@@ -352,11 +353,6 @@ def _errors(
     return coefficient_errors(
         circuit, model.second_order(), swing=None if circuit.stops else (swing, peaks.states)
     )
-
-
-def _drive_placeholder(model: Dimensionless, resistors: Array) -> dict[str, float]:
-    """R6 and R12 before their size is known; they do not enter the coefficients."""
-    return {"R6": float(resistors[-1]), "R12": float(resistors[-1])}
 
 
 def _drive(
