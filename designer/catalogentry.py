@@ -54,7 +54,8 @@ class OpAmp:
 
     supply [V] per rail; swing, saturation [V] about ground; offset [V]; bias [A]; gain [V/V];
     gbw [Hz]; slew [V/s]; output_current [A]; output_resistance [Ω], open loop; common_mode [V], its
-    lower and upper end as min and max; supply_current [A] per section; noise [V/√Hz] at 1 kHz.
+    lower and upper end as min and max; supply_current [A] per section; noise [V/√Hz] at 1 kHz;
+    recovery [s] from a saturated output after a hard overdrive is reversed.
     ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
     offsets from, and where it is cut. ``supply_pins``: positive, negative.
     """
@@ -83,6 +84,7 @@ class OpAmp:
     price: int
     footprint: str
     sources: tuple[str, ...]
+    recovery: Figure | None = None
 
     @property
     def sections(self) -> int:
