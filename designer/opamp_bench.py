@@ -18,8 +18,8 @@ from designer.opamp_model import Parameters, Rung, instance, subcircuit
 from designer.spice_batch import BatchNgspice
 
 TIGHT = ".options reltol=1e-6 vntol=1e-10 abstol=1e-15"
-LOADS = (2e3, 10e3)
-"""Loads [ohm] of the swing's two figures."""
+HARD = 0.25
+"""Of the supply: a differential input that drives every op-amp's output to its limit."""
 
 
 @dataclass(frozen=True)
@@ -128,21 +128,59 @@ class Bench:
         """Time [s] from the reversal of a hard overdrive to the output's leaving its limit."""
         wait = 20.0 * self.parameters.recovery + 10.0 * self.rails[1] / self.parameters.slew
         step = min(self.parameters.recovery / 200.0, wait / 1000.0)
+        hard = HARD * self.supply
         plot = self._real([
-            f"VIN inp 0 PULSE(2 -2 {wait!r} {step / 10!r} {step / 10!r} 1 2)",
+            f"VIN inp 0 PULSE({hard!r} {-hard!r} {wait!r} {step / 10!r} {step / 10!r} 1 2)",
             "VG inn 0 0", "RL out 0 1e6", f".tran {step!r} {2 * wait!r} 0 {step!r}",
         ])  # fmt: skip
-        left = (plot["time"] > wait) & (plot["out"] < 0.99 * self.rails[1])
+        after = plot["time"] > wait
+        limit = float(plot["out"][~after][-1])
+        left = after & (plot["out"] < 0.99 * limit)
         # The way from the limit to 1 % below it is slewing, no recovery.
-        slewing = 0.01 * self.rails[1] / self.parameters.slew
+        slewing = 0.01 * limit / self.parameters.slew
         return float(plot["time"][left][0] - wait - slewing)
+
+    def short_circuit(self) -> tuple[float, float]:
+        """Current [A] that the output drives into ground, driven hard down and up."""
+        plot = self._real(["VIN inp 0 0", "VG inn 0 0", "VSHORT out 0 0", *self._driven()])
+        return float(plot["vshort#branch"][0]), float(plot["vshort#branch"][1])
+
+    def below_range(self) -> tuple[float, float]:
+        """Output [V] of a follower whose input falls from zero to 0.5 V beyond the lower end of
+        its common-mode range: at 0.5 V inside that end, and at the last."""
+        end = -self.supply + self.parameters.headroom[0]
+        slow = 200.0 * self.supply / self.parameters.slew
+        plot = self._real([
+            f"VIN inp 0 PWL(0 0 {slow!r} {end - 0.5!r} {2 * slow!r} {end - 0.5!r})",
+            "RF out inn 1", "RL out 0 1e6", f".tran {slow / 100!r} {2 * slow!r} 0 {slow / 100!r}",
+        ])  # fmt: skip
+        inside = slow * (end + 0.5) / (end - 0.5)
+        return float(np.interp(inside, plot["time"], plot["out"])), float(plot["out"][-1])
+
+    def supply_current(self, load: float = 1e9) -> tuple[float, float]:
+        """Current [A] into the positive and out of the negative supply pin, as a follower of half
+        the positive limit into a load [ohm]."""
+        plot = self._real([
+            f"VIN inp 0 {self.rails[1] / 2!r}", "RF out inn 1", f"RL out 0 {load!r}", _POINT,
+        ])  # fmt: skip
+        return float(-plot["vcc#branch"][0]), float(plot["vee#branch"][0])
+
+    def noise(self, frequency: float) -> float:
+        """Noise of a follower [V/sqrt(Hz)] at a frequency [Hz]."""
+        text = self.deck([
+            "VIN inp 0 DC 0 AC 1", "RF out inn 1e-3",
+            f".noise v(out) VIN dec 10 {frequency!r} {10 * frequency!r}",
+        ])  # fmt: skip
+        plots = BatchNgspice().analyse(text)
+        density = next(p.vectors for p in plots if "onoise_spectrum" in p.vectors)
+        return float(density["onoise_spectrum"][0])
 
     def _follower(self) -> dict[str, NDArray[np.float64]]:
         return self._real(["VIN inp 0 0", "RF out inn 1e-3", "RL out 0 1e9", _POINT, TIGHT])
 
     def _driven(self) -> list[str]:
         """A sweep of the input from hard low to hard high."""
-        hard = 0.25 * self.supply
+        hard = HARD * self.supply
         return [f".dc VIN {-hard!r} {hard!r} {2 * hard!r}", TIGHT]
 
     def _real(self, around: Sequence[str]) -> dict[str, NDArray[np.float64]]:
