@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from designer.quantity import encode_value
+from designer.vendor_model import VendorModel
 
 Kind = Literal["resistor", "capacitor"]
 
@@ -59,7 +60,8 @@ class OpAmp:
     What only the finer simulation models use may be missing: recovery [s] from saturation after a
     hard overdrive is reversed; phase_margin [degrees] at unity gain; swing_2k [V] into 2 kΩ;
     noise_corner [Hz], of the 1/f noise; phase_reversal, whether the output goes high when an input
-    falls below the common-mode range.
+    falls below the common-mode range. spice : a vendor's model, used instead of ours on the finest
+    rung.
     ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
     offsets from, and where it is cut. ``supply_pins``: positive, negative.
     """
@@ -93,6 +95,7 @@ class OpAmp:
     swing_2k: Figure | None = None
     noise_corner: Figure | None = None
     phase_reversal: bool = False
+    spice: VendorModel | None = None
 
     @property
     def sections(self) -> int:

@@ -114,7 +114,8 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
     if circuit.figures is None:
         raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
     lines += [f"VCC vcc 0 {_n(circuit.supply)}", f"VEE vee 0 {_n(-circuit.supply)}"]
-    return lines + opamp_model.subcircuit(rung, Parameters.of(circuit.figures, gain))
+    figures = circuit.figures
+    return lines + opamp_model.subcircuit(rung, Parameters.of(figures, gain), figures.spice)
 
 
 def _outputs(

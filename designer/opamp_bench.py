@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from designer.catalogentry import OpAmp
 from designer.opamp_model import Parameters, Rung, instance, subcircuit
 from designer.spice_batch import BatchNgspice
+from designer.vendor_model import VendorModel
 
 TIGHT = ".options reltol=1e-6 vntol=1e-10 abstol=1e-15"
 HARD = 0.25
@@ -25,7 +26,7 @@ HARD = 0.25
 @dataclass(frozen=True)
 class Bench:
     """One op-amp on a bench: its model's rung, rails of ± supply [V], offset [V], bias [A],
-    output limits [V]."""
+    output limits [V], a vendor's model if there is one."""
 
     rung: Rung
     parameters: Parameters
@@ -33,6 +34,7 @@ class Bench:
     vos: float
     ib: float
     rails: tuple[float, float]
+    vendor: VendorModel | None = None
 
     @classmethod
     def of(cls, opamp: OpAmp, rung: Rung) -> Bench:
@@ -45,6 +47,7 @@ class Bench:
             vos=opamp.offset.nominal,
             ib=opamp.bias.nominal,
             rails=(-limit, limit),
+            vendor=opamp.spice,
         )
 
     def deck(self, around: Sequence[str], *, inputs: tuple[str, str] = ("inp", "inn")) -> str:
@@ -55,7 +58,7 @@ class Bench:
             f"VEE vee 0 {-self.supply!r}",
             instance("U1", (*inputs, "out"), rung=self.rung, vos=self.vos, ib=self.ib,
                      rails=self.rails),
-            *subcircuit(self.rung, self.parameters),
+            *subcircuit(self.rung, self.parameters, self.vendor),
             *around,
             ".end",
         ]  # fmt: skip

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from designer.catalogentry import OpAmp
+from designer.vendor_model import VendorModel
 
 Rung = Literal["ideal", "dynamic", "full"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
@@ -154,11 +155,13 @@ def instance(
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
 
-def subcircuit(rung: Rung, parameters: Parameters) -> list[str]:
-    """The lines of the subcircuit ``opamp`` of one rung."""
+def subcircuit(rung: Rung, parameters: Parameters, vendor: VendorModel | None = None) -> list[str]:
+    """The lines of the subcircuit ``opamp`` of one rung; on ``full`` a vendor's model, if any."""
     if rung == "ideal":
         return ideal(parameters.gain)
-    return _dynamic(parameters) if rung == "dynamic" else _full(parameters)
+    if rung == "dynamic":
+        return _dynamic(parameters)
+    return _full(parameters) if vendor is None else vendor.wrapped()
 
 
 def ideal(gain: float) -> list[str]:
