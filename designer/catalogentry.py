@@ -17,6 +17,10 @@ PRICE_CLASSES = (0.01, 0.05, 0.25, 1.0, 5.0, math.inf)
 """Upper ends, in euro apiece at a hundred pieces, of the price classes 1 to 6."""
 
 
+ASSUMED_IMPEDANCE = 1.0
+"""Dynamic impedance [Ω] of a reference whose data sheet gives none."""
+
+
 @dataclass(frozen=True)
 class Figure:
     """A figure of a data sheet: minimum, typical, maximum, where it stands, or that it is assumed.
@@ -126,7 +130,8 @@ class Diode:
 
 @dataclass(frozen=True)
 class Reference:
-    """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in."""
+    """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in,
+    dynamic impedance [Ω], which may be missing."""
 
     name: str
     manufacturer: str
@@ -138,6 +143,17 @@ class Reference:
     price: int
     footprint: str
     sources: tuple[str, ...]
+    impedance: Figure | None = None
+
+    @property
+    def least_current(self) -> float:
+        """Current [A] below which it does not regulate; 0 where the data sheet gives none."""
+        return self.current.min or 0.0
+
+    @property
+    def dynamic_impedance(self) -> float:
+        """Typical dynamic impedance [Ω]; assumed where the catalogue has none."""
+        return self.impedance.nominal if self.impedance else ASSUMED_IMPEDANCE
 
 
 @dataclass(frozen=True)

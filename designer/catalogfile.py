@@ -456,6 +456,7 @@ class _ReferenceTable(BaseModel):
     price: Annotated[int, _price()]
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
+    impedance: Annotated[Figure | None, _figure("Ω")] = None
 
 
 class _File(BaseModel):
