@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from designer import matching, topology
 from designer.catalog import load_catalog
 from designer.circuit import Circuit
@@ -42,6 +44,15 @@ def one_sided(threshold: float = 0.6, free: float = 11.0) -> dict[str, float]:
         "R208": 100e3, "R209": 100e3, "R210": 100e3,
         "R211": 10e3 * SUPPLY / shift, "R212": 100e3 * SUPPLY / shift,
     }  # fmt: skip
+
+
+def bought(values: Mapping[str, float]) -> dict[str, float]:
+    """The nearest resistors that can be bought."""
+    sold = CATALOG.values("resistor", ["E96", "E24"], 1e3, 1e6, 0.01)
+    return {
+        n: v if n[0] == "C" else float(sold[np.argmin(np.abs(np.log(sold / v)))])
+        for n, v in values.items()
+    }
 
 
 def stage(

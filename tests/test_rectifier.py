@@ -18,6 +18,7 @@ from designer.errors import InputError
 from designer.flow import Flow, FlowStatus
 from designer.orbit import OrbitStatus
 from designer.reduction import FloatingCircuit, Reduction
+from designer.resistors import composites_of
 from designer.system import Drive
 from designer.zone import Sides
 from tests.stages import CATALOG, PAPER, VREF, model, rectifier, stage
@@ -363,6 +364,8 @@ def test_composites_are_two_parts_and_one_resistance() -> None:
     circuit = stage("rectifier", "both", values, kinds)  # type: ignore[arg-type]
     assert {"r50m", "r4m"} <= set(circuit.nets)
     assert "r201m" not in circuit.nets
+    assert composites_of(circuit) == kinds
+    assert composites_of(BOTH) == {}
     assert set(circuit.values) == {*values, "R209"} - {"R12"}
     found = coefficient_errors(circuit, PAPER.second_order())
     assert found.max_error < 1e-9
