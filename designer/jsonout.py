@@ -58,6 +58,7 @@ def synthesis_json(
     seconds: float,
 ) -> dict[str, Any]:
     """What ``synthesise`` prints and ``design.json`` holds."""
+    from designer.resistors import composites_of
     from designer.setup_table import STATES, settings
 
     errors, circuit = design.errors, design.circuit
@@ -71,6 +72,7 @@ def synthesis_json(
             "bias": circuit.bias,
             "supply": circuit.supply,
             "saturation": circuit.saturation,
+            "composites": composites_of(circuit),
         },
         "parts": circuit.values,
         "errors": errors.errors,
