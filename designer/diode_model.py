@@ -17,6 +17,8 @@ from designer.errors import InputError
 
 TEST_CURRENT = 10e-3
 """Current [A] at which the catalogue's forward voltage is meant."""
+TEST_LOOP = 100.0
+"""Resistance [ohm] of the loop in which sheets measure the recovery, down to a tenth."""
 WORKING_CURRENT = 1e-3
 """Current [A] at which the constant drop is taken: what a stage of 10 kΩ parts carries."""
 TYPICAL_SHARE = 0.72
@@ -68,7 +70,8 @@ def diode_model(diode: Diode) -> DiodeModel:
     """The curve of a catalogued diode.
 
     It passes through the typical forward voltage at ``TEST_CURRENT`` and leaks less than the sheet
-    allows. The transit time makes the recovery time of equal forward and reverse currents.
+    allows. The transit time makes the recovery time of equal forward and reverse currents, less
+    what the capacitance takes.
 
     Raises
     ------
@@ -87,13 +90,15 @@ def diode_model(diode: Diode) -> DiodeModel:
         emission = junction / (THERMAL * math.log1p(TEST_CURRENT / most))
     if emission < LEAST_EMISSION:
         raise _no_diode(diode, volts, most)
+    # What is left of the reverse current falls to a tenth with the junction's capacitance.
+    fall = math.log(10.0) * TEST_LOOP * diode.capacitance.nominal
     return DiodeModel(
         name=diode.name,
         saturation_current=current,
         emission=emission,
         resistance=RESISTANCE,
         capacitance=diode.capacitance.nominal,
-        transit=diode.recovery.nominal / math.log(2.0),
+        transit=max(diode.recovery.nominal - fall, 0.0) / math.log(2.0),
         reverse_voltage=diode.reverse_voltage.nominal,
         assumed=figure.typ is None,
     )

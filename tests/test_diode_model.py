@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from designer.catalog import Figure, load_catalog
 from designer.diode_model import card, diode_model
 from designer.errors import InputError
 from designer.ngspice import check_netlist, open_simulator
+from designer.spice_batch import BatchNgspice
 
 DIODE = load_catalog().diode("1N4148")
 
@@ -72,5 +72,30 @@ def test_ngspice_draws_the_same_curve(charge: bool) -> None:
     assert abs(current[waves.time < 1.0]).max() < 25e-9
 
 
-def test_the_transit_time_is_that_of_the_recovery() -> None:
-    assert diode_model(DIODE).transit == pytest.approx(4e-9 / math.log(2.0))
+def test_ngspice_recovers_in_the_time_of_the_sheet() -> None:
+    """10 mA to -10 mA in 100 ohm, until a tenth of that is left: 4 ns within a tenth."""
+    text = "\n".join(
+        [
+            "* title: recovery", "V1 a 0 PULSE(1.72 -0.28 100n 10p 10p 1 2)", "R1 a b 100.0",
+            "D1 b 0 diode0", card(diode_model(DIODE), "diode0", charge=True),
+            ".tran 2p 130n 0 2p", ".end", "",
+        ]
+    )  # fmt: skip
+    waves = open_simulator("shared").run(text, ("a", "b"), 130e-9)
+    current = (waves.signals["a"] - waves.signals["b"]) / 100.0
+    reversed_ = (waves.time > 99e-9) & (current < 0.0)
+    began = waves.time[reversed_][0]
+    assert current[reversed_].min() == pytest.approx(-10e-3, rel=0.05)
+    ended = waves.time[(waves.time > began + 0.1e-9) & (current > -1e-3)][0]
+    assert ended - began == pytest.approx(DIODE.recovery.nominal, rel=0.1)
+
+
+def test_ngspice_has_the_capacitance_of_the_sheet() -> None:
+    text = "\n".join(
+        [
+            "* title: capacitance", "V1 b 0 DC 0 AC 1", "D1 b 0 diode0",
+            card(diode_model(DIODE), "diode0", charge=True), ".ac lin 2 1e6 2e6", ".end", "",
+        ]
+    )  # fmt: skip
+    current = BatchNgspice().analyse(text)[-1].phasors["v1#branch"][0]
+    assert abs(current.imag) / (2e6 * np.pi) == pytest.approx(4e-12, rel=0.01)
