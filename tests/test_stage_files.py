@@ -14,6 +14,7 @@ from designer.bom import bill
 from designer.circuit import Circuit
 from designer.coefficients import coefficient_errors
 from designer.folder import Folder
+from designer.jsonout import dumps, synthesis_json
 from designer.modelfile import ModelFile, read_model_file
 from designer.montecarlo import run_block
 from designer.provenance import provenance
@@ -65,10 +66,8 @@ def test_files_are_read_back_as_the_same_design(name: str, tmp_path: Path) -> No
     folder.path.mkdir()
     for file, text in texts.items():
         (folder.path / file).write_text(text)
-    said = design_files.synthesis_json(
-        first.modelfile, first.design, first.found, {}, first.seconds
-    )
-    (folder.path / "design.json").write_text(design_files.dumps(said))
+    said = synthesis_json(first.modelfile, first.design, first.found, {}, first.seconds)
+    (folder.path / "design.json").write_text(dumps(said))
     again = design_files.load(folder, first.modelfile, CATALOG)
     assert again.design.circuit == first.design.circuit
     zone = said["dead_zone"]
