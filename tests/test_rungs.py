@@ -22,10 +22,12 @@ from designer.ngspice import check_netlist, open_simulator
 from designer.opamp_model import Rung
 from designer.reduction import Reduction
 from designer.responses import on_circuit
+from designer.spread import Spread, draw
 from designer.system import Drive
 from designer.waveform_orbit import Read
 from tests.stages import PAPER, stage
 from tests.test_rectifier_ngspice import SCALED
+from tests.test_reduction import EXACT, circuit_of
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 finer = pytest.mark.parametrize("rung", ["dynamic", "full"])
@@ -104,6 +106,26 @@ def test_a_rectifier_board(rung: Rung) -> None:
     assert read.orbit.response == subject.orbit.response == "1-1-1"
     peak = np.abs(subject.orbit.extremes).max(axis=1)
     assert (np.abs(read.strobes[-1] - subject.orbit.start) < 0.02 * peak).all()
+
+
+@finer
+@pytest.mark.parametrize("name", [o.name for o in load_catalog().opamps if o.rated_supply == 15.0])
+@pytest.mark.parametrize("method", ["trap", "gear"])
+def test_boards_with_offsets_run(rung: Rung, name: str, method: str) -> None:
+    """Every op-amp: 10 mV offsets, unequal limits, from rest and from far off the orbit.
+
+    An XSPICE limiter whose limits meet while the supplies are still at zero fails here.
+    """
+    circuit = replace(circuit_of(EXACT), figures=load_catalog().opamp(name))
+    excitation = Excitation(400.0, 1.0)
+    for index, start in enumerate((None, np.array([0.3, -0.2, 0.5, 0.1]))):
+        board = draw(circuit, Spread(0.01, 0.05, 5e-3, 10e-3), 4, index)
+        text = deck.write(
+            circuit, board, excitation, SolverSettings(method, 1 / 400 / 200),
+            title="offsets", stop_time=2 / 400, initial=start, rung=rung,
+        )  # fmt: skip
+        waves = open_simulator("shared").run(text, circuit.state_nets, 2 / 400)
+        assert np.abs(waves.signals["v1"]).max() > 0.05
 
 
 @pytest.mark.slow
