@@ -32,7 +32,7 @@ LEAKAGE_SHARE = 0.5
 TRACE = 2e-14
 """Capacitance [F] at 0 V of a diode without charge. With none, nothing in the loop of an ideal
 op-amp and a diode has a memory: a smaller step is then no easier, and ngspice finds no first point.
-With this one each hand-over takes some ten steps more, and delays contact by less than a
+With this one each hand-over takes some forty steps more, and delays contact by less than a
 nanosecond; the 4 pF of a real diode delay it by 100 ns, which the waveform shows."""
 THERMAL = 0.025852
 """Vt = kT/q [V] at 300 K."""

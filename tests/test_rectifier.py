@@ -21,7 +21,7 @@ from designer.reduction import FloatingCircuit, Reduction
 from designer.resistors import composites_of
 from designer.system import Drive
 from designer.zone import Sides
-from tests.stages import CATALOG, PAPER, VREF, model, rectifier, stage
+from tests.stages import CATALOG, PAPER, SATURATION, VREF, model, rectifier, stage
 
 NOMINAL = rectifier()
 BOTH = stage("rectifier", "both", NOMINAL)
@@ -161,6 +161,18 @@ def test_the_idle_half_stays_off_as_far_as_its_clamp_lifts_it(v1: float, on: boo
         assert w2 == pytest.approx(2.0 * VREF + drop + resistance, rel=1e-3)
     assert bool(key[BOTH.switches.index("D202")]) is on
     assert bool(fv > 2.0 * VREF + 2.0 * drop) is on
+
+
+def test_a_clamp_that_lifts_past_the_limit_spoils_the_dead_zone() -> None:
+    """U3B clips inside the clearance where 2 Vref R209/R204 and a drop pass its limit."""
+    drop = BOTH.diodes[0].model.drop
+    most = (SATURATION - drop) / (2.0 * VREF) * NOMINAL["R204"]
+    fine = stage("rectifier", "both", {**NOMINAL, "R208": 0.999 * most, "R209": 0.999 * most})
+    assert coefficient_errors(fine, PAPER.second_order()).max_error < 1e-9
+    for name, section in (("R208", "U3A"), ("R209", "U3B")):
+        spoilt = stage("rectifier", "both", {**NOMINAL, name: 1.001 * most})
+        with pytest.raises(ArithmeticError, match=section):
+            coefficient_errors(spoilt, PAPER.second_order())
 
 
 def test_without_gain_only_the_hand_over_has_no_answer() -> None:
