@@ -23,11 +23,13 @@ class FloatingCircuit(ArithmeticError):
 class Solution:
     """Linear functions of (states, generator, 1), each a row of length n + 2.
 
-    voltage : by net; current : into each state capacitor, by name.
+    voltage : by net; current : into each state capacitor, by name; output : out of each op-amp
+    section's output, by name [A].
     """
 
     voltage: dict[str, Array]
     current: dict[str, Array]
+    output: dict[str, Array]
 
 
 WORST_CONDITION = 1e14
@@ -141,7 +143,9 @@ class Reduction:
         voltage[GROUND] = np.zeros(n + 2)
         # The unknown is the current that leaves ``plus`` through the source: into the capacitor.
         amps = {cap.name: y[nodes + i] for i, cap in enumerate(c.capacitors)}
-        return Solution(voltage, amps)
+        first = nodes + len(c.capacitors)
+        out = {s.name: -y[first + i] for i, s in enumerate(c.sections)}
+        return Solution(voltage, amps, out)
 
     def _mode(self, key: ModeKey) -> Mode:
         c, board = self.circuit, self.board
