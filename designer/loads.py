@@ -40,7 +40,7 @@ NEAR = 0.02
 BRACKET, ROUNDS = 16, 4
 """Parts of a bracket, and how often the best one is divided again."""
 WALK = 64
-"""Most modes between a guess and the mode that holds."""
+"""Steps that all states take together; what is not settled by then is looked up by itself."""
 
 
 @dataclass(frozen=True)
@@ -302,7 +302,12 @@ def _modes(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeKey
         if not moved:
             return at
         open_points = np.concatenate(moved)
-    raise ArithmeticError("no mode holds on the way")
+    for i in open_points:
+        key = system.mode_at(x[i], float(u[i]))
+        if key not in keys:
+            keys.append(key)
+        at[i] = keys.index(key)
+    return at
 
 
 def _guards(mode: Mode, x: Array, u: Array) -> Array:
