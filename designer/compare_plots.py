@@ -85,11 +85,13 @@ def _peaks(
     limits = sorted({float(c["saturation"]) for c in columns})
     for limit in limits:
         axes.axvline(limit, color=INK, lw=0.9, ls=(0, (4, 2)))
+    peaks: list[float] = []
     for i, (c, mark) in enumerate(zip(columns, marks, strict=True)):
         values = [_peak(c["peaks"].get(n)) for n in names]
+        peaks += [v for v in values if v > 0.0]
         _dots(axes, values, i, len(columns), mark)
     axes.set_xscale("log")
-    axes.set_xlim(0.02, 1.4 * limits[-1])
+    axes.set_xlim(min([*peaks, 0.04]) / 2.0, 1.4 * limits[-1])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     words = " and ".join(f"{v:g} V" for v in limits)
