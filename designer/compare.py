@@ -80,15 +80,16 @@ class Bill:
 class Column:
     """Everything about one design.
 
-    errors : None where a coefficient has the wrong sign; ``reason`` says so. k0, b : as realised
-    by the parts and the stated amplitude, by their definitions in Eq. (3); nan where they do not
-    apply. frequency_error : ln(stated/right) of the generator's frequency.
+    errors : None where a coefficient has the wrong sign; ``reason`` says so. k0, f20, b : as
+    realised by the parts and the stated amplitude, by their definitions in Eq. (3); nan where they
+    do not apply. frequency_error : ln(stated/right) of the generator's frequency.
     """
 
     candidate: Candidate
     errors: CoefficientErrors | None
     reason: str
     k0: float
+    f20: float
     b: float
     frequency_error: float
     offset: OffsetShare | None
@@ -146,6 +147,9 @@ def column(
         errors=errors,
         reason=reason,
         k0=_k0(model, errors),
+        f20=float("nan")
+        if errors is None
+        else float(errors.drive_gain[1] / errors.drive_gain.sum()),
         b=_b(candidate, model, errors),
         frequency_error=_frequency_error(candidate, errors),
         offset=offset_share(circuit, opamp),

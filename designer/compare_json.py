@@ -48,6 +48,7 @@ def _column(column: Column) -> dict[str, Any]:
         "max_error": None if errors is None else errors.max_error,
         "reason": column.reason,
         "k0": column.k0,
+        "f20": column.f20,
         "b": column.b,
         "threshold": None if errors is None else errors.scales.threshold,
         "frequency_hz": candidate.frequency,

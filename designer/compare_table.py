@@ -25,6 +25,7 @@ def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]
     for name in names:
         yield f"  {name}", [_percent((c["errors"] or {}).get(name)) for c in columns]
     yield "k0 as built", [_number(c["k0"]) for c in columns]
+    yield "f20 as built", [_number(c["f20"]) for c in columns]
     yield "b as driven", [_number(c["b"]) for c in columns]
     yield "frequency error", [_percent(c["frequency_error"]) for c in columns]
     yield (

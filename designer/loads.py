@@ -162,14 +162,17 @@ class _Sampled:
         self.system = reduction.system()
         self.run = run
         self.flow = Flow(self.system, run.drive)
-        self._strobe(LEAST_POINTS)
-        fastest = max(
-            run.drive.omega,
-            *(float(np.abs(np.linalg.eigvals(self.system.mode(k).A)).max()) for k in self.keys),
-        )
-        points = int(np.ceil(run.drive.period * fastest / RESOLUTION))
-        if points > LEAST_POINTS:
-            self._strobe(min(points, MOST_POINTS))
+        points = 0
+        needed = LEAST_POINTS
+        while needed > points:  # a finer look may meet a mode that a coarse one misses
+            points = needed
+            self._strobe(points)
+            fastest = max(run.drive.omega, *(_fastest(self.system.mode(k)) for k in self._held()))
+            needed = min(int(np.ceil(run.drive.period * fastest / RESOLUTION)), MOST_POINTS)
+
+    def _held(self) -> list[ModeKey]:
+        """Modes that hold at a strobe: not those that are only crossed in an instant."""
+        return [self.keys[int(i)] for i in np.unique(self.at)]
 
     def extremes(self) -> dict[tuple[str, str], float]:
         """By section: -lowest and highest voltage, largest current out of and into the output."""
@@ -254,6 +257,10 @@ class _Sampled:
             return out
 
         return values
+
+
+def _fastest(mode: Mode) -> float:
+    return float(np.abs(np.linalg.eigvals(mode.A)).max())
 
 
 def _brackets(values: Array) -> tuple[Index, Array, Array]:

@@ -30,6 +30,8 @@ from designer.system import Array
 
 MODEL = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 """The paper's case, Section 5.1."""
+DEAD_ZONE = tuple(f"R{i}" for i in range(200, 211))
+"""Fig. 5."""
 AS_PRINTED = "paper, as printed"
 """Name of the candidate with the printed values."""
 OPAMP, SUPPLY, SATURATION = "TL074C", 15.0, 13.0
@@ -145,7 +147,7 @@ def way(model: Dimensionless) -> dict[str, float]:
     follow from Eq. (14) in its corrected form (docs/errata.md), the dead zone's gains stay.
     """
     chosen = ("R1", "R4", "R6", "C1", "C2", "C3", "C4", *(f"R{i}" for i in range(100, 108)))
-    values = {name: PRINTED[name] for name in (*chosen, *topology.DEAD_ZONE_PARTS)}
+    values = {name: PRINTED[name] for name in (*chosen, *DEAD_ZONE)}
     C2, C4 = values["C2"], values["C4"]
     M1, K1 = values["R1"] * values["C1"], 1.0 / (values["R4"] * C2)
     M2 = M1 * model.m / (1.0 - model.m)

@@ -79,6 +79,20 @@ def test_corrected_values_have_these_right(columns: dict[str, Column]) -> None:
     assert columns["paper, corrected"].k0 == pytest.approx(0.95, rel=1e-12)
 
 
+def test_f20_by_the_ratio_of_the_driving_resistors() -> None:
+    """P2/P1 = R6 C2/(R12 C4), whatever the other parts are."""
+    model = replace(PAPER, f20=0.3)
+    values = paper_design.way(model) | {"R12": 300e3}
+    circuit = paper_design.circuit(model, values, CATALOG.opamp("TL074C"))
+    candidate = Candidate("x", "", circuit, *paper_design.generator(model, values))
+    got = compare.column(candidate, model, [], SPEC, CATALOG)
+    assert got.f20 == pytest.approx(1.0 / (1.0 + 3.0), rel=1e-9)
+    assert got.b == pytest.approx(0.25, rel=1e-9)
+    assert got.shown == ()
+    assert got.loads.sections == ()
+    assert got.current is None
+
+
 def test_parts_and_price_by_counting(columns: dict[str, Column]) -> None:
     """11 + 1 + 8 + 11 resistors (R12 and the stops' R50 counted once), 4 capacitors, 3 packages."""
     printed = columns["paper, as printed"].bill
