@@ -36,6 +36,10 @@ _PROBE = 1e-3
 """Offset [V] that the shift is computed with; it is proportional, so the size does not matter."""
 
 
+_GAIN = 1e9
+"""Of op-amps that are ideal but for offsets; between two diodes an infinite one has no answer."""
+
+
 @dataclass(frozen=True)
 class Shown:
     """One wanted response on one circuit: what it settles on from the model's own orbit.
@@ -237,7 +241,7 @@ def offset_share(circuit: Circuit, opamp: OpAmp) -> OffsetShare | None:
     """
     if not circuit.stops:
         return None
-    ideal = nominal_board(circuit, ideal=True)
+    ideal = replace(nominal_board(circuit, ideal=True), inverse_gain=1.0 / _GAIN)
     try:
         nominal, width = _distances(circuit, ideal)
         shifts = {
