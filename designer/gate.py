@@ -2,7 +2,8 @@
 
 Before ngspice's verdict counts, two step sizes and two integration methods must agree with each
 other, and with the exact circuit, on n-p-q and on every strobe within a stated bound. The largest
-step follows the contact, not only the period: T/200 miscounts the eight-impact response.
+step is min(T/200, shortest contact/N): it follows the contact, for T/200 miscounts the
+eight-impact response. Both bounds are halved together until the settings pass, which finds N.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from designer import deck
+from designer import deck, remedies
 from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
+from designer.remedies import Outcome, Remedy, Task
 from designer.system import Array, Drive, PiecewiseLinearSystem
 from designer.waveform_orbit import Read, Reading, read
 from designer.workers import SpiceJob, SpicePool
@@ -27,6 +29,8 @@ from designer.workers import SpiceJob, SpicePool
 STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 10
 LEVELS = 5
 """How often the step is halved before the gate gives up."""
+CURES: tuple[Remedy, ...] = ("tolerance", "start")
+"""Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
 BOUND = 1e-3
 """Of the peak: half the strobe tolerance, so that boards that differ have room too."""
 DISCARD = 2
@@ -37,25 +41,45 @@ DISCARD = 2
 class GateResult:
     """settings : what passed, or the finest that was tried. passed : whether any did.
     difference : largest strobe difference between the runs, of the peak. read : the run at
-    ``settings``; tried : steps a period that were tried."""
+    ``settings``; tried : steps a period that were tried. contact_steps : N, largest steps in the
+    shortest contact at ``settings`` (nan without contact). remedies : what the run at ``settings``
+    needed besides, or its companions."""
 
     settings: SolverSettings
     passed: bool
     difference: float
     read: Read | SimulationFailed
     tried: tuple[int, ...]
+    contact_steps: float = float("nan")
+    remedies: tuple[Remedy, ...] = ()
+
+    def as_dict(self) -> dict[str, object]:
+        """For provenance: the settings, and what they passed."""
+        return {
+            **self.settings.as_dict(),
+            "passed": self.passed,
+            "difference": self.difference,
+            "bound": BOUND,
+            "steps_a_period": self.tried[-1],
+            "steps_a_contact": self.contact_steps,
+            "steps_tried": list(self.tried),
+            "remedies": list(self.remedies),
+        }
 
 
 @dataclass(frozen=True)
 class Subject:
     """One response of one board (a reduction): what a run of ngspice needs.
 
-    orbit : on the exact circuit; the run starts there and its n sets the length.
+    orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
+    voltages at t = 0 if not the orbit's. discard : periods left out before the run is judged.
     """
 
     reduction: Reduction
     excitation: Excitation
     orbit: Orbit
+    start: Array | None = None
+    discard: int = DISCARD
 
     @property
     def circuit(self) -> Circuit:
@@ -80,17 +104,20 @@ class Subject:
         return 1.0 / self.excitation.frequency
 
 
-def job(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> SpiceJob[Read]:
-    """The run of one subject: ``DISCARD`` periods and at least 4n (six or more) to judge.
+def job(
+    subject: Subject, settings: SolverSettings, nudge: float = 0.0, *, keep: bool = False
+) -> SpiceJob[Read]:
+    """The run of one subject: what it discards, and at least 4n periods (six or more) to judge.
 
     Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
+    nudge : fraction by which every initial voltage is raised (``remedies``).
     """
-    periods = DISCARD + max(4 * (subject.orbit.n or MAX_PERIOD), 6)
-    stop = periods * subject.period
+    stop = length(subject) * subject.period
+    start = subject.orbit.start if subject.start is None else subject.start
     upper, lower = contact_rows(subject.system)
     reading = Reading(
         period=subject.period,
-        discard=DISCARD,
+        discard=subject.discard,
         nets=subject.circuit.state_nets,
         shift=subject.shift,
         upper=upper,
@@ -106,10 +133,20 @@ def job(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> Sp
         settings,
         title="one response of one board",
         stop_time=stop,
-        initial=subject.orbit.start,
+        initial=(1.0 + nudge) * start,
     )
     signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
     return SpiceJob(text, signals, stop, partial(read, reading=reading))
+
+
+def length(subject: Subject) -> int:
+    """Drive periods that the run of a subject takes."""
+    return subject.discard + max(4 * (subject.orbit.n or MAX_PERIOD), 6)
+
+
+def task(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> Task[Read]:
+    """The run as one that remedies may change."""
+    return Task(partial(job, subject, keep=keep), settings)
 
 
 def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
@@ -153,25 +190,24 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
 
     All subjects move through the levels together, so that the workers stay busy.
     """
-    steps = []
-    for s in subjects:
-        shortest = shortest_contact(s.orbit, s.system, s.excitation)
-        contact = int(np.ceil(STEPS_PER_CONTACT * s.period / shortest))
-        steps.append(max(STEPS_PER_PERIOD, contact))
+    contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
+    steps = [
+        max(STEPS_PER_PERIOD, int(np.ceil(STEPS_PER_CONTACT * s.period / contact)))
+        for s, contact in zip(subjects, contacts, strict=True)
+    ]
     results: list[GateResult | None] = [None] * len(subjects)
     tried: list[list[int]] = [[] for _ in subjects]
     for level in range(LEVELS):
         open_ = [i for i, r in enumerate(results) if r is None or not r.passed]
-        jobs = []
+        tasks = []
         for i in open_:
             tried[i].append(steps[i] * 2**level)
             trio = _trio(subjects[i].period / tried[i][-1])
-            jobs += [job(subjects[i], settings, keep=True) for settings in trio]
-        found = dict(pool.map(jobs))
+            tasks += [task(subjects[i], settings, keep=True) for settings in trio]
+        found = dict(remedies.run(pool, tasks, CURES))
         for k, i in enumerate(open_):
             runs = [found[3 * k + j] for j in range(3)]
-            first = _trio(subjects[i].period / tried[i][-1])[0]
-            results[i] = _judge(subjects[i], first, runs, tuple(tried[i]))
+            results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])
     return [r for r in results if r is not None]
 
 
@@ -185,23 +221,29 @@ def _trio(step: float) -> tuple[SolverSettings, SolverSettings, SolverSettings]:
 
 
 def _judge(
-    subject: Subject,
-    settings: SolverSettings,
-    runs: Sequence[Read | SimulationFailed],
-    tried: tuple[int, ...],
+    subject: Subject, runs: Sequence[Outcome[Read]], tried: tuple[int, ...], contact: float
 ) -> GateResult:
-    good = [r for r in runs if isinstance(r, Read)]
-    if len(good) < len(runs):
-        return GateResult(settings, False, float("nan"), runs[0], tried)
+    settings, read = runs[0].settings, runs[0].result
+    needed = {r for run in runs for r in run.tried}
+    good = [run.result for run in runs if isinstance(run.result, Read)]
     wanted = subject.orbit
-    same = all(r.orbit.response == wanted.response for r in good)
-    difference = float("nan")
-    if wanted.status is OrbitStatus.PERIODIC:
-        peak = np.abs(wanted.extremes).max(axis=1)
-        last = [r.strobes[-wanted.n :] for r in good]
-        difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
-    passed = same and bool(difference <= BOUND or wanted.status is not OrbitStatus.PERIODIC)
-    return GateResult(settings, passed, difference, runs[0], tried)
+    difference, passed = float("nan"), False
+    if len(good) == len(runs):
+        passed = all(r.orbit.response == wanted.response for r in good)
+        if wanted.status is OrbitStatus.PERIODIC:
+            peak = np.abs(wanted.extremes).max(axis=1)
+            last = [r.strobes[-wanted.n :] for r in good]
+            difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
+            passed = passed and difference <= BOUND
+    return GateResult(
+        settings,
+        passed,
+        difference,
+        read,
+        tried,
+        contact / settings.max_step if len(wanted.impact_times) else float("nan"),
+        tuple(r for r in CURES if r in needed),
+    )
 
 
 def _pairs(items: Sequence[Array]) -> Iterator[tuple[Array, Array]]:

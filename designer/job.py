@@ -315,14 +315,7 @@ def _study_provenance(
         settings={
             "highs": SOLVER,
             "ngspice": [
-                {
-                    "omega": c.model.omega,
-                    "passed": c.gate.passed,
-                    "difference": c.gate.difference,
-                    **c.gate.settings.as_dict(),
-                }
-                for c in checked
-                if c.gate is not None
+                {"omega": c.model.omega, **c.gate.as_dict()} for c in checked if c.gate is not None
             ],
         },
         spread=spread.as_dict(),

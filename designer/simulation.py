@@ -313,8 +313,10 @@ def _gate_settings(result: gate.GateResult) -> dict[str, Any]:
     return {
         **result.settings.as_dict(),
         "steps_a_period": result.tried[-1],
+        "steps_a_contact": result.contact_steps,
         "gate_passed": result.passed,
         "gate_difference": result.difference,
+        "remedies": list(result.remedies),
     }
 
 
