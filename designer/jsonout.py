@@ -208,13 +208,12 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "yield": None,
         "rate": None,
         "reasons": {},
-        "agreement": {"asked": 0, "agreed": 0, "failed": 0},
+        "agreement": _agreement(answers),
     }
     if counted is None:
         row["left_out"] = study.left_out[index]
         return row
     low, high = counted.interval
-    asked = [a for a in answers if a.ngspice]
     row["yield"] = {
         "ok": counted.ok,
         "lost": counted.lost,
@@ -226,12 +225,26 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
     }
     row["rate"] = counted.rate
     row["reasons"] = _reasons(answers)
-    row["agreement"] = {
+    return row
+
+
+def _agreement(answers: Sequence[Answer]) -> dict[str, Any]:
+    """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
+    asked = [a for a in answers if a.ngspice]
+    nominal = [a for a in answers if a.ngspice_nominal]
+    return {
         "asked": len(asked),
         "agreed": sum(a.agrees is True for a in asked),
         "failed": sum(a.ngspice == "failed" for a in asked),
+        "nominal_start": {
+            "asked": len(nominal),
+            "agreed": sum(a.agrees_from_nominal is True for a in nominal),
+            "failed": sum(a.ngspice_nominal == "failed" for a in nominal),
+            "too_long": sum(
+                bool(a.ngspice_nominal_reason) and not a.ngspice_nominal for a in answers
+            ),
+        },
     }
-    return row
 
 
 def _reasons(answers: Sequence[Answer]) -> dict[str, int]:
