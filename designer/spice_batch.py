@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,12 @@ from numpy.typing import NDArray
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
     HOW_TO_INSTALL,
+    Analysis,
     SimulationFailed,
+    Sweep,
     Waveforms,
     accept,
+    accept_sweep,
     check_netlist,
     clean_environment,
     offending_line,
@@ -47,6 +51,22 @@ class BatchNgspice:
 
     def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
         """See `designer.ngspice.Simulator.run`."""
+        vectors, log, seconds, status = self._vectors_of(netlist, "tran")
+        waveforms = accept(vectors, signals, stop_time, log, seconds)
+        _check_status(status, log)
+        return waveforms
+
+    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+        """See `designer.ngspice.Simulator.sweep`."""
+        vectors, log, seconds, status = self._vectors_of(netlist, analysis)
+        found = accept_sweep(vectors, signals, stop, analysis, log, seconds)
+        _check_status(status, log)
+        return found
+
+    def _vectors_of(
+        self, netlist: str, analysis: Analysis
+    ) -> tuple[dict[str, NDArray[Any]], str, float, int]:
+        """Run a deck: vectors of its last analysis of this kind, log, wall time, exit status."""
         check_netlist(netlist)
         started = time.perf_counter()
         with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
@@ -61,20 +81,17 @@ class BatchNgspice:
             line = offending_line(log)
             reason = f"{error} (ngspice exit {done.returncode})" if line is None else said(line)
             raise SimulationFailed(reason, log) from error
-        transient = [plot for plot in plots if plot.name == "Transient Analysis"]
-        waveforms = accept(
-            transient[-1].vectors if transient else {},
-            signals,
-            stop_time,
-            log,
-            time.perf_counter() - started,
-        )
-        if done.returncode != 0:
-            raise SimulationFailed(f"ngspice exit {done.returncode}", log)
-        return waveforms
+        wanted = [plot for plot in plots if plot.name == PLOTS[analysis]]
+        vectors = wanted[-1].vectors if wanted else {}
+        return vectors, log, time.perf_counter() - started, done.returncode
 
     def close(self) -> None:
         """Nothing to do: nothing outlives a run."""
+
+
+def _check_status(status: int, log: str) -> None:
+    if status != 0:
+        raise SimulationFailed(f"ngspice exit {status}", log)
 
 
 def _program() -> str:
@@ -125,6 +142,12 @@ def _call(command: list[str], folder: str) -> subprocess.CompletedProcess[bytes]
 # ---------------------------------------------------------------------------------------------
 # The raw file
 
+PLOTS: dict[Analysis, str] = {
+    "tran": "Transient Analysis",
+    "ac": "AC Analysis",
+    "dc": "DC transfer characteristic",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class RawPlot:
@@ -132,12 +155,12 @@ class RawPlot:
 
     name: str
     """Such as ``Transient Analysis``."""
-    vectors: dict[str, NDArray[np.float64]]
+    vectors: dict[str, NDArray[Any]]
     """By the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
 
 
 def read_raw(content: bytes) -> list[RawPlot]:
-    """The real plots of a binary raw file; complex ones (``.ac``) are passed over.
+    """The plots of a binary raw file, real (float64) and complex (complex128, of ``.ac``).
 
     A plot is a text header (``Key: value`` lines, then one line ``index name type`` a variable)
     and, after the line ``Binary:``, points × variables doubles in the machine's byte order, twice
@@ -169,11 +192,11 @@ def read_raw(content: bytes) -> list[RawPlot]:
         size = rows * columns * width * 8
         if position + size > len(content):
             raise ValueError("raw file: cut short")
-        if width == 1:
-            data = np.frombuffer(content, np.float64, rows * columns, position)
-            by_variable = np.ascontiguousarray(data.reshape(rows, columns).T)
-            vectors = {_session_name(n): by_variable[i] for i, n in enumerate(names)}
-            plots.append(RawPlot(name, vectors))
+        kind = np.complex128 if width == 2 else np.float64
+        data: NDArray[Any] = np.frombuffer(content, kind, rows * columns, position)
+        by_variable = np.ascontiguousarray(data.reshape(rows, columns).T)
+        vectors = {_session_name(n): by_variable[i] for i, n in enumerate(names)}
+        plots.append(RawPlot(name, vectors))
         position += size
     return plots
 
