@@ -31,14 +31,14 @@ NOMINAL_SAMPLES = 50
 the first fifty are a random subset, and the same one however many samples follow."""
 SLOW = 0.9
 """Every sample with a larger multiplier starts from the nominal orbit too, whatever its index."""
-UNKNOWN_PERIODS = 50
-"""Drive periods for a sample without a period, so without a multiplier: those of ρ = 0.9."""
-REMAINDER = 2e-4
-"""Of the peak: a tenth of the strobe tolerance."""
+UNKNOWN_PERIODS = 20
+"""Drive periods for a sample without a period: 64 more follow, in which none must be found."""
+REMAINDER = 5e-4
+"""Of the peak: a quarter of the strobe tolerance."""
 MOST_PERIODS = 400
 """Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
 out by name: the run would take minutes."""
-OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 3, 1
+OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
 """How often the step is halved where ngspice disagrees, until two step sizes say the same."""
 
 

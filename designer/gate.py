@@ -35,6 +35,8 @@ BOUND = 1e-3
 """Of the peak: half the strobe tolerance, so that boards that differ have room too."""
 DISCARD = 2
 """Periods left out after a start on the exact circuit's orbit."""
+SHORTEST = 8
+"""Drive periods of the shortest run: a lap of one period is then judged over six."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ class Subject:
 def job(
     subject: Subject, settings: SolverSettings, nudge: float = 0.0, *, keep: bool = False
 ) -> SpiceJob[Read]:
-    """The run of one subject: what it discards, and at least 4n periods (six or more) to judge.
+    """The run of one subject: what it discards, and at least 4n periods to judge.
 
     Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
     nudge : fraction by which every initial voltage is raised (``remedies``).
@@ -141,7 +143,7 @@ def job(
 
 def length(subject: Subject) -> int:
     """Drive periods that the run of a subject takes."""
-    return subject.discard + max(4 * (subject.orbit.n or MAX_PERIOD), 6)
+    return max(subject.discard + 4 * (subject.orbit.n or MAX_PERIOD), SHORTEST)
 
 
 def task(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> Task[Read]:
