@@ -52,9 +52,14 @@ class Section:
 class OpAmp:
     """An op-amp package. Voltages and currents are those at a supply of ± ``rated_supply``.
 
-    supply [V] per rail; swing, saturation [V] about ground; offset [V]; bias [A]; gain [V/V];
-    gbw [Hz]; slew [V/s]; output_current [A]; output_resistance [Ω], open loop; common_mode [V], its
-    lower and upper end as min and max; supply_current [A] per section; noise [V/√Hz] at 1 kHz.
+    supply [V] per rail; swing (into 10 kΩ), saturation [V] about ground; offset [V]; bias [A]; gain
+    [V/V]; gbw [Hz]; slew [V/s]; output_current [A], short circuit; output_resistance [Ω], open
+    loop; common_mode [V], its lower and upper end as min and max; supply_current [A] per section;
+    noise [V/√Hz] at 1 kHz;
+    What only the finer simulation models use may be missing: recovery [s] from saturation after a
+    hard overdrive is reversed; phase_margin [degrees] at unity gain; swing_2k [V] into 2 kΩ;
+    noise_corner [Hz], of the 1/f noise; phase_reversal, whether the output goes high when an input
+    falls below the common-mode range.
     ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
     offsets from, and where it is cut. ``supply_pins``: positive, negative.
     """
@@ -83,6 +88,11 @@ class OpAmp:
     price: int
     footprint: str
     sources: tuple[str, ...]
+    recovery: Figure | None = None
+    phase_margin: Figure | None = None
+    swing_2k: Figure | None = None
+    noise_corner: Figure | None = None
+    phase_reversal: bool = False
 
     @property
     def sections(self) -> int:

@@ -38,6 +38,7 @@ from designer.schema import (
     choice,
     did_you_mean,
     exactly,
+    flag,
     line,
     lines,
     number,
@@ -395,6 +396,11 @@ class _OpAmpTable(BaseModel):
     price: Annotated[int, _price()]
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
+    recovery: Annotated[Figure | None, _figure("s")] = None
+    phase_margin: Annotated[Figure | None, _figure("°")] = None
+    swing_2k: Annotated[Figure | None, _figure("V")] = None
+    noise_corner: Annotated[Figure | None, _figure("Hz")] = None
+    phase_reversal: Annotated[bool, flag()] = False
 
 
 class _DiodeTable(BaseModel):

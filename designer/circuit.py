@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from designer.catalogentry import OpAmp
 from designer.errors import InputError
 
 GROUND = "0"
@@ -87,7 +88,8 @@ class Circuit:
     states : capacitor names in the order of the state equations.
     state_nets : nets that carry the states, in the same order.
     opamp : name of the op-amp in the catalogue; gain : its open-loop gain; bias : input current
-    [A]; supply, saturation : rails and output limits, ± volts.
+    [A]; supply, saturation : rails and output limits, ± volts. figures : the catalogue's entry of
+    the op-amp, for models above the ideal one.
     """
 
     parts: tuple[Part, ...]
@@ -100,6 +102,7 @@ class Circuit:
     bias: float
     supply: float
     saturation: float
+    figures: OpAmp | None = None
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parts]

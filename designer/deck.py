@@ -1,22 +1,26 @@
 """The SPICE deck of a board: literal values, one element a line.
 
-Written for plain ``ngspice -b`` and for the shared library alike. The op-amp is one subcircuit with
-an input offset, an open-loop gain and two output limits: the rung called ``ideal``. The offset is a
-source in series, not the limiter's own parameter: with the parameter every op-amp starts Newton's
-method beyond its limit, where the slope is zero, and no board with offsets ever starts. Text from a
-model file enters only through ``title_line``.
+Written for plain ``ngspice -b`` and for the shared library alike. Every op-amp is one subcircuit,
+which ``designer.opamp_model`` writes for the rung that is asked for. Text from a model file enters
+only through ``title_line``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from designer import opamp_model
 from designer.circuit import Board, Circuit
+from designer.opamp_model import Parameters, Rung
+from designer.reduction import FloatingCircuit, Reduction
 from designer.system import Array
 
 FORMAT = 1
-LIMIT_RANGE = 1e-3
-"""Width [V] over which the limiter's corner is rounded, so that Newton's method converges."""
+IDEAL_GAIN = 1e9
+"""Open-loop gain that stands for an infinite one."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +59,16 @@ def write(
     title: str,
     stop_time: float,
     initial: Array | None = None,
+    rung: Rung = "ideal",
 ) -> str:
     """The deck as text, ending in a newline.
 
-    initial : (states,) capacitor voltages at t = 0; discharged where None.
+    initial : (states,) capacitor voltages at t = 0; discharged where None. rung : the op-amps'
+    model; those with a memory start at the output voltages that belong to ``initial``.
+
+    Raises
+    ------
+    ValueError : a rung above ``ideal`` for a circuit without the figures of its op-amp.
     """
     lines = [
         title_line(title),
@@ -72,23 +82,9 @@ def write(
     for c in circuit.capacitors:
         start = float(voltages.get(c.name, 0.0))
         lines.append(f"{c.name} {c.plus} {c.minus} {_n(board.values[c.name])} IC={_n(start)}")
-    for s in circuit.sections:
-        low, high = board.rails[s.name]
-        lines.append(
-            f"X{s.name} {s.noninverting} {s.inverting} {s.output} opamp "
-            f"vos={_n(board.offset.get(s.name, 0.0))} low={_n(low)} high={_n(high)}"
-        )
-        if board.bias:
-            lines.append(f"I{s.name} {s.inverting} 0 {_n(board.bias)}")
-    gain = 1.0 / board.inverse_gain if board.inverse_gain else 1e9
+    lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
     nets = [*circuit.state_nets, *(["fv"] if circuit.stops else []), circuit.generator.net]
     lines += [
-        ".subckt opamp inp inn out vos=0 low=-13 high=13",
-        "Voffset inside inp {vos}",
-        "Alimit %vd(inside inn) out limiter",
-        f".model limiter limit(in_offset=0 gain={_n(gain)} out_lower_limit={{low}} "
-        f"out_upper_limit={{high}} limit_range={_n(LIMIT_RANGE)} fraction=FALSE)",
-        ".ends opamp",
         f".options method={settings.method} reltol={_n(settings.reltol)} "
         f"abstol={_n(settings.abstol)} vntol={_n(settings.vntol)} noopiter",
         ".save " + " ".join(f"v({net})" for net in nets),
@@ -96,6 +92,52 @@ def write(
         ".end",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, float]) -> list[str]:
+    """One element line for each section, the supplies that the model uses, and the model."""
+    gain = 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
+    lines = [
+        opamp_model.instance(
+            s.name,
+            (s.noninverting, s.inverting, s.output),
+            rung=rung,
+            vos=board.offset.get(s.name, 0.0),
+            ib=board.bias,
+            rails=board.rails[s.name],
+            start=outputs.get(s.name, 0.0),
+        )
+        for s in circuit.sections
+    ]
+    if rung == "ideal":
+        return lines + opamp_model.ideal(gain)
+    if circuit.figures is None:
+        raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
+    lines += [f"VCC vcc 0 {_n(circuit.supply)}", f"VEE vee 0 {_n(-circuit.supply)}"]
+    return lines + opamp_model.subcircuit(rung, Parameters.of(circuit.figures, gain))
+
+
+def _outputs(
+    circuit: Circuit, board: Board, excitation: Excitation, initial: Array | None, rung: Rung
+) -> dict[str, float]:
+    """Output voltage of each section at t = 0 where nothing is saturated, cut at its limits."""
+    if rung == "ideal":
+        return {}
+    x = np.zeros(len(circuit.states)) if initial is None else initial
+    reduction = Reduction(circuit, board)
+    try:
+        voltage = reduction.solution(reduction.system().start).voltage
+    except FloatingCircuit:
+        return {}
+    return {
+        s.name: float(
+            np.clip(
+                voltage[s.output] @ np.concatenate([x, [excitation.offset, 1.0]]),
+                *board.rails[s.name],
+            )
+        )
+        for s in circuit.sections
+    }
 
 
 def title_line(text: str) -> str:

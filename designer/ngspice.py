@@ -175,7 +175,7 @@ def require_version(found: str) -> str:
 
 CARDS = frozenset(
     ".subckt .ends .model .param .func .tran .ic .options .option .save .end .title .global "
-    ".temp .ac .dc".split()
+    ".temp .ac .dc .op .noise".split()
 )
 
 MODEL_TYPES = frozenset(

@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -67,8 +67,30 @@ class BatchNgspice:
         self, netlist: str, analysis: Analysis
     ) -> tuple[dict[str, NDArray[Any]], str, float, int]:
         """Run a deck: vectors of its last analysis of this kind, log, wall time, exit status."""
-        check_netlist(netlist)
         started = time.perf_counter()
+        plots, log, status = self._plots(netlist)
+        wanted = [plot.phasors or plot.vectors for plot in plots if plot.name == PLOTS[analysis]]
+        return wanted[-1] if wanted else {}, log, time.perf_counter() - started, status
+
+    def analyse(self, netlist: str) -> list[RawPlot]:
+        """Every plot of a deck of any analysis: operating point, ``.dc``, ``.ac``, ``.noise``.
+
+        Raises
+        ------
+        ValueError : `check_netlist` refuses the deck.
+        SimulationFailed : the log holds an `offending_line`, or there is no plot.
+        """
+        plots, log, status = self._plots(netlist)
+        line = offending_line(log)
+        if line is not None:
+            raise SimulationFailed(said(line), log)
+        if status != 0 or not plots:
+            raise SimulationFailed(f"{len(plots)} plots, ngspice exit {status}", log)
+        return plots
+
+    def _plots(self, netlist: str) -> tuple[list[RawPlot], str, int]:
+        """Plots, log and exit status."""
+        check_netlist(netlist)
         with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
             Path(folder, "deck.cir").write_bytes(netlist.encode("utf-8") + b"\n")
             done = _call([self._program, "-n", "-b", "-r", "deck.raw", "deck.cir"], folder)
@@ -76,14 +98,11 @@ class BatchNgspice:
             raw = Path(folder, "deck.raw")
             content = raw.read_bytes() if raw.exists() else b""
         try:
-            plots = read_raw(content)
+            return read_raw(content), log, done.returncode
         except ValueError as error:
             line = offending_line(log)
             reason = f"{error} (ngspice exit {done.returncode})" if line is None else said(line)
             raise SimulationFailed(reason, log) from error
-        wanted = [plot for plot in plots if plot.name == PLOTS[analysis]]
-        vectors = wanted[-1].vectors if wanted else {}
-        return vectors, log, time.perf_counter() - started, done.returncode
 
     def close(self) -> None:
         """Nothing to do: nothing outlives a run."""
@@ -155,12 +174,14 @@ class RawPlot:
 
     name: str
     """Such as ``Transient Analysis``."""
-    vectors: dict[str, NDArray[Any]]
+    vectors: dict[str, NDArray[np.float64]]
     """By the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
+    phasors: dict[str, NDArray[np.complex128]] = field(default_factory=dict)
+    """Likewise, of a plot of complex numbers (``.ac``), whose ``vectors`` are empty."""
 
 
 def read_raw(content: bytes) -> list[RawPlot]:
-    """The plots of a binary raw file, real (float64) and complex (complex128, of ``.ac``).
+    """The plots of a binary raw file.
 
     A plot is a text header (``Key: value`` lines, then one line ``index name type`` a variable)
     and, after the line ``Binary:``, points × variables doubles in the machine's byte order, twice
@@ -192,11 +213,14 @@ def read_raw(content: bytes) -> list[RawPlot]:
         size = rows * columns * width * 8
         if position + size > len(content):
             raise ValueError("raw file: cut short")
-        kind = np.complex128 if width == 2 else np.float64
-        data: NDArray[Any] = np.frombuffer(content, kind, rows * columns, position)
-        by_variable = np.ascontiguousarray(data.reshape(rows, columns).T)
-        vectors = {_session_name(n): by_variable[i] for i, n in enumerate(names)}
-        plots.append(RawPlot(name, vectors))
+        block, shape = content[position : position + size], (rows, columns)
+        keys = [_session_name(n) for n in names]
+        if width == 1:
+            real = np.frombuffer(block, np.float64).reshape(shape).T.copy()
+            plots.append(RawPlot(name, dict(zip(keys, real, strict=True))))
+        else:
+            phasors = np.frombuffer(block, np.complex128).reshape(shape).T.copy()
+            plots.append(RawPlot(name, {}, dict(zip(keys, phasors, strict=True))))
         position += size
     return plots
 

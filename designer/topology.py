@@ -74,6 +74,7 @@ def build(
         bias=opamp.bias.typ or 0.0,
         supply=supply,
         saturation=saturation,
+        figures=opamp,
     )
 
 
