@@ -310,7 +310,7 @@ def _compiling(progress: Progress) -> Iterator[None]:
 def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
     answer = outcome.answer
     if verb == "tolerance":
-        keys = ("format", "samples", "responses", "provenance")
+        keys = ("format", "samples", "equation_check", "responses", "provenance")
         answer = {**{k: answer[k] for k in keys}, "cost": answer["cost"]["study"]}
     if json:
         _print_json(answer)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import __version__, api, design_files, simulate_plots, simulation
+from designer import __version__, api, design_files, equation_check, simulate_plots, simulation
 from designer.api import RunResult, Synthesis
 from designer.blocks import BlockStore, block_names
 from designer.catalog import Catalog, load_catalog
@@ -186,6 +186,10 @@ def run_into(
             made = load(folder, modelfile, catalog)
             folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
         ready = time.perf_counter()
+        progress.stage("ngspice, equation check")
+        equations = equation_check.check(made.design, made.found, pool)
+        if not equations.passed:
+            progress.note(f"the netlist does not compute the model's equation: {equations.worst}")
         checked = check(made, pool, progress)
         if checked[0].gate is not None and checked[0].gate.passed:
             folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
@@ -207,8 +211,10 @@ def run_into(
         "jobs": float(jobs),
     }
     said = _study_provenance(made, checked, options)
-    result = RunResult(made.modelfile, catalog, made.found, made.design, checked, study, said, cost)
-    folder.write(TOLERANCE, dumps(study_json(study, said, cost)))
+    result = RunResult(
+        made.modelfile, catalog, made.found, made.design, checked, study, said, cost, equations
+    )
+    folder.write(TOLERANCE, dumps(study_json(study, said, cost, equations)))
     progress.stage("report")
     from designer.report import write_report  # matplotlib is not needed before this
     from designer.report_data import ReportData
@@ -327,4 +333,5 @@ def _all_found(answer: Mapping[str, Any]) -> bool:
 
 
 def _satisfied(answer: Mapping[str, Any]) -> bool:
-    return all(r["found"] and r["engines_agree"] for r in answer["responses"])
+    right = answer["equation_check"] is None or answer["equation_check"]["passed"]
+    return right and all(r["found"] and r["engines_agree"] for r in answer["responses"])

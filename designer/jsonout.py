@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.equation_check import EquationCheck
     from designer.modelfile import ModelFile
     from designer.montecarlo import Answer
     from designer.orbit import Orbit
@@ -102,12 +103,16 @@ def synthesis_json(
 
 
 def study_json(
-    study: Study, provenance: Mapping[str, Any], cost: Mapping[str, float]
+    study: Study,
+    provenance: Mapping[str, Any],
+    cost: Mapping[str, float],
+    equations: EquationCheck | None = None,
 ) -> dict[str, Any]:
     """What ``tolerance`` prints and ``tolerance.json`` holds."""
     return {
         "format": FORMAT,
         "samples": study.plan.samples,
+        "equation_check": None if equations is None else equations.as_dict(),
         "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
         "provenance": provenance,
         "cost": dict(cost),
@@ -120,6 +125,7 @@ def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, A
     return {
         **design,
         "samples": study["samples"],
+        "equation_check": study.get("equation_check"),
         "responses": study["responses"],
         "provenance": study["provenance"],
         "cost": cost,

@@ -210,6 +210,22 @@ def ngspice_table(data: ReportData) -> Table | None:
     )  # fmt: skip
 
 
+def equation_table(data: ReportData) -> Table | None:
+    """What ngspice says of the circuit's equation: .ac and .dc against the model."""
+    if data.equations is None:
+        return None
+    rows = tuple(
+        (
+            f.name,
+            f.reason or words.error(f.deviation),
+            words.error(f.bound),
+            words.yes(f.passed),
+        )
+        for f in data.equations.findings
+    )
+    return Table(("compared", "largest deviation", "bound", "within"), rows, (1, 2))
+
+
 def bom_table(data: ReportData) -> Table | None:
     if not data.bom:
         return None
