@@ -9,16 +9,17 @@ eight-impact response. Both bounds are halved together until the settings pass, 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from designer import deck, remedies
+from designer import deck, remedies, warm_start
 from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
+from designer.opamp_model import Rung
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.remedies import Outcome, Remedy, Task
@@ -35,6 +36,8 @@ BOUND = 1e-3
 """Of the peak: half the strobe tolerance, so that boards that differ have room too."""
 DISCARD = 2
 """Periods left out after a start on the exact circuit's orbit."""
+MOST_DISCARDED = 400
+"""Drive periods: no run on any rung discards more."""
 SHORTEST = 8
 """Drive periods of the shortest run: a lap of one period is then judged over six."""
 
@@ -45,7 +48,7 @@ class GateResult:
     difference : largest strobe difference between the runs, of the peak. read : the run at
     ``settings``; tried : steps a period that were tried. contact_steps : N, largest steps in the
     shortest contact at ``settings`` (nan without contact). remedies : what the run at ``settings``
-    needed besides, or its companions."""
+    needed besides, or its companions. discarded : drive periods before the run was judged."""
 
     settings: SolverSettings
     passed: bool
@@ -54,6 +57,7 @@ class GateResult:
     tried: tuple[int, ...]
     contact_steps: float = float("nan")
     remedies: tuple[Remedy, ...] = ()
+    discarded: int = DISCARD
 
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""
@@ -66,6 +70,7 @@ class GateResult:
             "steps_a_contact": self.contact_steps,
             "steps_tried": list(self.tried),
             "remedies": list(self.remedies),
+            "discarded_periods": self.discarded,
         }
 
 
@@ -75,6 +80,7 @@ class Subject:
 
     orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
     voltages at t = 0 if not the orbit's. discard : periods left out before the run is judged.
+    rung : the op-amps' model in ngspice.
     """
 
     reduction: Reduction
@@ -82,6 +88,7 @@ class Subject:
     orbit: Orbit
     start: Array | None = None
     discard: int = DISCARD
+    rung: Rung = "ideal"
 
     @property
     def circuit(self) -> Circuit:
@@ -107,19 +114,25 @@ class Subject:
 
 
 def job(
-    subject: Subject, settings: SolverSettings, nudge: float = 0.0, *, keep: bool = False
+    subject: Subject,
+    settings: SolverSettings,
+    nudge: float = 0.0,
+    *,
+    keep: bool = False,
+    whole: bool = False,
 ) -> SpiceJob[Read]:
     """The run of one subject: what it discards, and at least 4n periods to judge.
 
     Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
-    nudge : fraction by which every initial voltage is raised (``remedies``).
+    nudge : fraction by which every initial voltage is raised (``remedies``). whole : nothing is
+    left out of the strobes, for a look at the way itself.
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
     upper, lower = contact_rows(subject.system)
     reading = Reading(
         period=subject.period,
-        discard=subject.discard,
+        discard=0 if whole else subject.discard,
         nets=subject.circuit.state_nets,
         shift=subject.shift,
         upper=upper,
@@ -136,6 +149,7 @@ def job(
         title="one response of one board",
         stop_time=stop,
         initial=(1.0 + nudge) * start,
+        rung=subject.rung,
     )
     signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
     return SpiceJob(text, signals, stop, partial(read, reading=reading))
@@ -146,9 +160,11 @@ def length(subject: Subject) -> int:
     return max(subject.discard + 4 * (subject.orbit.n or MAX_PERIOD), SHORTEST)
 
 
-def task(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> Task[Read]:
+def task(
+    subject: Subject, settings: SolverSettings, *, keep: bool = False, whole: bool = False
+) -> Task[Read]:
     """The run as one that remedies may change."""
-    return Task(partial(job, subject, keep=keep), settings)
+    return Task(partial(job, subject, keep=keep, whole=whole), settings)
 
 
 def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
@@ -190,8 +206,10 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
 def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     """Find the coarsest settings that pass, for the nominal board of each response.
 
-    All subjects move through the levels together, so that the workers stay busy.
+    All subjects move through the levels together, so that the workers stay busy. On a rung above
+    ``ideal`` a short run first says how many periods are discarded (``warm_start``).
     """
+    subjects = _warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
     steps = [
         max(STEPS_PER_PERIOD, int(np.ceil(STEPS_PER_CONTACT * s.period / contact)))
@@ -211,6 +229,26 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
             runs = [found[3 * k + j] for j in range(3)]
             results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])
     return [r for r in results if r is not None]
+
+
+def _warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
+    """The subjects with the periods that each has to discard on its rung."""
+    out = list(subjects)
+    asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
+    tasks = []
+    for i in asked:
+        s = subjects[i]
+        contact = shortest_contact(s.orbit, s.system, s.excitation)
+        steps = max(2 * STEPS_PER_PERIOD, 4 * STEPS_PER_CONTACT * s.period / contact)
+        probe = replace(s, discard=max(warm_start.PROBE - 4, 0) * s.orbit.n)
+        tasks.append(task(probe, SolverSettings("trap", s.period / steps), whole=True))
+    for k, outcome in remedies.run(pool, tasks):
+        s = subjects[asked[k]]
+        if isinstance(outcome.result, Read):
+            peak = np.abs(s.orbit.extremes).max(axis=1)
+            found, _ = warm_start.periods(outcome.result.strobes, s.orbit.n, s.orbit.radius, peak)
+            out[asked[k]] = replace(s, discard=min(max(found, DISCARD), MOST_DISCARDED))
+    return out
 
 
 def _trio(step: float) -> tuple[SolverSettings, SolverSettings, SolverSettings]:
@@ -245,6 +283,7 @@ def _judge(
         tried,
         contact / settings.max_step if len(wanted.impact_times) else float("nan"),
         tuple(r for r in CURES if r in needed),
+        subject.discard,
     )
 
 
