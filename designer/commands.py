@@ -40,6 +40,14 @@ class EngineName(StrEnum):
     NGSPICE = "ngspice"
 
 
+class RungName(StrEnum):
+    """How ngspice models the op-amps."""
+
+    IDEAL = "ideal"
+    DYNAMIC = "dynamic"
+    FULL = "full"
+
+
 Source = Annotated[
     Path, typer.Argument(metavar="MODEL|DIR", help="A model file (TOML) or a design folder.")
 ]
@@ -174,6 +182,9 @@ def simulate(
     engine: Annotated[EngineName, typer.Option("--engine", help="What simulates.")] = (
         EngineName.MODEL
     ),
+    rung: Annotated[
+        RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
+    ] = RungName.IDEAL,
     seed: Seed = 1,
     plots: Annotated[
         Path | None,
@@ -194,7 +205,7 @@ def simulate(
 
         job.Options(seed, jobs).check()
         answer, found = job.simulate_answer(
-            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite
+            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
         )
     if json:
         _print_json(answer)

@@ -31,6 +31,7 @@ from designer.folder import (
 )
 from designer.jsonout import dumps, plain, run_json, simulate_json, study_json
 from designer.modelfile import ModelFile, read_model_file
+from designer.opamp_model import Rung
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
@@ -235,6 +236,7 @@ def simulate_answer(
     progress: Progress,
     plots: Path | None = None,
     overwrite: bool = False,
+    rung: Rung = "ideal",
 ) -> tuple[dict[str, Any], bool]:
     """The verb ``simulate``: its JSON object, and whether every wanted response was found.
 
@@ -261,8 +263,9 @@ def simulate_answer(
         jobs=jobs,
         progress=progress,
         traces=plots is not None,
+        rung=rung,
     )
-    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine))
+    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine, rung))
     answer = simulate_json(simulated, engine, said, time.perf_counter() - began)
     if plots is not None:
         progress.stage("pictures")
