@@ -17,7 +17,8 @@ from designer.circuit import Circuit
 from designer.deck import SolverSettings
 from designer.flow import Flow
 from designer.gate import Subject
-from designer.ngspice import SimulationFailed, Waveforms, open_simulator
+from designer.ngspice import SimulationFailed, Waveforms
+from designer.orbit import MAX_PERIOD
 from designer.reduction import Reduction
 from designer.spread import Spread, draw
 from designer.system import Array, Drive
@@ -26,8 +27,6 @@ from designer.workers import SpiceJob, SpicePool
 
 SETTLED = 400
 """Drive periods of the run that a warm start is held against."""
-GRID = 2000
-"""Points of a period at which ngspice and the exact circuit are compared."""
 
 
 def flow_of(subject: Subject) -> Flow:
@@ -86,24 +85,6 @@ def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
     )
 
 
-def rms_error(subject: Subject, result: Read) -> float:
-    """RMS over the last n periods of ngspice less exact circuit, of the peak; worst state.
-
-    ``result`` has its trace. The exact orbit is taken from its own strobe nearest to ngspice's.
-    """
-    assert result.trace is not None
-    n, peak = subject.orbit.n, peak_of(subject)
-    flow = flow_of(subject)
-    laps = flow.run(subject.orbit.start, n).strobes[:-1]
-    first = result.trace[1][0]
-    start = laps[int(np.argmin((np.abs(laps - first) / peak).max(axis=1)))]
-    exact = flow.run(start, n, points=GRID).strobes
-    grid = np.arange(len(exact)) * subject.period / GRID
-    time_, states = result.trace
-    got = np.stack([np.interp(grid, time_, column) for column in states.T], axis=1)
-    return float((np.sqrt(((got - exact) ** 2).mean(axis=0)) / peak).max())
-
-
 # ---------------------------------------------------------------------------------------------
 # Throughput
 
@@ -154,26 +135,18 @@ def throughput(
 NAIVE_PERIODS = 500
 
 
-def naive(subjects: Sequence[Subject], settings: SolverSettings) -> Throughput:
-    """A process for every sample, one after the other, from discharged capacitors, 500 periods."""
-    began = time.perf_counter()
-    simulator = open_simulator("batch")
-    agreed = failed = 0
-    for s in subjects:
-        todo = gate.job(
-            replace(
-                s, start=np.zeros(len(s.circuit.states)), discard=NAIVE_PERIODS - 4 * s.orbit.n
-            ),
-            settings,
+def naive(subjects: Sequence[Subject], settings: SolverSettings, jobs: int) -> Throughput:
+    """A process for every sample, from discharged capacitors, 500 periods; same settings."""
+    rest = [
+        replace(
+            s,
+            start=np.zeros(len(s.circuit.states)),
+            discard=NAIVE_PERIODS - 4 * (s.orbit.n or MAX_PERIOD),
         )
-        try:
-            found = todo.reduce(simulator.run(todo.netlist, todo.signals, todo.stop_time))
-        except SimulationFailed:
-            failed += 1
-        else:
-            agreed += found.orbit.response == s.orbit.response
-    seconds = time.perf_counter() - began
-    return Throughput(len(subjects), 1, seconds, agreed, failed, NAIVE_PERIODS)
+        for s in subjects
+    ]
+    with SpicePool(jobs, "batch", timeout=600.0) as pool:
+        return throughput(pool, rest, settings, jobs)
 
 
 # ---------------------------------------------------------------------------------------------

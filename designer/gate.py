@@ -1,9 +1,10 @@
 """The numerics gate: which ngspice settings may decide on a response.
 
 Before ngspice's verdict counts, two step sizes and two integration methods must agree with each
-other, and with the exact circuit, on n-p-q and on every strobe within a stated bound. The largest
-step is min(T/200, shortest contact/N): it follows the contact, for T/200 miscounts the
-eight-impact response. Both bounds are halved together until the settings pass, which finds N.
+other, and with the exact circuit, on n-p-q and on every strobe within a stated bound; with ideal
+op-amps the wave itself must be the exact circuit's, within another. The largest step is
+min(T/200, shortest contact/N): it follows the contact, for T/200 miscounts the eight-impact
+response. Both bounds are halved together until the settings pass, which finds N.
 """
 
 from __future__ import annotations
@@ -34,10 +35,16 @@ CURES: tuple[Remedy, ...] = ("tolerance", "start")
 """Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
 BOUND = 1e-3
 """Of the peak: half the strobe tolerance, so that boards that differ have room too."""
+WAVE_BOUND = 2e-3
+"""Of the peak: RMS over the last n periods of ngspice, with ideal op-amps, less exact circuit."""
+RELTOL = 1e-5
+"""ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
 DISCARD = 2
 """Periods left out after a start on the exact circuit's orbit."""
 MOST_DISCARDED = 400
 """Drive periods: no run on any rung discards more."""
+WAVE_POINTS = 20_000
+"""Points of a period of the exact wave, so many that straight lines join them."""
 SHORTEST = 8
 """Drive periods of the shortest run: a lap of one period is then judged over six."""
 
@@ -48,7 +55,8 @@ class GateResult:
     difference : largest strobe difference between the runs, of the peak. read : the run at
     ``settings``; tried : steps a period that were tried. contact_steps : N, largest steps in the
     shortest contact at ``settings`` (nan without contact). remedies : what the run at ``settings``
-    needed besides, or its companions. discarded : drive periods before the run was judged."""
+    needed besides, or its companions. discarded : drive periods before the run was judged. wave :
+    `wave_error` of the run at ``settings`` (nan without a period)."""
 
     settings: SolverSettings
     passed: bool
@@ -58,6 +66,7 @@ class GateResult:
     contact_steps: float = float("nan")
     remedies: tuple[Remedy, ...] = ()
     discarded: int = DISCARD
+    wave: float = float("nan")
 
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""
@@ -66,6 +75,7 @@ class GateResult:
             "passed": self.passed,
             "difference": self.difference,
             "bound": BOUND,
+            "rms": self.wave,
             "steps_a_period": self.tried[-1],
             "steps_a_contact": self.contact_steps,
             "steps_tried": list(self.tried),
@@ -241,7 +251,7 @@ def _warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
         contact = shortest_contact(s.orbit, s.system, s.excitation)
         steps = max(2 * STEPS_PER_PERIOD, 4 * STEPS_PER_CONTACT * s.period / contact)
         probe = replace(s, discard=max(warm_start.PROBE - 4, 0) * s.orbit.n)
-        tasks.append(task(probe, SolverSettings("trap", s.period / steps), whole=True))
+        tasks.append(task(probe, SolverSettings("trap", s.period / steps, RELTOL), whole=True))
     for k, outcome in remedies.run(pool, tasks):
         s = subjects[asked[k]]
         if isinstance(outcome.result, Read):
@@ -251,12 +261,35 @@ def _warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
     return out
 
 
+def wave_error(subject: Subject, read: Read) -> float:
+    """RMS over the last n periods of ngspice less exact circuit, of the peak of each state, worst.
+
+    ``read`` has its trace; the exact wave starts at the orbit's strobe that is nearest to
+    ngspice's. nan without a period or where n differs.
+    """
+    orbit = subject.orbit
+    if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
+        return float("nan")
+    e = subject.excitation
+    flow = Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude))
+    peak = np.abs(orbit.extremes).max(axis=1)
+    time, states = read.trace
+    laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
+    start = laps[int(np.argmin((np.abs(laps - states[0]) / peak).max(axis=1)))]
+    exact = flow.run(start, orbit.n, points=WAVE_POINTS).strobes
+    grid = np.arange(len(exact)) * subject.period / WAVE_POINTS
+    # At ngspice's own points, in time: what lies between them is no part of its answer.
+    there = np.stack([np.interp(time, grid, column) for column in exact.T], axis=1)
+    square = np.trapezoid((states - there) ** 2, time, axis=0) / (time[-1] - time[0])
+    return float((np.sqrt(square) / peak).max())
+
+
 def _trio(step: float) -> tuple[SolverSettings, SolverSettings, SolverSettings]:
     """The settings under test, the same at half the step, and the other method."""
     return (
-        SolverSettings("trap", step),
-        SolverSettings("trap", step / 2.0),
-        SolverSettings("gear", step / 2.0),
+        SolverSettings("trap", step, RELTOL),
+        SolverSettings("trap", step / 2.0, RELTOL),
+        SolverSettings("gear", step / 2.0, RELTOL),
     )
 
 
@@ -267,14 +300,16 @@ def _judge(
     needed = {r for run in runs for r in run.tried}
     good = [run.result for run in runs if isinstance(run.result, Read)]
     wanted = subject.orbit
-    difference, passed = float("nan"), False
+    difference, wave, passed = float("nan"), float("nan"), False
     if len(good) == len(runs):
         passed = all(r.orbit.response == wanted.response for r in good)
+        wave = wave_error(subject, good[0])
         if wanted.status is OrbitStatus.PERIODIC:
             peak = np.abs(wanted.extremes).max(axis=1)
             last = [r.strobes[-wanted.n :] for r in good]
             difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
             passed = passed and difference <= BOUND
+            passed = passed and (subject.rung != "ideal" or wave <= WAVE_BOUND)
     return GateResult(
         settings,
         passed,
@@ -284,6 +319,7 @@ def _judge(
         contact / settings.max_step if len(wanted.impact_times) else float("nan"),
         tuple(r for r in CURES if r in needed),
         subject.discard,
+        wave,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from designer import gate
 from designer.deck import SolverSettings
@@ -86,7 +87,11 @@ def test_two_steps_and_two_methods_say_the_same(
     """Three runs made here, on every strobe of the last 1-p-p lap."""
     settings = passed[p].settings
     half = settings.max_step / 2.0
-    runs = [settings, replace(settings, max_step=half), SolverSettings("gear", half)]
+    runs = [
+        settings,
+        replace(settings, max_step=half),
+        SolverSettings("gear", half, settings.reltol),
+    ]
     found = [
         r for _, r in sorted(pool.map([gate.job(subject(p), s) for s in runs]), key=lambda r: r[0])
     ]
@@ -95,6 +100,33 @@ def test_two_steps_and_two_methods_say_the_same(
     peak = np.abs(subject(p).orbit.extremes).max(axis=1)
     gaps = [np.abs(a.strobes[-1] - b.strobes[-1]) / peak for a in reads for b in reads]
     assert np.max(gaps) == pytest.approx(passed[p].difference, rel=1e-9)
+
+
+def rms(who: Subject, read: Read) -> float:
+    """On an even grid, ngspice's points joined by a cubic spline; worst state, of its peak."""
+    assert read.trace is not None
+    exact = flow_of(who).run(who.orbit.start, 1, points=5000).strobes
+    grid = np.linspace(0.0, who.period, len(exact))
+    gap = CubicSpline(*read.trace)(grid) - exact
+    return float((np.sqrt((gap**2).mean(axis=0)) / np.abs(exact).max(axis=0)).max())
+
+
+@pytest.mark.parametrize("p", P)
+def test_the_wave_is_the_exact_circuit_s(passed: dict[int, GateResult], p: int) -> None:
+    read = passed[p].read
+    assert isinstance(read, Read)
+    assert rms(subject(p), read) == pytest.approx(passed[p].wave, rel=0.1)
+    assert passed[p].wave < 2e-3
+
+
+@pytest.mark.slow
+def test_the_wave_at_every_p(pool: SpicePool) -> None:
+    for who, result in zip(
+        map(subject, range(1, 9)), gate.check(pool, [subject(p) for p in range(1, 9)]), strict=True
+    ):
+        assert result.passed
+        assert isinstance(result.read, Read)
+        assert rms(who, result.read) < 2e-3
 
 
 # ---------------------------------------------------------------------------------------------
