@@ -1,4 +1,7 @@
-"""Run each ``benchmarks/bench_*.py`` that has a ``main()`` and print how long it took."""
+"""Run each ``benchmarks/bench_*.py`` that has a ``main()`` and print how long it took.
+
+With names as arguments (``python -m benchmarks ngspice``), only those.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +9,30 @@ import importlib
 import pkgutil
 import sys
 import time
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
 
 import benchmarks
 
+PREFIX = "benchmarks.bench_"
 
-def main() -> int:
-    """Exit status: 0, or 1 if a benchmark raised."""
+
+def main(wanted: Sequence[str] = ()) -> int:
+    """Exit status: 0, 1 if a benchmark raised, or 2 if there is none of a wanted name."""
     console = Console()
     table = Table("benchmark", "seconds", "result")
     failed = False
-    names = sorted(m.name for m in pkgutil.iter_modules(benchmarks.__path__, "benchmarks."))
+    modules = sorted(m.name for m in pkgutil.iter_modules(benchmarks.__path__, "benchmarks."))
+    names = [name for name in modules if name.startswith(PREFIX)]
+    unknown = {f"{PREFIX}{name}" for name in wanted} - set(names)
+    if unknown:
+        found = ", ".join(name.removeprefix(PREFIX) for name in names)
+        print(f"no such benchmark; there are: {found}", file=sys.stderr)
+        return 2
     for name in names:
-        if not name.startswith("benchmarks.bench_"):
+        if wanted and name.removeprefix(PREFIX) not in wanted:
             continue
         run = getattr(importlib.import_module(name), "main", None)
         if run is None:
@@ -33,10 +45,10 @@ def main() -> int:
             failed, result = True, f"failed: {error!r}"
         seconds = time.perf_counter() - start
         shown = "" if result is None else str(result)
-        table.add_row(name.removeprefix("benchmarks.bench_"), f"{seconds:.2f}", shown)
+        table.add_row(name.removeprefix(PREFIX), f"{seconds:.2f}", shown)
     console.print(table)
     return int(failed)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -9,8 +9,9 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from designer import pipeline
+from designer import equation_check, pipeline
 from designer.catalog import Catalog, load_catalog
+from designer.equation_check import EquationCheck
 from designer.modelfile import ModelFile
 from designer.montecarlo import Answer, StudyPlan, Yield
 from designer.pipeline import Checked
@@ -45,6 +46,7 @@ class RunResult:
     study: Study
     provenance: dict[str, Any] = field(default_factory=dict)
     cost: dict[str, float] = field(default_factory=dict)
+    equations: EquationCheck | None = None
 
     @property
     def plan(self) -> StudyPlan:
@@ -61,8 +63,10 @@ class RunResult:
 
     @property
     def satisfied(self) -> bool:
-        """Whether every wanted response was found and every engine shows it."""
-        return all(c.model.found and c.agrees for c in self.checked)
+        """Whether every wanted response was found, every engine shows it, and the netlist computes
+        the model's equation."""
+        right = self.equations is None or self.equations.passed
+        return right and all(c.model.found and c.agrees for c in self.checked)
 
 
 def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesis:
@@ -101,5 +105,14 @@ def run(
     with SpicePool(jobs) as pool:
         require_ngspice(pool)
         made = synthesise(modelfile, catalog)
+        equations = equation_check.check(made.design, made.found, pool)
         study = tolerance(made, samples=samples, seed=seed, jobs=jobs, pool=pool, progress=progress)
-    return RunResult(made.modelfile, made.catalog, made.found, made.design, study.checked, study)
+    return RunResult(
+        made.modelfile,
+        made.catalog,
+        made.found,
+        made.design,
+        study.checked,
+        study,
+        equations=equations,
+    )

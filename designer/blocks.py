@@ -19,12 +19,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from designer import __version__
+from designer import __version__, confirmation
 from designer.errors import InputError
 from designer.montecarlo import (
     BLOCK,
-    NGSPICE_SAMPLES,
-    REFINEMENTS,
     Answer,
     StudyPlan,
     Verdict,
@@ -48,6 +46,11 @@ _SCHEMA = pa.schema(
         ("periods", pa.int64()),
         ("ngspice", pa.string()),
         ("ngspice_reason", pa.string()),
+        ("ngspice_remedies", pa.string()),
+        ("ngspice_nominal", pa.string()),
+        ("ngspice_nominal_reason", pa.string()),
+        ("ngspice_nominal_remedies", pa.string()),
+        ("ngspice_nominal_periods", pa.int64()),
     ]
 )
 
@@ -73,7 +76,14 @@ def study_hash(plan: StudyPlan) -> str:
         "opamp": [circuit.opamp, circuit.gain, circuit.bias, circuit.supply, circuit.saturation],
         "spread": plan.spread.as_dict(),
         "seed": plan.seed,
-        "ngspice": [NGSPICE_SAMPLES, REFINEMENTS],
+        "ngspice": [
+            confirmation.OWN_SAMPLES,
+            confirmation.OWN_REFINEMENTS,
+            confirmation.NOMINAL_SAMPLES,
+            confirmation.NOMINAL_REFINEMENTS,
+            confirmation.SLOW,
+            confirmation.MOST_PERIODS,
+        ],
         "questions": [
             {
                 "spec": asdict(q.spec),

@@ -41,6 +41,14 @@ class EngineName(StrEnum):
     NGSPICE = "ngspice"
 
 
+class RungName(StrEnum):
+    """How ngspice models the op-amps."""
+
+    IDEAL = "ideal"
+    DYNAMIC = "dynamic"
+    FULL = "full"
+
+
 Source = Annotated[
     Path, typer.Argument(metavar="MODEL|DIR", help="A model file (TOML) or a design folder.")
 ]
@@ -182,6 +190,9 @@ def simulate(
     engine: Annotated[EngineName, typer.Option("--engine", help="What simulates.")] = (
         EngineName.MODEL
     ),
+    rung: Annotated[
+        RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
+    ] = RungName.IDEAL,
     seed: Seed = 1,
     plots: Annotated[
         Path | None,
@@ -202,7 +213,7 @@ def simulate(
 
         job.Options(seed, jobs).check()
         answer, found = job.simulate_answer(
-            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite
+            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
         )
     if json:
         _print_json(answer)
@@ -338,7 +349,7 @@ def _compiling(progress: Progress) -> Iterator[None]:
 def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
     answer = outcome.answer
     if verb == "tolerance":
-        keys = ("format", "samples", "responses", "provenance")
+        keys = ("format", "samples", "equation_check", "responses", "provenance")
         answer = {**{k: answer[k] for k in keys}, "cost": answer["cost"]["study"]}
     if json:
         _print_json(answer)

@@ -1,25 +1,29 @@
 """The numerics gate: which ngspice settings may decide on a response.
 
 Before ngspice's verdict counts, two step sizes and two integration methods must agree with each
-other, and with the exact circuit, on n-p-q and on every strobe within a stated bound. The largest
-step follows the contact, not only the period: T/200 miscounts the eight-impact response.
+other, and with the exact circuit, on n-p-q and on every strobe within a stated bound; with ideal
+op-amps the wave itself must be the exact circuit's, within another. The largest step is
+min(T/200, shortest contact/N): it follows the contact, for T/200 miscounts the eight-impact
+response. Both bounds are halved together until the settings pass, which finds N.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
 
-from designer import deck
+from designer import deck, remedies, warm_start
 from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
+from designer.opamp_model import Rung
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
+from designer.remedies import Outcome, Remedy, Task
 from designer.system import Array, Drive, PiecewiseLinearSystem
 from designer.waveform_orbit import Read, Reading, read
 from designer.workers import SpiceJob, SpicePool
@@ -27,35 +31,74 @@ from designer.workers import SpiceJob, SpicePool
 STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 10
 LEVELS = 5
 """How often the step is halved before the gate gives up."""
+CURES: tuple[Remedy, ...] = ("tolerance", "start")
+"""Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
 BOUND = 1e-3
 """Of the peak: half the strobe tolerance, so that boards that differ have room too."""
+WAVE_BOUND = 2e-3
+"""Of the peak: RMS over the last n periods of ngspice, with ideal op-amps, less exact circuit."""
+RELTOL = 1e-5
+"""ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
 DISCARD = 2
 """Periods left out after a start on the exact circuit's orbit."""
+MOST_DISCARDED = 400
+"""Drive periods: no run on any rung discards more."""
+WAVE_POINTS = 20_000
+"""Points of a period of the exact wave, so many that straight lines join them."""
+SHORTEST = 8
+"""Drive periods of the shortest run: a lap of one period is then judged over six."""
 
 
 @dataclass(frozen=True)
 class GateResult:
     """settings : what passed, or the finest that was tried. passed : whether any did.
     difference : largest strobe difference between the runs, of the peak. read : the run at
-    ``settings``; tried : steps a period that were tried."""
+    ``settings``; tried : steps a period that were tried. contact_steps : N, largest steps in the
+    shortest contact at ``settings`` (nan without contact). remedies : what the run at ``settings``
+    needed besides, or its companions. discarded : drive periods before the run was judged. wave :
+    `wave_error` of the run at ``settings`` (nan without a period)."""
 
     settings: SolverSettings
     passed: bool
     difference: float
     read: Read | SimulationFailed
     tried: tuple[int, ...]
+    contact_steps: float = float("nan")
+    remedies: tuple[Remedy, ...] = ()
+    discarded: int = DISCARD
+    wave: float = float("nan")
+
+    def as_dict(self) -> dict[str, object]:
+        """For provenance: the settings, and what they passed."""
+        return {
+            **self.settings.as_dict(),
+            "passed": self.passed,
+            "difference": self.difference,
+            "bound": BOUND,
+            "rms": self.wave,
+            "steps_a_period": self.tried[-1],
+            "steps_a_contact": self.contact_steps,
+            "steps_tried": list(self.tried),
+            "remedies": list(self.remedies),
+            "discarded_periods": self.discarded,
+        }
 
 
 @dataclass(frozen=True)
 class Subject:
     """One response of one board (a reduction): what a run of ngspice needs.
 
-    orbit : on the exact circuit; the run starts there and its n sets the length.
+    orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
+    voltages at t = 0 if not the orbit's. discard : periods left out before the run is judged.
+    rung : the op-amps' model in ngspice.
     """
 
     reduction: Reduction
     excitation: Excitation
     orbit: Orbit
+    start: Array | None = None
+    discard: int = DISCARD
+    rung: Rung = "ideal"
 
     @property
     def circuit(self) -> Circuit:
@@ -80,17 +123,26 @@ class Subject:
         return 1.0 / self.excitation.frequency
 
 
-def job(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> SpiceJob[Read]:
-    """The run of one subject: ``DISCARD`` periods and at least 4n (six or more) to judge.
+def job(
+    subject: Subject,
+    settings: SolverSettings,
+    nudge: float = 0.0,
+    *,
+    keep: bool = False,
+    whole: bool = False,
+) -> SpiceJob[Read]:
+    """The run of one subject: what it discards, and at least 4n periods to judge.
 
     Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
+    nudge : fraction by which every initial voltage is raised (``remedies``). whole : nothing is
+    left out of the strobes, for a look at the way itself.
     """
-    periods = DISCARD + max(4 * (subject.orbit.n or MAX_PERIOD), 6)
-    stop = periods * subject.period
+    stop = length(subject) * subject.period
+    start = subject.orbit.start if subject.start is None else subject.start
     upper, lower = contact_rows(subject.system)
     reading = Reading(
         period=subject.period,
-        discard=DISCARD,
+        discard=0 if whole else subject.discard,
         nets=subject.circuit.state_nets,
         shift=subject.shift,
         upper=upper,
@@ -106,10 +158,23 @@ def job(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> Sp
         settings,
         title="one response of one board",
         stop_time=stop,
-        initial=subject.orbit.start,
+        initial=(1.0 + nudge) * start,
+        rung=subject.rung,
     )
     signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
     return SpiceJob(text, signals, stop, partial(read, reading=reading))
+
+
+def length(subject: Subject) -> int:
+    """Drive periods that the run of a subject takes."""
+    return max(subject.discard + 4 * (subject.orbit.n or MAX_PERIOD), SHORTEST)
+
+
+def task(
+    subject: Subject, settings: SolverSettings, *, keep: bool = False, whole: bool = False
+) -> Task[Read]:
+    """The run as one that remedies may change."""
+    return Task(partial(job, subject, keep=keep, whole=whole), settings)
 
 
 def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
@@ -146,57 +211,111 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
 def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     """Find the coarsest settings that pass, for the nominal board of each response.
 
-    All subjects move through the levels together, so that the workers stay busy.
+    All subjects move through the levels together, so that the workers stay busy. On a rung above
+    ``ideal`` a short run first says how many periods are discarded (``warm_start``).
     """
-    steps = []
-    for s in subjects:
-        shortest = shortest_contact(s.orbit, s.system, s.excitation)
-        contact = int(np.ceil(STEPS_PER_CONTACT * s.period / shortest))
-        steps.append(max(STEPS_PER_PERIOD, contact))
+    subjects = _warmed(pool, subjects)
+    contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
+    steps = [
+        max(STEPS_PER_PERIOD, int(np.ceil(STEPS_PER_CONTACT * s.period / contact)))
+        for s, contact in zip(subjects, contacts, strict=True)
+    ]
     results: list[GateResult | None] = [None] * len(subjects)
     tried: list[list[int]] = [[] for _ in subjects]
     for level in range(LEVELS):
         open_ = [i for i, r in enumerate(results) if r is None or not r.passed]
-        jobs = []
+        tasks = []
         for i in open_:
             tried[i].append(steps[i] * 2**level)
             trio = _trio(subjects[i].period / tried[i][-1])
-            jobs += [job(subjects[i], settings, keep=True) for settings in trio]
-        found = dict(pool.map(jobs))
+            tasks += [task(subjects[i], settings, keep=True) for settings in trio]
+        found = dict(remedies.run(pool, tasks, CURES))
         for k, i in enumerate(open_):
             runs = [found[3 * k + j] for j in range(3)]
-            first = _trio(subjects[i].period / tried[i][-1])[0]
-            results[i] = _judge(subjects[i], first, runs, tuple(tried[i]))
+            results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])
     return [r for r in results if r is not None]
+
+
+def _warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
+    """The subjects with the periods that each has to discard on its rung."""
+    out = list(subjects)
+    asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
+    tasks = []
+    for i in asked:
+        s = subjects[i]
+        contact = shortest_contact(s.orbit, s.system, s.excitation)
+        steps = max(2 * STEPS_PER_PERIOD, 4 * STEPS_PER_CONTACT * s.period / contact)
+        probe = replace(s, discard=max(warm_start.PROBE - 4, 0) * s.orbit.n)
+        tasks.append(task(probe, SolverSettings("trap", s.period / steps, RELTOL), whole=True))
+    for k, outcome in remedies.run(pool, tasks):
+        s = subjects[asked[k]]
+        if isinstance(outcome.result, Read):
+            peak = np.abs(s.orbit.extremes).max(axis=1)
+            found, _ = warm_start.periods(outcome.result.strobes, s.orbit.n, s.orbit.radius, peak)
+            out[asked[k]] = replace(s, discard=min(max(found, DISCARD), MOST_DISCARDED))
+    return out
+
+
+def wave_error(subject: Subject, read: Read) -> float:
+    """RMS over the last n periods of ngspice less exact circuit, of the peak of each state, worst.
+
+    ``read`` has its trace; the exact wave starts at the orbit's strobe that is nearest to
+    ngspice's. nan without a period or where n differs.
+    """
+    orbit = subject.orbit
+    if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
+        return float("nan")
+    e = subject.excitation
+    flow = Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude))
+    peak = np.abs(orbit.extremes).max(axis=1)
+    time, states = read.trace
+    laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
+    start = laps[int(np.argmin((np.abs(laps - states[0]) / peak).max(axis=1)))]
+    exact = flow.run(start, orbit.n, points=WAVE_POINTS).strobes
+    grid = np.arange(len(exact)) * subject.period / WAVE_POINTS
+    # At ngspice's own points, in time: what lies between them is no part of its answer.
+    there = np.stack([np.interp(time, grid, column) for column in exact.T], axis=1)
+    square = np.trapezoid((states - there) ** 2, time, axis=0) / (time[-1] - time[0])
+    return float((np.sqrt(square) / peak).max())
 
 
 def _trio(step: float) -> tuple[SolverSettings, SolverSettings, SolverSettings]:
     """The settings under test, the same at half the step, and the other method."""
     return (
-        SolverSettings("trap", step),
-        SolverSettings("trap", step / 2.0),
-        SolverSettings("gear", step / 2.0),
+        SolverSettings("trap", step, RELTOL),
+        SolverSettings("trap", step / 2.0, RELTOL),
+        SolverSettings("gear", step / 2.0, RELTOL),
     )
 
 
 def _judge(
-    subject: Subject,
-    settings: SolverSettings,
-    runs: Sequence[Read | SimulationFailed],
-    tried: tuple[int, ...],
+    subject: Subject, runs: Sequence[Outcome[Read]], tried: tuple[int, ...], contact: float
 ) -> GateResult:
-    good = [r for r in runs if isinstance(r, Read)]
-    if len(good) < len(runs):
-        return GateResult(settings, False, float("nan"), runs[0], tried)
+    settings, read = runs[0].settings, runs[0].result
+    needed = {r for run in runs for r in run.tried}
+    good = [run.result for run in runs if isinstance(run.result, Read)]
     wanted = subject.orbit
-    same = all(r.orbit.response == wanted.response for r in good)
-    difference = float("nan")
-    if wanted.status is OrbitStatus.PERIODIC:
-        peak = np.abs(wanted.extremes).max(axis=1)
-        last = [r.strobes[-wanted.n :] for r in good]
-        difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
-    passed = same and bool(difference <= BOUND or wanted.status is not OrbitStatus.PERIODIC)
-    return GateResult(settings, passed, difference, runs[0], tried)
+    difference, wave, passed = float("nan"), float("nan"), False
+    if len(good) == len(runs):
+        passed = all(r.orbit.response == wanted.response for r in good)
+        wave = wave_error(subject, good[0])
+        if wanted.status is OrbitStatus.PERIODIC:
+            peak = np.abs(wanted.extremes).max(axis=1)
+            last = [r.strobes[-wanted.n :] for r in good]
+            difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
+            passed = passed and difference <= BOUND
+            passed = passed and (subject.rung != "ideal" or wave <= WAVE_BOUND)
+    return GateResult(
+        settings,
+        passed,
+        difference,
+        read,
+        tried,
+        contact / settings.max_step if len(wanted.impact_times) else float("nan"),
+        tuple(r for r in CURES if r in needed),
+        subject.discard,
+        wave,
+    )
 
 
 def _pairs(items: Sequence[Array]) -> Iterator[tuple[Array, Array]]:

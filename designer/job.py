@@ -13,7 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import __version__, api, compare_files, design_files, simulate_plots, simulation
+from designer import (
+    __version__,
+    api,
+    compare_files,
+    design_files,
+    equation_check,
+    simulate_plots,
+    simulation,
+)
 from designer.api import RunResult, Synthesis
 from designer.blocks import BlockStore, block_names
 from designer.catalog import Catalog, load_catalog
@@ -39,6 +47,7 @@ from designer.jsonout import (
     synthesis_json,
 )
 from designer.modelfile import ModelFile, read_model_file
+from designer.opamp_model import Rung
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
@@ -219,6 +228,10 @@ def run_into(
             made = load(folder, modelfile, catalog)
             folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
         ready = time.perf_counter()
+        progress.stage("ngspice, equation check")
+        equations = equation_check.check(made.design, made.found, pool)
+        if not equations.passed:
+            progress.note(f"the netlist does not compute the model's equation: {equations.worst}")
         checked = check(made, pool, progress)
         if checked[0].gate is not None and checked[0].gate.passed:
             folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
@@ -240,8 +253,10 @@ def run_into(
         "jobs": float(jobs),
     }
     said = _study_provenance(made, checked, options)
-    result = RunResult(made.modelfile, catalog, made.found, made.design, checked, study, said, cost)
-    folder.write(TOLERANCE, dumps(study_json(study, said, cost)))
+    result = RunResult(
+        made.modelfile, catalog, made.found, made.design, checked, study, said, cost, equations
+    )
+    folder.write(TOLERANCE, dumps(study_json(study, said, cost, equations)))
     progress.stage("report")
     from designer.report import write_report  # matplotlib is not needed before this
     from designer.report_data import ReportData
@@ -262,6 +277,7 @@ def simulate_answer(
     progress: Progress,
     plots: Path | None = None,
     overwrite: bool = False,
+    rung: Rung = "ideal",
 ) -> tuple[dict[str, Any], bool]:
     """The verb ``simulate``: its JSON object, and whether every wanted response was found.
 
@@ -288,8 +304,9 @@ def simulate_answer(
         jobs=jobs,
         progress=progress,
         traces=plots is not None,
+        rung=rung,
     )
-    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine))
+    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine, rung))
     answer = simulate_json(simulated, engine, said, time.perf_counter() - began)
     if plots is not None:
         progress.stage("pictures")
@@ -348,14 +365,7 @@ def _study_provenance(
         settings={
             "highs": SOLVER,
             "ngspice": [
-                {
-                    "omega": c.model.omega,
-                    "passed": c.gate.passed,
-                    "difference": c.gate.difference,
-                    **c.gate.settings.as_dict(),
-                }
-                for c in checked
-                if c.gate is not None
+                {"omega": c.model.omega, **c.gate.as_dict()} for c in checked if c.gate is not None
             ],
         },
         spread=spread.as_dict(),
@@ -367,4 +377,5 @@ def _all_found(answer: Mapping[str, Any]) -> bool:
 
 
 def _satisfied(answer: Mapping[str, Any]) -> bool:
-    return all(r["found"] and r["engines_agree"] for r in answer["responses"])
+    right = answer["equation_check"] is None or answer["equation_check"]["passed"]
+    return right and all(r["found"] and r["engines_agree"] for r in answer["responses"])

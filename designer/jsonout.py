@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.equation_check import EquationCheck
     from designer.modelfile import ModelFile
     from designer.montecarlo import Answer
     from designer.orbit import Orbit
@@ -104,12 +105,16 @@ def synthesis_json(
 
 
 def study_json(
-    study: Study, provenance: Mapping[str, Any], cost: Mapping[str, float]
+    study: Study,
+    provenance: Mapping[str, Any],
+    cost: Mapping[str, float],
+    equations: EquationCheck | None = None,
 ) -> dict[str, Any]:
     """What ``tolerance`` prints and ``tolerance.json`` holds."""
     return {
         "format": FORMAT,
         "samples": study.plan.samples,
+        "equation_check": None if equations is None else equations.as_dict(),
         "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
         "provenance": provenance,
         "cost": dict(cost),
@@ -122,6 +127,7 @@ def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, A
     return {
         **design,
         "samples": study["samples"],
+        "equation_check": study.get("equation_check"),
         "responses": study["responses"],
         "provenance": study["provenance"],
         "cost": cost,
@@ -210,13 +216,12 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "yield": None,
         "rate": None,
         "reasons": {},
-        "agreement": {"asked": 0, "agreed": 0, "failed": 0},
+        "agreement": _agreement(answers),
     }
     if counted is None:
         row["left_out"] = study.left_out[index]
         return row
     low, high = counted.interval
-    asked = [a for a in answers if a.ngspice]
     row["yield"] = {
         "ok": counted.ok,
         "lost": counted.lost,
@@ -228,12 +233,26 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
     }
     row["rate"] = counted.rate
     row["reasons"] = _reasons(answers)
-    row["agreement"] = {
+    return row
+
+
+def _agreement(answers: Sequence[Answer]) -> dict[str, Any]:
+    """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
+    asked = [a for a in answers if a.ngspice]
+    nominal = [a for a in answers if a.ngspice_nominal]
+    return {
         "asked": len(asked),
         "agreed": sum(a.agrees is True for a in asked),
         "failed": sum(a.ngspice == "failed" for a in asked),
+        "nominal_start": {
+            "asked": len(nominal),
+            "agreed": sum(a.agrees_from_nominal is True for a in nominal),
+            "failed": sum(a.ngspice_nominal == "failed" for a in nominal),
+            "too_long": sum(
+                bool(a.ngspice_nominal_reason) and not a.ngspice_nominal for a in answers
+            ),
+        },
     }
-    return row
 
 
 def _reasons(answers: Sequence[Answer]) -> dict[str, int]:

@@ -1,8 +1,9 @@
 """How many boards will show the response: Monte Carlo over component spread.
 
-Every verdict is decided on the exact circuit rung, started on the nominal design's orbit; ngspice
-repeats the first samples of each response, started on the attractor that the exact rung reached.
-Finished blocks of samples go to disk at once (``designer.blocks``).
+Every verdict is decided on the exact circuit rung, started on the nominal design's orbit. ngspice
+repeats samples of each response from the attractor that the exact rung reached, and others from
+the nominal orbit (``designer.confirmation``). Finished blocks of samples go to disk at once
+(``designer.blocks``).
 """
 
 from __future__ import annotations
@@ -16,27 +17,29 @@ from scipy.stats import binomtest
 
 from designer.attractor import settle
 from designer.circuit import Circuit
+from designer.confirmation import (
+    NOMINAL_REFINEMENTS,
+    OWN_REFINEMENTS,
+    OWN_SAMPLES,
+    Heard,
+    Query,
+    confirm,
+    periods_to_settle,
+    starts_from_nominal,
+)
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
-from designer.gate import Subject, job
+from designer.gate import Subject
 from designer.modelfile import Response
-from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import FloatingCircuit, Reduction
 from designer.spread import Spread, draw
 from designer.system import Drive
 from designer.threads import parallel
-from designer.waveform_orbit import Read
 from designer.workers import SpicePool
 
 BLOCK = 25
 """Samples in a block; block edges depend on the sample index alone."""
-NGSPICE_SAMPLES = 40
-"""How many samples of each response ngspice repeats at least (all, where there are fewer)."""
-
-
-REFINEMENTS = 3
-"""How often the step is halved where ngspice disagrees, until two step sizes say the same."""
 
 
 class Verdict(StrEnum):
@@ -67,7 +70,10 @@ class Answer:
     """One sample of one response.
 
     response : n-p-q or status on the exact circuit; the margins are its. ngspice : n-p-q or
-    status there, "" where ngspice was not asked; agrees : whether both say the same.
+    status there from this sample's own orbit, "" where ngspice was not asked. ngspice_nominal :
+    likewise from the nominal orbit, after ngspice_nominal_periods drive periods; where the
+    reason alone is given, the way was too long to be asked. The remedies are those that a run
+    needed to converge, in order.
     """
 
     sample: int
@@ -82,13 +88,24 @@ class Answer:
     periods: int
     ngspice: str = ""
     ngspice_reason: str = ""
+    ngspice_remedies: str = ""
+    ngspice_nominal: str = ""
+    ngspice_nominal_reason: str = ""
+    ngspice_nominal_remedies: str = ""
+    ngspice_nominal_periods: int = 0
 
     @property
     def agrees(self) -> bool | None:
         """None where ngspice was not asked or failed."""
-        if self.ngspice in ("", OrbitStatus.FAILED):
-            return None
-        return self.ngspice == self.response
+        return self._says_so(self.ngspice)
+
+    @property
+    def agrees_from_nominal(self) -> bool | None:
+        """The same of its start from the nominal orbit."""
+        return self._says_so(self.ngspice_nominal)
+
+    def _says_so(self, heard: str) -> bool | None:
+        return None if heard in ("", OrbitStatus.FAILED) else heard == self.response
 
 
 @dataclass(frozen=True)
@@ -173,41 +190,62 @@ def run_block(
 ) -> list[Answer]:
     """Answers for every sample of the block and every question, in order.
 
-    ``progress`` is called once per answer, and once more for each that ngspice repeats.
+    ``progress`` is called once per answer, and once more for each run that ngspice is asked for.
     """
     pieces = parallel(lambda index: _exact(plan, index, progress), block, jobs)
     found = [pair for piece in pieces for pair in piece]
     answers = [answer for answer, _ in found]
     if pool is None:
         return answers
-    asked = [
-        (k, subject, settings)
-        for k, (answer, subject) in enumerate(found)
-        if answer.sample < NGSPICE_SAMPLES
-        and subject is not None
-        and (settings := plan.questions[answer.question].settings) is not None
-    ]
-    for _ in range(REFINEMENTS + 1):
-        again = []
-        for i, result in pool.map(job(subject, settings) for _, subject, settings in asked):
-            k, subject, settings = asked[i]
-            before = answers[k]
-            answers[k] = _heard(before, result)
-            settled = before.ngspice == answers[k].ngspice or answers[k].agrees
-            if settled:
+    own, far = {}, {}
+    for k, (answer, subject) in enumerate(found):
+        question = plan.questions[answer.question]
+        if subject is None or question.settings is None:
+            continue
+        if answer.sample < OWN_SAMPLES:
+            own[k] = Query(subject, question.settings, answer.response)
+        if starts_from_nominal(answer.sample, subject.orbit):
+            way = _from_nominal(subject, question)
+            if way is None:
+                answers[k] = replace(answer, ngspice_nominal_reason="too long a way to be asked")
                 progress()
             else:
-                again.append((k, subject, replace(settings, max_step=settings.max_step / 2.0)))
-        asked = sorted(again, key=lambda item: item[0])
-    for _ in asked:
-        progress()
+                far[k] = Query(way, question.settings, answer.response)
+    for k, heard in _ask(pool, own, OWN_REFINEMENTS, progress):
+        answers[k] = replace(
+            answers[k],
+            ngspice=heard.response,
+            ngspice_reason=heard.reason,
+            ngspice_remedies=heard.remedies,
+        )
+    for k, heard in _ask(pool, far, NOMINAL_REFINEMENTS, progress):
+        answers[k] = replace(
+            answers[k],
+            ngspice_nominal=heard.response,
+            ngspice_nominal_reason=heard.reason,
+            ngspice_nominal_remedies=heard.remedies,
+            ngspice_nominal_periods=far[k].subject.discard,
+        )
     return answers
 
 
-def _heard(answer: Answer, result: Read | SimulationFailed) -> Answer:
-    if isinstance(result, SimulationFailed):
-        return replace(answer, ngspice=str(OrbitStatus.FAILED), ngspice_reason=result.reason)
-    return replace(answer, ngspice=result.orbit.response, ngspice_reason=result.orbit.reason)
+def _ask(
+    pool: SpicePool, queries: dict[int, Query], refinements: int, progress: Callable[[], None]
+) -> Iterator[tuple[int, Heard]]:
+    heard = confirm(pool, list(queries.values()), refinements, progress)
+    return zip(queries, heard, strict=True)
+
+
+def _from_nominal(subject: Subject, question: Question) -> Subject | None:
+    """The sample's run from the nominal orbit, long enough to arrive; None if that is too long."""
+    start = question.start.start
+    periods = periods_to_settle(_flow(subject, question), start, subject.orbit)
+    return None if periods is None else replace(subject, start=start, discard=periods)
+
+
+def _flow(subject: Subject, question: Question) -> Flow:
+    e = question.excitation
+    return Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude))
 
 
 def _exact(

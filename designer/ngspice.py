@@ -21,7 +21,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from designer.errors import DesignerError, EnvironmentMissing
 
 Backend = Literal["shared", "batch"]
+Analysis = Literal["tran", "ac", "dc"]
 
 OLDEST_NGSPICE = 36
 HOW_TO_INSTALL = (
@@ -48,6 +49,20 @@ class Waveforms:
     """(k,), s, strictly increasing, up to the stop time at least."""
     signals: Mapping[str, NDArray[np.float64]]
     """Name as it was asked for → (k,), V (A for a branch such as ``vm1#branch``)."""
+    log: str
+    """What ngspice printed."""
+    seconds: float
+    """Wall time of the run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What an ``.ac`` or ``.dc`` analysis that counts has produced."""
+
+    axis: NDArray[np.float64]
+    """(k,), strictly increasing: frequency in Hz, or the swept source in V."""
+    signals: Mapping[str, NDArray[np.complex128]]
+    """Name as it was asked for → (k,), V; the imaginary part is 0 for ``.dc``."""
     log: str
     """What ngspice printed."""
     seconds: float
@@ -92,6 +107,18 @@ class Simulator(Protocol):
         ------
         ValueError : `check_netlist` refuses the deck.
         SimulationFailed : the run does not count.
+        """
+
+    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+        """Run a deck with one ``.ac`` or ``.dc`` and return the wanted signals.
+
+        Parameters
+        ----------
+        stop : last frequency [Hz], or last value of the swept source [V]; the run must reach it.
+
+        Raises
+        ------
+        As `run`.
         """
 
     def close(self) -> None:
@@ -291,25 +318,64 @@ def accept(
     SimulationFailed : the log holds an `offending_line`; or the time vector is missing, does not
         increase, does not reach the stop time; or a signal is missing or not finite.
     """
+    time, found = _accepted(vectors, "time", signals, stop_time, log)
+    return Waveforms(time=time, signals=found, log=log, seconds=seconds)
+
+
+AXES = {"ac": "frequency", "dc": "v-sweep"}
+"""What ngspice calls the axis of each analysis."""
+
+
+def accept_sweep(
+    vectors: Mapping[str, NDArray[np.complex128]],
+    signals: Sequence[str],
+    stop: float,
+    analysis: Analysis,
+    log: str,
+    seconds: float,
+) -> Sweep:
+    """The sweep of an ``.ac`` or ``.dc`` analysis, if it counts: as `accept`.
+
+    Raises
+    ------
+    SimulationFailed : as `accept`, of the axis that `AXES` names.
+    """
+    axis, found = _accepted(vectors, AXES[analysis], signals, stop, log)
+    complex_ = {name: values.astype(np.complex128) for name, values in found.items()}
+    return Sweep(axis=axis, signals=complex_, log=log, seconds=seconds)
+
+
+_WORDS = {
+    "time": ("transient", "time vector", "s"),
+    "frequency": ("ac", "frequency vector", "Hz"),
+    "v-sweep": ("dc", "vector of the swept source", "V"),
+}
+
+
+def _accepted(
+    vectors: Mapping[str, NDArray[Any]], name: str, signals: Sequence[str], stop: float, log: str
+) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
     line = offending_line(log)
     if line is not None:
         raise SimulationFailed(said(line), log)
-    time = vectors.get("time")
-    if time is None or time.size == 0:
-        raise SimulationFailed("ngspice made no transient analysis", log)
-    if not np.all(np.isfinite(time)) or not np.all(np.diff(time) > 0.0):
-        raise SimulationFailed("the time vector does not increase", log)
-    if time[-1] < stop_time * (1.0 - 1e-9):
-        raise SimulationFailed(f"the run ends at {time[-1]:.9g} s, not {stop_time:.9g} s", log)
-    found: dict[str, NDArray[np.float64]] = {}
+    analysis, what, unit = _WORDS[name]
+    axis = vectors.get(name)
+    if axis is None or axis.size == 0:
+        raise SimulationFailed(f"ngspice made no {analysis} analysis", log)
+    axis = np.array(axis.real, dtype=np.float64)
+    if not np.all(np.isfinite(axis)) or not np.all(np.diff(axis) > 0.0):
+        raise SimulationFailed(f"the {what} does not increase", log)
+    if axis[-1] < stop - 1e-9 * abs(stop):
+        raise SimulationFailed(f"the run ends at {axis[-1]:.9g} {unit}, not {stop:.9g} {unit}", log)
+    found: dict[str, NDArray[Any]] = {}
     for name in signals:
         values = vectors.get(name.lower())
         if values is None:
             raise SimulationFailed(f"the circuit has no node {name!r}", log)
-        if values.shape != time.shape or not np.all(np.isfinite(values)):
+        if values.shape != axis.shape or not np.all(np.isfinite(values)):
             raise SimulationFailed(f"node {name!r} has values that are not finite", log)
         found[name] = values
-    return Waveforms(time=time, signals=found, log=log, seconds=seconds)
+    return axis, found
 
 
 # ---------------------------------------------------------------------------------------------

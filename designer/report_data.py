@@ -16,6 +16,7 @@ from designer.synthesis import Design
 
 if TYPE_CHECKING:
     from designer.api import RunResult
+    from designer.equation_check import EquationCheck
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class ReportData:
     checked : every wanted response. plan, answers : the tolerance study, of some or all of them;
     plan None where there was none. yields : one for each response (None where it was left out) or
     one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
-    command : the command line that makes these results again.
+    command : the command line that makes these results again. equations : the equation check.
     """
 
     modelfile: ModelFile
@@ -37,6 +38,7 @@ class ReportData:
     bom: Sequence[Mapping[str, str]]
     provenance: Mapping[str, Any]
     command: str
+    equations: EquationCheck | None = None
 
     @classmethod
     def of(cls, result: RunResult, command: str) -> ReportData:
@@ -52,6 +54,7 @@ class ReportData:
             bom=[line.cells() for line in lines],
             provenance=result.provenance,
             command=command,
+            equations=result.equations,
         )
 
     @cached_property

@@ -40,6 +40,8 @@ def facts(data: ReportData) -> dict[str, Any]:
         "parts_note": _parts_note(data),
         "error_table": tables.error_table(design),
         "error_note": _error_note(design),
+        "equation_table": tables.equation_table(data),
+        "equation_note": _equation_note(data),
         "certificate": _certificate(design),
         "scale_table": tables.scale_table(data),
         "scale_note": _scale_note(data),
@@ -221,6 +223,19 @@ def _error_note(design: Design) -> str:
         "Of the finished circuit, reduced by nodal analysis with ideal op-amps, at the time and "
         f"voltage scales that suit it best. {said} The clearance and the force are set at the "
         "generator and do not count."
+    )
+
+
+def _equation_note(data: ReportData) -> str:
+    check = data.equations
+    if check is None:
+        return ""
+    low, high = (words.quantity(f, "Hz", 3) for f in (check.low, check.high))
+    return (
+        f"ngspice on the deck itself, by .ac from {low} to {high} from the generator to v1, the "
+        "clearance held open and closed by a constant force, and by .dc through the dead zone and "
+        "into contact; against the model at the scales below. The bounds follow from the "
+        "coefficient errors."
     )
 
 

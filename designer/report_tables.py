@@ -181,28 +181,50 @@ def ngspice_table(data: ReportData) -> Table | None:
     """How often ngspice, asked about the same boards, said the same as the exact circuit."""
     rows = []
     for i, c in enumerate(data.checked):
-        asked = [a for a in data.answers_to(i) if a.ngspice]
-        if not asked:
-            continue
-        failed = [a for a in asked if a.agrees is None]
-        why = Counter(a.ngspice_reason or "no reason given" for a in failed)
-        differ = Counter(f"{a.response} but {a.ngspice}" for a in asked if a.agrees is False)
-        said = [f"{t} ({n})" for t, n in sorted([*differ.items(), *why.items()])]
-        agreed = sum(a.agrees is True for a in asked)
-        rows.append(
-            (
-                words.name(c),
-                str(len(asked)),
-                str(agreed),
-                str(sum(differ.values())),
-                str(len(failed)),
-                ", ".join(said[:REASONS_SHOWN]),
+        answers = data.answers_to(i)
+        own = [(a, a.ngspice, a.ngspice_reason, a.agrees) for a in answers]
+        nominal = [
+            (a, a.ngspice_nominal, a.ngspice_nominal_reason, a.agrees_from_nominal) for a in answers
+        ]
+        for start, heard in (("its own orbit", own), ("the nominal orbit", nominal)):
+            asked = [h for h in heard if h[1]]
+            if not asked:
+                continue
+            failed = Counter(
+                why or "no reason given" for _, _, why, agrees in asked if agrees is None
             )
-        )
+            differ = Counter(f"{a.response} but {said}" for a, said, _, ok in asked if ok is False)
+            agreed = sum(agrees is True for _, _, _, agrees in asked)
+            notes = [f"{t} ({n})" for t, n in sorted([*differ.items(), *failed.items()])]
+            counts = (len(asked), agreed, sum(differ.values()), sum(failed.values()))
+            said_ = ", ".join(notes[:REASONS_SHOWN])
+            rows.append((words.name(c), start, *map(str, counts), said_))
     if not rows:
         return None
-    columns = ("response", "boards", "agreed", "differed", "failed", "circuit but ngspice; reasons")
-    return Table(columns, tuple(rows), (1, 2, 3, 4))
+    return Table(
+        (
+            "response", "started on", "boards", "agreed", "differed", "failed",
+            "circuit but ngspice; reasons",
+        ),
+        tuple(rows),
+        (2, 3, 4, 5),
+    )  # fmt: skip
+
+
+def equation_table(data: ReportData) -> Table | None:
+    """What ngspice says of the circuit's equation: .ac and .dc against the model."""
+    if data.equations is None:
+        return None
+    rows = tuple(
+        (
+            f.name,
+            f.reason or words.error(f.deviation),
+            words.error(f.bound),
+            words.yes(f.passed),
+        )
+        for f in data.equations.findings
+    )
+    return Table(("compared", "largest deviation", "bound", "within"), rows, (1, 2))
 
 
 def bom_table(data: ReportData) -> Table | None:

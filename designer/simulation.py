@@ -16,10 +16,12 @@ from designer import attractor, gate, pipeline, waveform_orbit
 from designer.api import Synthesis, synthesise
 from designer.attractor import coexisting, settle, starts
 from designer.deck import Excitation
+from designer.errors import InputError
 from designer.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.model import Dimensionless
 from designer.modelfile import ModelFile, Response
 from designer.ngspice import SimulationFailed
+from designer.opamp_model import Rung
 from designer.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.pipeline import Checked, Trace, trace_of
 from designer.preconditions import cores, naming, need_responses, require_ngspice
@@ -79,18 +81,24 @@ def simulate(
     jobs: int | None = None,
     progress: Progress | None = None,
     traces: bool = False,
+    rung: Rung = "ideal",
 ) -> tuple[Simulated, ...]:
     """The responses of a model file, or what is reached from rest at ``omegas``.
 
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
     synthesis : of this model file; made where the engine needs one and None is given. traces :
-    keep the orbits and their mirror twins as traces too.
+    keep the orbits and their mirror twins as traces too. rung : the op-amps' model in ngspice.
 
     Raises
     ------
-    InputError : a frequency outside ``SLOWEST`` to ``FASTEST``, or nothing to simulate.
+    InputError : a rung for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, or
+        nothing to simulate.
     """
     said = Progress() if progress is None else progress
+    if rung != "ideal" and engine != "ngspice":
+        raise InputError(
+            None, "--rung", rung, "ideal, or --engine ngspice: other engines have none"
+        )
     for omega in omegas:
         check_omega("--omega", omega)
     if not omegas and not modelfile.responses:
@@ -116,10 +124,10 @@ def simulate(
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
         made = synthesis or synthesise(modelfile)
-        return _in_ngspice(made, specs, bool(omegas), pool, said, traces)
+        return _in_ngspice(made, specs, bool(omegas), pool, said, traces, rung)
 
 
-def engine_settings(engine: Engine) -> dict[str, Any]:
+def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
     """What ``simulate`` states of an engine: tolerances, bounds and limits (docs/engine.md)."""
     exact: dict[str, Any] = {
         "flow": "exact, by modes",
@@ -138,7 +146,7 @@ def engine_settings(engine: Engine) -> dict[str, Any]:
         "strobe_tolerance": waveform_orbit.STROBE_TOLERANCE,
         "undecided_below": waveform_orbit.ENGINE_ERROR,
         "gate_bound": gate.BOUND,
-        "discarded_periods": gate.DISCARD,
+        "rung": rung,
     }
 
 
@@ -268,6 +276,7 @@ def _in_ngspice(
     pool: SpicePool,
     said: Progress,
     traces: bool,
+    rung: Rung,
 ) -> tuple[Simulated, ...]:
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
     began = time.perf_counter()
@@ -279,7 +288,7 @@ def _in_ngspice(
         frequency = made.design.errors.scales.frequency(r.omega)
         excitation = Excitation(frequency, made.design.amplitude(r.b))
         started = [o for o in orbits if len(o.start)]
-        subjects += [gate.Subject(reduction, excitation, o) for o in started]
+        subjects += [gate.Subject(reduction, excitation, o, rung=rung) for o in started]
         rows.append((r, excitation, len(started)))
         step()
     said.stage("ngspice, numerics gate")
@@ -313,8 +322,11 @@ def _gate_settings(result: gate.GateResult) -> dict[str, Any]:
     return {
         **result.settings.as_dict(),
         "steps_a_period": result.tried[-1],
+        "steps_a_contact": result.contact_steps,
         "gate_passed": result.passed,
         "gate_difference": result.difference,
+        "remedies": list(result.remedies),
+        "discarded_periods": result.discarded,
     }
 
 

@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,12 @@ from numpy.typing import NDArray
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
     HOW_TO_INSTALL,
+    Analysis,
     SimulationFailed,
+    Sweep,
     Waveforms,
     accept,
+    accept_sweep,
     check_netlist,
     clean_environment,
     offending_line,
@@ -47,19 +51,26 @@ class BatchNgspice:
 
     def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
         """See `designer.ngspice.Simulator.run`."""
+        vectors, log, seconds, status = self._vectors_of(netlist, "tran")
+        waveforms = accept(vectors, signals, stop_time, log, seconds)
+        _check_status(status, log)
+        return waveforms
+
+    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+        """See `designer.ngspice.Simulator.sweep`."""
+        vectors, log, seconds, status = self._vectors_of(netlist, analysis)
+        found = accept_sweep(vectors, signals, stop, analysis, log, seconds)
+        _check_status(status, log)
+        return found
+
+    def _vectors_of(
+        self, netlist: str, analysis: Analysis
+    ) -> tuple[dict[str, NDArray[Any]], str, float, int]:
+        """Run a deck: vectors of its last analysis of this kind, log, wall time, exit status."""
         started = time.perf_counter()
         plots, log, status = self._plots(netlist)
-        transient = [plot for plot in plots if plot.name == "Transient Analysis"]
-        waveforms = accept(
-            transient[-1].vectors if transient else {},
-            signals,
-            stop_time,
-            log,
-            time.perf_counter() - started,
-        )
-        if status != 0:
-            raise SimulationFailed(f"ngspice exit {status}", log)
-        return waveforms
+        wanted = [plot.phasors or plot.vectors for plot in plots if plot.name == PLOTS[analysis]]
+        return wanted[-1] if wanted else {}, log, time.perf_counter() - started, status
 
     def analyse(self, netlist: str) -> list[RawPlot]:
         """Every plot of a deck of any analysis: operating point, ``.dc``, ``.ac``, ``.noise``.
@@ -95,6 +106,11 @@ class BatchNgspice:
 
     def close(self) -> None:
         """Nothing to do: nothing outlives a run."""
+
+
+def _check_status(status: int, log: str) -> None:
+    if status != 0:
+        raise SimulationFailed(f"ngspice exit {status}", log)
 
 
 def _program() -> str:
@@ -144,6 +160,12 @@ def _call(command: list[str], folder: str) -> subprocess.CompletedProcess[bytes]
 
 # ---------------------------------------------------------------------------------------------
 # The raw file
+
+PLOTS: dict[Analysis, str] = {
+    "tran": "Transient Analysis",
+    "ac": "AC Analysis",
+    "dc": "DC transfer characteristic",
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,12 @@ from numpy.typing import NDArray
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
     HOW_TO_INSTALL,
+    Analysis,
     SimulationFailed,
+    Sweep,
     Waveforms,
     accept,
+    accept_sweep,
     changed_environment,
     check_netlist,
     clean_environment,
@@ -77,12 +80,25 @@ class SharedNgspice:
 
     def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
         """See `designer.ngspice.Simulator.run`."""
+        vectors, log, seconds = self._vectors_of(netlist, "tran")
+        real = {name: values.real for name, values in vectors.items()}
+        return accept(real, signals, stop_time, log, seconds)
+
+    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+        """See `designer.ngspice.Simulator.sweep`."""
+        vectors, log, seconds = self._vectors_of(netlist, analysis)
+        return accept_sweep(vectors, signals, stop, analysis, log, seconds)
+
+    def _vectors_of(
+        self, netlist: str, analysis: Analysis
+    ) -> tuple[dict[str, NDArray[Any]], str, float]:
+        """Run a deck: the vectors of its newest analysis of this kind, log and wall time."""
         check_netlist(netlist)
         if not self.usable:
             raise SimulationFailed("an earlier deck ended the ngspice session of this process")
         started = time.perf_counter()
         self._heard = []
-        vectors: dict[str, NDArray[np.float64]] = {}
+        vectors: dict[str, NDArray[Any]] = {}
         try:
             # PySpice raises NameError and its kin on any odd line of output, harmless ones too;
             # whether the run counts is for the log and the vectors to say.
@@ -94,13 +110,13 @@ class SharedNgspice:
                     self._session.run()
                 self._watch()
             if self.usable:
-                vectors = self._transient()
+                vectors = self._newest(analysis)
         finally:
             log = "\n".join(self._heard)
             self._heard = None
             if self.usable:
                 self._forget()
-        return accept(vectors, signals, stop_time, log, time.perf_counter() - started)
+        return vectors, log, time.perf_counter() - started
 
     def close(self) -> None:
         """Nothing to do: no circuit and no plot outlives a run, the session ends with the process.
@@ -113,15 +129,13 @@ class SharedNgspice:
         if any("cannot recover" in line for line in self._heard or ()):
             self.usable = False
 
-    def _transient(self) -> dict[str, NDArray[np.float64]]:
-        plots = [name for name in self._session.plot_names if name.startswith("tran")]
+    def _newest(self, analysis: Analysis) -> dict[str, NDArray[Any]]:
+        plots = [name for name in self._session.plot_names if name.startswith(analysis)]
         if not plots:
             return {}
         vectors = self._session.plot(None, plots[0])  # the newest comes first
-        return {
-            name.lower(): np.array(vector.to_waveform(to_real=True), dtype=np.float64)
-            for name, vector in vectors.items()
-        }
+        # A copy of the numbers without PySpice's units, which are slow and not complex.
+        return {name.lower(): np.array(vector._data) for name, vector in vectors.items()}
 
     def _forget(self) -> None:
         """Drop the finished plots and the circuit: neither goes by itself."""

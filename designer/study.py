@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from designer import montecarlo, pipeline
+from designer import confirmation, montecarlo, pipeline
 from designer.blocks import BlockStore
 from designer.montecarlo import Answer, StudyPlan, Yield
 from designer.orbit import OrbitStatus
@@ -101,9 +101,8 @@ def tolerance(
     answers: list[Answer] = []
     steps = samples * len(asked)
     if pool is not None:
-        steps += min(samples, montecarlo.NGSPICE_SAMPLES) * sum(
-            q.settings is not None for q in plan.questions
-        )
+        heard = min(samples, confirmation.OWN_SAMPLES) + min(samples, confirmation.NOMINAL_SAMPLES)
+        steps += heard * sum(q.settings is not None for q in plan.questions)
     step = said.stage(f"tolerance study, {samples} boards, responses: {len(asked)}", steps)
     for block in plan.blocks() if asked else ():
         known = None if blocks is None else blocks.read(block)
@@ -114,8 +113,9 @@ def tolerance(
         else:
             for answer in known:
                 step()
-                if answer.ngspice:
-                    step()
+                for said_ in (answer.ngspice, answer.ngspice_nominal):
+                    if said_:
+                        step()
         answers += known
     return Study(checked, plan, asked, left_out, tuple(answers))
 

@@ -76,7 +76,7 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         return Read(
             Orbit(status, start=strobes[-1], periods=last, reason=reason),
             strobes,
-            _tail(t, y, marks, reading, len(strobes) - 1),
+            _tail(t, y, marks, strobes, reading, len(strobes) - 1),
         )
     laps = (len(strobes) - 1) // n
     first = marks[len(strobes) - 1 - laps * n]
@@ -125,7 +125,7 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         reason=reason,
         periods=last,
     )
-    return Read(orbit, strobes, _tail(t, y, marks, reading, n))
+    return Read(orbit, strobes, _tail(t, y, marks, strobes, reading, n))
 
 
 def _period(strobes: Array, peak: Array) -> int:
@@ -175,8 +175,13 @@ def _asymmetry(t: Array, y: Array, end: float, n: int, period: float, peak: Arra
     return float((np.abs(np.roll(wave, -64, axis=0) + wave).max(axis=0) / peak).max())
 
 
-def _tail(t: Array, y: Array, marks: Array, reading: Reading, n: int) -> tuple[Array, Array] | None:
+def _tail(
+    t: Array, y: Array, marks: Array, strobes: Array, reading: Reading, n: int
+) -> tuple[Array, Array] | None:
+    """The last n periods, from a strobe on."""
     if not reading.keep:
         return None
-    last = t >= marks[max(len(marks) - 1 - n, 0)]
-    return t[last] - t[last][0], y[last]
+    k = max(len(marks) - 1 - n, 0)
+    later = t > marks[k]
+    time = np.concatenate([marks[k : k + 1], t[later]]) - marks[k]
+    return time, np.concatenate([strobes[k : k + 1], y[later]])

@@ -35,9 +35,11 @@ from typing import Any, Generic, TypeVar
 
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
+    Analysis,
     Backend,
     SimulationFailed,
     Simulator,
+    Sweep,
     Waveforms,
     changed_environment,
     clean_environment,
@@ -63,13 +65,16 @@ class SpiceJob(Generic[T_co]):
 
     ``netlist``, ``signals`` and ``stop_time`` (s) are those of `Simulator.run`. ``reduce`` runs
     inside the worker; it and its result must pickle, so it is a function of a module (or a
-    `functools.partial` of one), not a lambda.
+    `functools.partial` of one), not a lambda. With ``analysis`` "ac" or "dc" the run is a
+    `Simulator.sweep`: ``stop_time`` is then its last frequency [Hz] or voltage [V], and ``reduce``
+    gets a `Sweep`.
     """
 
     netlist: str
     signals: tuple[str, ...]
     stop_time: float
-    reduce: Callable[[Waveforms], T_co]
+    reduce: Callable[[Any], T_co]
+    analysis: Analysis = "tran"
 
 
 class SpicePool:
@@ -383,7 +388,13 @@ def _outcome(simulator: Simulator, job: bytes) -> bytes:
         except Exception as error:
             raise SimulationFailed(f"analysis failed: it cannot be read: {_told(error)}") from error
         try:
-            waveforms = simulator.run(todo.netlist, todo.signals, todo.stop_time)
+            waveforms: Waveforms | Sweep
+            if todo.analysis == "tran":
+                waveforms = simulator.run(todo.netlist, todo.signals, todo.stop_time)
+            else:
+                waveforms = simulator.sweep(
+                    todo.netlist, todo.signals, todo.stop_time, todo.analysis
+                )
         except (ValueError, OSError, EnvironmentMissing) as error:
             raise SimulationFailed(f"simulation failed: {_told(error)}") from error
         try:

@@ -279,6 +279,22 @@ def test_a_model_that_was_changed_in_its_folder(
     assert _tree(out) == before
 
 
+def test_rungs_of_op_amps_in_ngspice(
+    finished: tuple[Path, subprocess.CompletedProcess[str]], capfd: pytest.CaptureFixture[str]
+) -> None:
+    out, _ = finished
+    words = ["simulate", str(out), "--engine", "ngspice", "--rung", "dynamic", "--json"]
+    assert cli.status(words) == 0
+    answer = _strict(capfd.readouterr().out)
+    (response,) = answer["responses"]
+    assert response["response"] == "1-2-2"
+    assert answer["provenance"]["settings"]["rung"] == "dynamic"
+    # Op-amps with a memory have an orbit of their own, and a way to it.
+    assert response["engine"]["discarded_periods"] > 2
+    assert response["x1_max"] == pytest.approx(0.40105, rel=2e-2)
+    _refused(["simulate", str(out), "--rung", "full", "-q"], capfd, "--rung", "--engine ngspice")
+
+
 @pytest.mark.parametrize("engine", ["model", "circuit", "ngspice"])
 def test_simulate_a_folder(
     finished: tuple[Path, subprocess.CompletedProcess[str]],

@@ -18,6 +18,7 @@ import designer
 from designer import spice_batch
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
+    Analysis,
     Backend,
     SimulationFailed,
     Simulator,
@@ -116,6 +117,59 @@ def test_clipping(simulator: Simulator, deck: str) -> None:
     waves = simulator.run(deck, ["a", "b"], 2e-3)
     exact = np.clip(2.0 * waves.signals["a"], -1.0, 1.5)
     np.testing.assert_allclose(waves.signals["b"], exact, atol=1e-5)
+
+
+LOW_PASS = """RC low pass
+V1 in 0 DC 0.5 AC 2
+R1 in out 1k
+C1 out 0 1u
+R2 out 0 3k
+{analysis}
+.end
+"""
+
+
+def test_ac_sweep_is_the_transfer_function(simulator: Simulator) -> None:
+    deck = LOW_PASS.format(analysis=".ac dec 10 10 1k")
+    found = simulator.sweep(deck, ["out", "IN"], 1e3, "ac")
+    assert found.axis[[0, -1]] == pytest.approx([10.0, 1e3])
+    assert len(found.axis) == 21
+    exact = 2.0 * 0.75 / (1.0 + 2j * np.pi * found.axis * 750.0 * 1e-6)
+    np.testing.assert_allclose(found.signals["out"], exact, rtol=1e-9)
+    np.testing.assert_allclose(found.signals["IN"], 2.0, rtol=1e-12)
+
+
+def test_dc_sweep_is_the_curve(simulator: Simulator) -> None:
+    deck = LIMIT.replace("SIN(0 2 1k)", "DC 0").replace(".tran 2u 2m 0 2u", ".dc V1 -2 2 0.1")
+    found = simulator.sweep(deck, ["a", "b"], 2.0, "dc")
+    np.testing.assert_allclose(found.axis, np.linspace(-2.0, 2.0, 41), atol=1e-12)
+    exact = np.clip(2.0 * found.signals["a"].real, -1.0, 1.5)
+    np.testing.assert_allclose(found.signals["b"], exact, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("deck", "stop", "analysis", "reason"),
+    [
+        (LOW_PASS.format(analysis=".ac dec 10 10 1k"), 2e3, "ac", "ends at 1000 Hz, not 2000 Hz"),
+        (LOW_PASS.format(analysis=".dc V1 0 1 0.1"), 2.0, "dc", "ends at 1 V, not 2 V"),
+        (LOW_PASS.format(analysis=".dc V1 0 1 0.1"), 1.0, "ac", "no ac analysis"),
+        (LOW_PASS.format(analysis=".ac dec 10 10 1k"), 1.0, "dc", "no dc analysis"),
+        (LOW_PASS.format(analysis=".tran 1u 1m"), 1.0, "dc", "no dc analysis"),
+        (LOW_PASS.format(analysis=".dc V2 0 1 0.1"), 1.0, "dc", "(?i)not in the circuit|no such"),
+        (
+            LOW_PASS.format(analysis=".ac dec 10 10 1k").replace("R2 out", "C2 out b 1u\nR2 out"),
+            1e3,
+            "ac",
+            "singular matrix",
+        ),
+        (LOW_PASS.format(analysis=".dc V1 0 1 0.1").replace(" out ", " x "), 1.0, "dc", "no node"),
+    ],
+)
+def test_sweeps_that_do_not_count(
+    simulator: Simulator, deck: str, stop: float, analysis: Analysis, reason: str
+) -> None:
+    with pytest.raises(SimulationFailed, match=reason):
+        simulator.sweep(deck, ["out"], stop, analysis)
 
 
 @pytest.mark.parametrize(

@@ -297,7 +297,7 @@ def test_without_a_study(whole: ReportData) -> None:
 
 def test_without_ngspice(whole: ReportData) -> None:
     checked = tuple(replace(c, gate=None) for c in whole.checked)
-    answers = tuple(replace(a, ngspice="") for a in whole.answers)
+    answers = tuple(replace(a, ngspice="", ngspice_nominal="") for a in whole.answers)
     text = Page(render_html(replace(whole, checked=checked, answers=answers))).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text

@@ -1,0 +1,173 @@
+"""What is measured of ngspice on a design's responses: warm starts, errors, throughput, memory."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from designer import gate, warm_start
+from designer.attractor import settle
+from designer.circuit import Circuit
+from designer.deck import SolverSettings
+from designer.flow import Flow
+from designer.gate import Subject
+from designer.ngspice import SimulationFailed, Waveforms
+from designer.orbit import MAX_PERIOD
+from designer.reduction import Reduction
+from designer.spread import Spread, draw
+from designer.system import Array, Drive
+from designer.waveform_orbit import STROBE_TOLERANCE, Read
+from designer.workers import SpiceJob, SpicePool
+
+SETTLED = 400
+"""Drive periods of the run that a warm start is held against."""
+
+
+def flow_of(subject: Subject) -> Flow:
+    """The exact flow of a subject's board under its excitation."""
+    e = subject.excitation
+    return Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude, e.offset))
+
+
+def peak_of(subject: Subject) -> Array:
+    """(states,) peaks of the exact orbit."""
+    return np.asarray(np.abs(subject.orbit.extremes).max(axis=1))
+
+
+@dataclass(frozen=True)
+class WarmStart:
+    """A run of `SETTLED` periods from the exact circuit's orbit.
+
+    gaps : (SETTLED + 1,) distance of each strobe from the last, of the peak. needed : the first
+    strobe from which all later ones are within the strobe tolerance. predicted : what
+    ``warm_start`` says of the first periods. exact : what the exact circuit's multiplier alone
+    says. response : n-p-q at the end. seconds : wall time.
+    """
+
+    gaps: Array
+    needed: int
+    predicted: int
+    exact: int
+    response: str
+    seconds: float
+
+
+def warm_job(subject: Subject, settings: SolverSettings) -> SpiceJob[Read]:
+    """The run of a warm start; every strobe comes back."""
+    n = max(subject.orbit.n, 1)
+    long = replace(subject, discard=SETTLED - 4 * n)
+    return gate.job(long, settings, whole=True)
+
+
+def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
+    """What a `warm_job` shows."""
+    n, peak = max(subject.orbit.n, 1), peak_of(subject)
+    strobes = result.strobes
+    gaps = (np.abs(strobes - strobes[-1]) / peak).max(axis=1)
+    far = np.flatnonzero(gaps > STROBE_TOLERANCE)
+    short = strobes[: warm_start.PROBE * n + 1]
+    predicted, _ = warm_start.periods(short, n, subject.orbit.radius, peak)
+    moves = (np.abs(strobes[2 * n] - strobes[n]) / peak).max() / (1.0 - subject.orbit.radius)
+    alone = max(np.log(STROBE_TOLERANCE / moves) / np.log(subject.orbit.radius), 0.0)
+    return WarmStart(
+        gaps=gaps,
+        needed=int(far[-1]) + 1 if len(far) else 0,
+        predicted=predicted,
+        exact=n * (1 + int(np.ceil(alone))),
+        response=result.orbit.response,
+        seconds=seconds,
+    )
+
+
+# ---------------------------------------------------------------------------------------------
+# Throughput
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """seconds : wall time of ``samples`` boards on ``jobs`` workers. agreed : runs that show the
+    exact circuit's n-p-q; failed : runs that did not count. periods : simulated, on average."""
+
+    samples: int
+    jobs: int
+    seconds: float
+    agreed: int
+    failed: int
+    periods: float
+
+
+def boards(
+    circuit: Circuit, spread: Spread, nominal: Subject, samples: int, seed: int = 1
+) -> list[Subject]:
+    """Boards of a study, each on the orbit of the exact circuit that it settles on."""
+    out = []
+    for index in range(samples):
+        board = draw(circuit, spread, seed, index)
+        subject = replace(nominal, reduction=Reduction(circuit, board))
+        orbit = settle(flow_of(subject), nominal.orbit.start)
+        if len(orbit.start):
+            out.append(replace(subject, orbit=orbit))
+    return out
+
+
+def throughput(
+    pool: SpicePool, subjects: Sequence[Subject], settings: SolverSettings, jobs: int
+) -> Throughput:
+    """All subjects through the pool, as the study does it (without its refinements)."""
+    began = time.perf_counter()
+    agreed = failed = 0
+    for i, heard in pool.map(gate.job(s, settings) for s in subjects):
+        if isinstance(heard, SimulationFailed):
+            failed += 1
+        else:
+            agreed += heard.orbit.response == subjects[i].orbit.response
+    seconds = time.perf_counter() - began
+    periods = float(np.mean([gate.length(s) for s in subjects]))
+    return Throughput(len(subjects), jobs, seconds, agreed, failed, periods)
+
+
+NAIVE_PERIODS = 500
+
+
+def naive(subjects: Sequence[Subject], settings: SolverSettings, jobs: int) -> Throughput:
+    """A process for every sample, from discharged capacitors, 500 periods; same settings."""
+    rest = [
+        replace(
+            s,
+            start=np.zeros(len(s.circuit.states)),
+            discard=NAIVE_PERIODS - 4 * (s.orbit.n or MAX_PERIOD),
+        )
+        for s in subjects
+    ]
+    with SpicePool(jobs, "batch", timeout=600.0) as pool:
+        return throughput(pool, rest, settings, jobs)
+
+
+# ---------------------------------------------------------------------------------------------
+# Memory
+
+
+def resident_megabytes(waves: Waveforms, reduce: Callable[[Waveforms], object]) -> float:
+    """Resident memory of the worker after it has read a run."""
+    reduce(waves)
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def memory(subject: Subject, settings: SolverSettings, runs: int) -> list[float]:
+    """Resident memory [MB] of one worker after each of so many runs."""
+    todo = gate.job(subject, settings)
+    look = partial(resident_megabytes, reduce=todo.reduce)
+    one = SpiceJob(todo.netlist, todo.signals, todo.stop_time, look)
+    out = []
+    with SpicePool(1) as pool:
+        for _, size in pool.map(one for _ in range(runs)):
+            assert not isinstance(size, SimulationFailed), size.reason
+            out.append(size)
+    return out

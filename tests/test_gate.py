@@ -1,0 +1,177 @@
+"""The numerics gate: it finds the step by itself, and the known traps are traps without it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from designer import gate
+from designer.deck import SolverSettings
+from designer.gate import BOUND, LEVELS, STEPS_PER_CONTACT, GateResult, Subject
+from designer.ngspice import SimulationFailed
+from designer.orbit import Orbit, OrbitStatus
+from designer.waveform_orbit import Read
+from designer.workers import SpicePool
+from tests.paper_cases import flow_of, subject
+
+P = (1, 3, 8)
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[SpicePool]:
+    with SpicePool(2) as pool:
+        yield pool
+
+
+@pytest.fixture(scope="module")
+def passed(pool: SpicePool) -> dict[int, GateResult]:
+    return dict(zip(P, gate.check(pool, [subject(p) for p in P]), strict=True))
+
+
+def heard(pool: SpicePool, who: Subject, settings: SolverSettings) -> Orbit:
+    ((_, found),) = pool.map([gate.job(who, settings)])
+    assert not isinstance(found, SimulationFailed), found.reason
+    return found.orbit
+
+
+def long_run(who: Subject) -> Subject:
+    """Enough periods to call a run aperiodic, from the same orbit."""
+    return replace(who, orbit=replace(who.orbit, n=0), start=who.orbit.start)
+
+
+def shortest_contact(who: Subject) -> float:
+    """Length of the shortest contact in periods, by a plain count of a dense exact trace."""
+    flow = flow_of(who)
+    run = flow.run(who.orbit.start, who.orbit.n, points=20_000)
+    upper, lower = gate.contact_rows(who.system)
+    phase = 2.0 * np.pi * np.arange(len(run.strobes)) / 20_000
+    u = -who.excitation.amplitude * np.sin(phase)
+    shortest = np.inf
+    for row in (upper, lower):
+        assert row is not None
+        touch = (run.strobes @ row[:-2] + row[-2] * u + row[-1] > 0.0).astype(int)
+        edges = np.flatnonzero(np.diff(touch))
+        lengths = np.diff(edges)[touch[edges[:-1]] == 0]
+        shortest = min(shortest, float(lengths.min()))
+    return shortest / 20_000
+
+
+@pytest.mark.parametrize("p", P)
+def test_what_passes(passed: dict[int, GateResult], p: int) -> None:
+    result, who = passed[p], subject(p)
+    assert result.passed
+    assert result.difference <= BOUND
+    assert isinstance(result.read, Read)
+    assert result.read.orbit.response == f"1-{p}-{p}"
+    assert result.remedies == ()
+    contact = shortest_contact(who)
+    finest = min(1.0 / 200.0, contact / STEPS_PER_CONTACT)
+    halvings = len(result.tried) - 1
+    assert result.settings.max_step == pytest.approx(who.period * finest / 2**halvings, rel=0.02)
+    assert result.contact_steps == pytest.approx(
+        contact * who.period / result.settings.max_step, rel=0.02
+    )
+    said = result.as_dict()
+    assert (said["method"], said["passed"], said["bound"]) == ("trap", True, BOUND)
+    assert said["steps_a_period"] == pytest.approx(who.period / result.settings.max_step)
+
+
+@pytest.mark.parametrize("p", P)
+def test_two_steps_and_two_methods_say_the_same(
+    pool: SpicePool, passed: dict[int, GateResult], p: int
+) -> None:
+    """Three runs made here, on every strobe of the last 1-p-p lap."""
+    settings = passed[p].settings
+    half = settings.max_step / 2.0
+    runs = [
+        settings,
+        replace(settings, max_step=half),
+        SolverSettings("gear", half, settings.reltol),
+    ]
+    found = [
+        r for _, r in sorted(pool.map([gate.job(subject(p), s) for s in runs]), key=lambda r: r[0])
+    ]
+    reads = [r for r in found if isinstance(r, Read)]
+    assert [r.orbit.response for r in reads] == [f"1-{p}-{p}"] * 3
+    peak = np.abs(subject(p).orbit.extremes).max(axis=1)
+    gaps = [np.abs(a.strobes[-1] - b.strobes[-1]) / peak for a in reads for b in reads]
+    assert np.max(gaps) == pytest.approx(passed[p].difference, rel=1e-9)
+
+
+def rms(who: Subject, read: Read) -> float:
+    """On an even grid, ngspice's points joined by a cubic spline; worst state, of its peak."""
+    assert read.trace is not None
+    exact = flow_of(who).run(who.orbit.start, 1, points=5000).strobes
+    grid = np.linspace(0.0, who.period, len(exact))
+    gap = CubicSpline(*read.trace)(grid) - exact
+    return float((np.sqrt((gap**2).mean(axis=0)) / np.abs(exact).max(axis=0)).max())
+
+
+@pytest.mark.parametrize("p", P)
+def test_the_wave_is_the_exact_circuit_s(passed: dict[int, GateResult], p: int) -> None:
+    read = passed[p].read
+    assert isinstance(read, Read)
+    assert rms(subject(p), read) == pytest.approx(passed[p].wave, rel=0.1)
+    assert passed[p].wave < 2e-3
+
+
+@pytest.mark.slow
+def test_the_wave_at_every_p(pool: SpicePool) -> None:
+    for who, result in zip(
+        map(subject, range(1, 9)), gate.check(pool, [subject(p) for p in range(1, 9)]), strict=True
+    ):
+        assert result.passed
+        assert isinstance(result.read, Read)
+        assert rms(who, result.read) < 2e-3
+
+
+# ---------------------------------------------------------------------------------------------
+# Traps
+
+
+def test_gear_at_default_tolerance_makes_a_periodic_orbit_look_aperiodic(
+    pool: SpicePool, passed: dict[int, GateResult]
+) -> None:
+    who = long_run(subject(3))
+    naive = SolverSettings("gear", who.period / 200.0, reltol=1e-3, vntol=1e-6)
+    assert heard(pool, who, naive).status is OrbitStatus.APERIODIC
+    assert heard(pool, who, passed[3].settings).response == "1-3-3"
+
+
+def test_two_hundred_steps_a_period_miscount_eight_impacts(
+    pool: SpicePool, passed: dict[int, GateResult]
+) -> None:
+    who = long_run(subject(8))
+    naive = SolverSettings("trap", who.period / 200.0, reltol=1e-3, vntol=1e-6)
+    miscounted = heard(pool, who, naive)
+    assert miscounted.status is not OrbitStatus.PERIODIC or (miscounted.p, miscounted.q) != (8, 8)
+    assert heard(pool, who, passed[8].settings).response == "1-8-8"
+    assert passed[8].settings.max_step < who.period / 800.0
+
+
+# ---------------------------------------------------------------------------------------------
+# No
+
+
+def test_engines_that_disagree_do_not_pass(pool: SpicePool) -> None:
+    """An orbit that the circuit does not show: no step makes ngspice say so."""
+    who = subject(1)
+    wrong = replace(who, orbit=replace(who.orbit, p=2, q=2))
+    (result,) = gate.check(pool, [wrong])
+    assert not result.passed
+    assert len(result.tried) == LEVELS
+    assert isinstance(result.read, Read)
+    assert result.read.orbit.response == "1-1-1"
+
+
+def test_runs_that_fail_do_not_pass(pool: SpicePool) -> None:
+    who = subject(1)
+    broken = replace(who, start=np.full(4, np.nan))
+    (result,) = gate.check(pool, [broken])
+    assert not result.passed
+    assert isinstance(result.read, SimulationFailed)
+    assert np.isnan(result.difference)
