@@ -285,7 +285,7 @@ def _circle(uses: Mapping[str, set[str]]) -> str | None:
 
 
 def _prefixed(name: str) -> str:
-    return PREFIX + re.sub(r"\W", "_", name)
+    return PREFIX + name
 
 
 def _refused(path: Path, line: int, text: str, why: str) -> InputError:

@@ -94,6 +94,16 @@ def test_names_cannot_collide(tmp_path: Path) -> None:
         assert depth == 1 or line.startswith(".ends"), f"outside: {line}"
 
 
+def test_names_stay_apart(tmp_path: Path) -> None:
+    """Two names that differ in punctuation alone."""
+    text = MODEL.replace("BUFFER", "a-b").replace("buffer", "a-b")
+    text += ".subckt a.b in out\nR1 in out 1\n.ends\n"
+    model = read_vendor_model("part.lib", "part", ORDER, save(tmp_path, text))
+    heads = [line.split()[1] for line in model.lines if line.startswith(".subckt")]
+    assert heads == ["vendor_part", "vendor_a-b", "vendor_a.b"]
+    assert "Xbuf x 5 vendor_a-b" in model.lines
+
+
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
