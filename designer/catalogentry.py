@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from designer.quantity import encode_value
+from designer.vendor_model import VendorModel
 
 Kind = Literal["resistor", "capacitor"]
 
@@ -14,6 +15,10 @@ UNITS: dict[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
 
 PRICE_CLASSES = (0.01, 0.05, 0.25, 1.0, 5.0, math.inf)
 """Upper ends, in euro apiece at a hundred pieces, of the price classes 1 to 6."""
+
+
+ASSUMED_IMPEDANCE = 1.0
+"""Dynamic impedance [Ω] of a reference whose data sheet gives none."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,8 @@ class OpAmp:
     What only the finer simulation models use may be missing: recovery [s] from saturation after a
     hard overdrive is reversed; phase_margin [degrees] at unity gain; swing_2k [V] into 2 kΩ;
     noise_corner [Hz], of the 1/f noise; phase_reversal, whether the output goes high when an input
-    falls below the common-mode range.
+    falls below the common-mode range. spice : a vendor's model, used instead of ours on the finest
+    rung.
     ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
     offsets from, and where it is cut. ``supply_pins``: positive, negative.
     """
@@ -93,6 +99,7 @@ class OpAmp:
     swing_2k: Figure | None = None
     noise_corner: Figure | None = None
     phase_reversal: bool = False
+    spice: VendorModel | None = None
 
     @property
     def sections(self) -> int:
@@ -123,7 +130,8 @@ class Diode:
 
 @dataclass(frozen=True)
 class Reference:
-    """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in."""
+    """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in,
+    dynamic impedance [Ω], which may be missing."""
 
     name: str
     manufacturer: str
@@ -135,6 +143,17 @@ class Reference:
     price: int
     footprint: str
     sources: tuple[str, ...]
+    impedance: Figure | None = None
+
+    @property
+    def least_current(self) -> float:
+        """Current [A] below which it does not regulate; 0 where the data sheet gives none."""
+        return self.current.min or 0.0
+
+    @property
+    def dynamic_impedance(self) -> float:
+        """Typical dynamic impedance [Ω]; assumed where the catalogue has none."""
+        return self.impedance.nominal if self.impedance else ASSUMED_IMPEDANCE
 
 
 @dataclass(frozen=True)

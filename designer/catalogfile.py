@@ -45,6 +45,7 @@ from designer.schema import (
     one_of,
     parse_toml,
 )
+from designer.vendor_model import PINS, read_vendor_model
 
 Entry = PartFamily | OpAmp | Diode | Reference
 
@@ -72,8 +73,12 @@ def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
         row = content[: error.start].count(b"\n") + 1
         found = f"byte 0x{content[error.start]:02x}"
         raise InputError(path, f"line {row}", found, "text in UTF-8") from None
-    read = _from_csv if path.suffix == ".csv" else _from_toml
-    return content, tuple(read(text, str(path)))
+    if path.suffix == ".csv":
+        return content, tuple(_from_csv(text, str(path)))
+    entries = tuple(_from_toml(text, str(path)))
+    # A model beside the file is content too: the catalogue's hash follows it.
+    spice = [e.spice for e in entries if isinstance(e, OpAmp) and e.spice is not None]
+    return b"\n".join([content, *(model.content for model in spice)]), entries
 
 
 def _from_toml(text: str, file: str) -> Iterable[Entry]:
@@ -201,8 +206,17 @@ def _opamp(table: _OpAmpTable, file: str, place: str) -> OpAmp:
                 raise InputError(file, f"{place}.{key}", name, "a name or pin that is used once")
     if not sections:
         raise InputError(file, f"{place}.section", "nothing", "at least one section")
-    figures = {key: value for key, value in table if key != "section"}
-    return OpAmp(**{**figures, "pins": sections})
+    spice = None
+    if table.spice is not None:
+        named = table.spice
+        try:
+            spice = read_vendor_model(named.file, named.subckt, named.pins, Path(file).parent)
+        except InputError as error:
+            if error.file is not None:
+                raise
+            raise InputError(file, f"{place}.{error.field}", error.found, error.expected) from None
+    figures = {key: value for key, value in table if key not in ("section", "spice")}
+    return OpAmp(**{**figures, "pins": sections, "spice": spice})
 
 
 # What the fields of a file accept.
@@ -370,6 +384,13 @@ class _SectionTable(BaseModel):
     output: Annotated[str, line("a pin, in quotes")]
 
 
+class _SpiceTable(BaseModel):
+    model_config = STRICT
+    file: Annotated[str, line("the name of a file beside this one")]
+    subckt: Annotated[str, line("the name of a subcircuit in it")]
+    pins: Annotated[tuple[str, ...], lines("its pins in order, of " + ", ".join(PINS))]
+
+
 class _OpAmpTable(BaseModel):
     model_config = STRICT
     name: Annotated[str, line("a name of one line")]
@@ -401,6 +422,7 @@ class _OpAmpTable(BaseModel):
     swing_2k: Annotated[Figure | None, _figure("V")] = None
     noise_corner: Annotated[Figure | None, _figure("Hz")] = None
     phase_reversal: Annotated[bool, flag()] = False
+    spice: _SpiceTable | None = Field(None, description="a table of file, subckt, pins")
 
 
 class _DiodeTable(BaseModel):
@@ -434,6 +456,7 @@ class _ReferenceTable(BaseModel):
     price: Annotated[int, _price()]
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
+    impedance: Annotated[Figure | None, _figure("Ω")] = None
 
 
 class _File(BaseModel):

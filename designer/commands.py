@@ -6,6 +6,7 @@ import logging
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -220,13 +221,33 @@ def simulate(
 
 @app.command()
 def catalog(
-    json: Json = False, verbose: Verbose = False, quiet: Quiet = False, log: Log = None
+    check: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Measure this op-amp's model against its figures."),
+    ] = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
 ) -> int:
     """What can be bought: part families, op-amps, diodes, references."""
     with _session(verbose, quiet, log):
         from designer.catalog import load_catalog
 
         held = load_catalog()
+        if check is not None:
+            from designer.opamp_bench import checks
+
+            measured = checks(held.opamp(check))
+    if check is not None:
+        if json:
+            rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
+            _print_json({"format": 1, "opamp": check, "checks": rows, "hash": held.hash})
+        elif not quiet:
+            from designer import show
+
+            show.checks(check, measured)
+        return 0 if all(row.agrees for row in measured) else 1
     if json:
         _print_json(
             {

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer import opamp_model
+from designer import opamp_model, reference_model
 from designer.circuit import Board, Circuit
+from designer.dead_zone_parts import OUTPUT
+from designer.diode_model import card
 from designer.opamp_model import Parameters, Rung
 from designer.reduction import FloatingCircuit, Reduction
 from designer.system import Array
@@ -77,13 +79,15 @@ def write(
         f"SIN({_n(excitation.offset)} {_n(excitation.amplitude)} {_n(excitation.frequency)} "
         "0 0 180)",
     ]
+    lines += _sources(circuit, board, rung)
     voltages = dict(zip(circuit.states, initial if initial is not None else (), strict=False))
     lines += [f"{r.name} {r.a} {r.b} {_n(board.values[r.name])}" for r in circuit.resistors]
     for c in circuit.capacitors:
         start = float(voltages.get(c.name, 0.0))
         lines.append(f"{c.name} {c.plus} {c.minus} {_n(board.values[c.name])} IC={_n(start)}")
+    lines += _diodes(circuit, rung)
     lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
-    nets = [*circuit.state_nets, *(["fv"] if circuit.stops else []), circuit.generator.net]
+    nets = [*circuit.state_nets, *([OUTPUT] if circuit.stops else []), circuit.generator.net]
     lines += [
         f".options method={settings.method} reltol={_n(settings.reltol)} "
         f"abstol={_n(settings.abstol)} vntol={_n(settings.vntol)} noopiter",
@@ -113,8 +117,8 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
         return lines + opamp_model.ideal(gain)
     if circuit.figures is None:
         raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
-    lines += [f"VCC vcc 0 {_n(circuit.supply)}", f"VEE vee 0 {_n(-circuit.supply)}"]
-    return lines + opamp_model.subcircuit(rung, Parameters.of(circuit.figures, gain))
+    figures = circuit.figures
+    return lines + opamp_model.subcircuit(rung, Parameters.of(figures, gain), figures.spice)
 
 
 def _outputs(
@@ -138,6 +142,39 @@ def _outputs(
         )
         for s in circuit.sections
     }
+
+
+def _sources(circuit: Circuit, board: Board, rung: Rung) -> list[str]:
+    """Supplies that a part or a model uses; references at the board's value, fed as on the board.
+
+    A reference is a source on ``ideal``; above, it needs its current and has its resistance.
+    """
+    supplies = circuit.supplies if rung == "ideal" else circuit.rails
+    lines = [f"{s.name} {s.net} 0 {_n(s.volts)}" for s in supplies]
+    shunts = False
+    for r in circuit.references:
+        volts = board.reference[r.name]
+        if rung == "ideal" or r.least == 0.0:
+            lines.append(f"{r.name} {r.cathode} {r.anode} {_n(volts)}")
+            continue
+        shunts = True
+        lines.append(
+            reference_model.instance(
+                r.name, r.cathode, r.anode, volts=volts, least=r.least, impedance=r.impedance
+            )
+        )
+    return lines + (reference_model.subcircuit() if shunts else [])
+
+
+def _diodes(circuit: Circuit, rung: Rung) -> list[str]:
+    """The diodes, and a model for each kind; its name in the catalogue stays out of the deck.
+
+    On ``ideal`` a diode is its curve alone; above, it has its capacitance and recovers.
+    """
+    kinds = list(dict.fromkeys(d.model for d in circuit.diodes))
+    lines = [f"{d.name} {d.anode} {d.cathode} diode{kinds.index(d.model)}" for d in circuit.diodes]
+    charge = rung != "ideal"
+    return lines + [card(model, f"diode{i}", charge=charge) for i, model in enumerate(kinds)]
 
 
 def title_line(text: str) -> str:

@@ -13,9 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.catalogentry import OpAmp
-from designer.opamp_model import Parameters, Rung, instance, subcircuit
+from designer.catalogentry import Figure, OpAmp
+from designer.opamp_model import (
+    HEAVY_LOAD,
+    NOISE_FREQUENCY,
+    RATED_LOAD,
+    Parameters,
+    Rung,
+    instance,
+    subcircuit,
+)
 from designer.spice_batch import BatchNgspice
+from designer.vendor_model import VendorModel
 
 TIGHT = ".options reltol=1e-6 vntol=1e-10 abstol=1e-15"
 HARD = 0.25
@@ -25,7 +34,7 @@ HARD = 0.25
 @dataclass(frozen=True)
 class Bench:
     """One op-amp on a bench: its model's rung, rails of ± supply [V], offset [V], bias [A],
-    output limits [V]."""
+    output limits [V], a vendor's model if there is one."""
 
     rung: Rung
     parameters: Parameters
@@ -33,6 +42,7 @@ class Bench:
     vos: float
     ib: float
     rails: tuple[float, float]
+    vendor: VendorModel | None = None
 
     @classmethod
     def of(cls, opamp: OpAmp, rung: Rung) -> Bench:
@@ -45,6 +55,7 @@ class Bench:
             vos=opamp.offset.nominal,
             ib=opamp.bias.nominal,
             rails=(-limit, limit),
+            vendor=opamp.spice,
         )
 
     def deck(self, around: Sequence[str], *, inputs: tuple[str, str] = ("inp", "inn")) -> str:
@@ -55,7 +66,7 @@ class Bench:
             f"VEE vee 0 {-self.supply!r}",
             instance("U1", (*inputs, "out"), rung=self.rung, vos=self.vos, ib=self.ib,
                      rails=self.rails),
-            *subcircuit(self.rung, self.parameters),
+            *subcircuit(self.rung, self.parameters, self.vendor),
             *around,
             ".end",
         ]  # fmt: skip
@@ -188,6 +199,66 @@ class Bench:
 
 
 _POINT = ".op"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One figure: expected by the catalogue, measured in ngspice, whether they agree, and whether
+    the catalogue's figure is assumed."""
+
+    figure: str
+    unit: str
+    expected: float
+    measured: float
+    tolerance: float
+    assumed: bool
+
+    @property
+    def agrees(self) -> bool:
+        return abs(self.measured - self.expected) <= self.tolerance * abs(self.expected)
+
+
+def checks(opamp: OpAmp, rung: Rung = "full") -> list[Check]:
+    """Every figure that this rung's model has, measured; a vendor's model on ``full`` if named.
+
+    Raises
+    ------
+    SimulationFailed : ngspice has no answer for one of them.
+    EnvironmentMissing : ngspice is missing.
+    """
+    bench, found = Bench.of(opamp, rung), []
+
+    def add(name: str, unit: str, figure: Figure | None, measured: float, tolerance: float) -> None:
+        if figure is not None:
+            expected = figure.nominal
+            found.append(Check(name, unit, expected, measured, tolerance, figure.assumed))
+
+    add("gain", "V/V", opamp.gain, bench.open_loop_gain(), 0.01)
+    add("offset", "V", opamp.offset, bench.offset(), 0.01)
+    for pin, current in zip(("noninverting", "inverting"), bench.bias(), strict=True):
+        add(f"bias, {pin} input", "A", opamp.bias, current, 0.01)
+    light = bench.swing(RATED_LOAD)
+    add("swing into 10 kΩ, low", "V", opamp.saturation, -light[0], 0.01)
+    add("swing into 10 kΩ, high", "V", opamp.saturation, light[1], 0.01)
+    if rung == "ideal":
+        return found
+    at = opamp.gbw.nominal / 10.0
+    frequency, gain = bench.response(at, 2.0 * at)
+    add("gain-bandwidth", "Hz", opamp.gbw, float(abs(gain[0]) * frequency[0]), 0.02)
+    for edge, slope in zip(("rising", "falling"), bench.slew(), strict=True):
+        add(f"slew, {edge}", "V/s", opamp.slew, slope, 0.02)
+    add("recovery", "s", opamp.recovery, bench.recovery(), 0.1)
+    if rung == "dynamic":
+        return found
+    heavy = bench.swing(HEAVY_LOAD)
+    add("swing into 2 kΩ, low", "V", opamp.swing_2k, -heavy[0], 0.01)
+    add("swing into 2 kΩ, high", "V", opamp.swing_2k, heavy[1], 0.01)
+    add("phase margin", "°", opamp.phase_margin, bench.unity_gain()[1], 0.05)
+    for side, current in zip(("sinking", "sourcing"), bench.short_circuit(), strict=True):
+        add(f"short circuit, {side}", "A", opamp.output_current, abs(current), 0.02)
+    add("supply current", "A", opamp.supply_current, bench.supply_current()[0], 0.01)
+    add("noise at 1 kHz", "V/√Hz", opamp.noise, bench.noise(NOISE_FREQUENCY), 0.01)
+    return found
 
 
 def _between(time: NDArray[np.float64], wave: NDArray[np.float64], a: float, b: float) -> float:

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from designer.catalogentry import OpAmp
+from designer.vendor_model import VendorModel
 
 Rung = Literal["ideal", "dynamic", "full"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
@@ -154,11 +155,13 @@ def instance(
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
 
-def subcircuit(rung: Rung, parameters: Parameters) -> list[str]:
-    """The lines of the subcircuit ``opamp`` of one rung."""
+def subcircuit(rung: Rung, parameters: Parameters, vendor: VendorModel | None = None) -> list[str]:
+    """The lines of the subcircuit ``opamp`` of one rung; on ``full`` a vendor's model, if any."""
     if rung == "ideal":
         return ideal(parameters.gain)
-    return _dynamic(parameters) if rung == "dynamic" else _full(parameters)
+    if rung == "dynamic":
+        return _dynamic(parameters)
+    return _full(parameters) if vendor is None else vendor.wrapped()
 
 
 def ideal(gain: float) -> list[str]:
@@ -242,19 +245,29 @@ def _output_limit(low: str, high: str) -> list[str]:
 def _common_mode(p: Parameters) -> list[str]:
     """Inputs as the first stage sees them: cut at its range, at nodes ``seen`` and ``seenn``.
 
+    Two limits in a row, each about its own pin: XSPICE's controlled limiter would do with one, but
+    reports an error in Newton's first steps, while the supplies are still at zero.
     Phase reversal: an input below the range, either of them, pulls the output up.
     """
     lower, upper = p.headroom
-    over = -BEYOND if upper is None else upper
-    pull = REVERSAL if p.reversal else 0.0
-    return [
-        "Apositive inside vcc vee kept range",
-        "Anegative inn vcc vee keptn range",
-        f".model range climit(in_offset=0 gain=1 upper_delta={_n(over)} "
-        f"lower_delta={_n(lower)} limit_range=0.01 fraction=FALSE)",
-        f"Epositive seen kept kept inside {_n(pull)}",
-        f"Enegative seenn keptn inn keptn {_n(pull)}",
+    lines = [
+        f".model lowest limit(in_offset=0 gain=1 out_lower_limit={_n(lower)} "
+        f"out_upper_limit={_n(BEYOND)} limit_range=0.01 fraction=FALSE)"
     ]
+    if upper is not None:
+        lines.append(
+            f".model highest limit(in_offset=0 gain=1 out_lower_limit={_n(-BEYOND)} "
+            f"out_upper_limit={_n(-upper)} limit_range=0.01 fraction=FALSE)"
+        )
+    pull = REVERSAL if p.reversal else 0.0
+    for pin, own, seen in (("inside", "p", "seen"), ("inn", "n", "seenn")):
+        cut = f"cut{own}" if upper is not None else f"kept{own}"
+        lines.append(f"Alowest{own} %vd({pin} vee) %vd({cut} vee) lowest")
+        if upper is not None:
+            lines.append(f"Ahighest{own} %vd({cut} vcc) %vd(kept{own} vcc) highest")
+        sign = f"kept{own} {pin}" if own == "p" else f"{pin} kept{own}"
+        lines.append(f"Epull{own} {seen} kept{own} {sign} {_n(pull)}")
+    return lines
 
 
 def _noisy_input(p: Parameters) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -13,6 +13,9 @@ from rich.text import Text
 
 from designer.catalog import Catalog
 from designer.quantity import format_quantity
+
+if TYPE_CHECKING:
+    from designer.opamp_bench import Check
 
 
 def run(answer: Mapping[str, Any]) -> None:
@@ -130,6 +133,20 @@ def pictures(folder: Path, names: Sequence[str]) -> None:
     """Where the pictures are."""
     said = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
     _line(_console(), f"{folder}: {said}")
+
+
+def checks(name: str, measured: Sequence[Check]) -> None:
+    """An op-amp's figures, by the catalogue and by its model in ngspice."""
+    table = _table(f"{name} in ngspice", "figure", "catalogue", "measured", "")
+    for row in measured:
+        _row(
+            table,
+            row.figure + (" (assumed)" if row.assumed else ""),
+            format_quantity(row.expected, row.unit),
+            format_quantity(row.measured, row.unit),
+            "" if row.agrees else f"differ by more than {100 * row.tolerance:g} %",
+        )
+    _console().print(table)
 
 
 def catalog(held: Catalog) -> None:

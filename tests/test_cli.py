@@ -350,6 +350,23 @@ def test_synthesis_without_responses_or_stops(
     assert done.returncode == 0
 
 
+def test_catalog_check(capfd: pytest.CaptureFixture[str]) -> None:
+    """An op-amp's model against its figures; an unknown name is bad input."""
+    assert cli.status(["catalog", "--check", "TL074C", "--json"]) == 0
+    said = json.loads(capfd.readouterr().out)
+    assert said["opamp"] == "TL074C"
+    figures = {row["figure"]: row for row in said["checks"]}
+    assert figures["swing into 2 kΩ, high"]["measured"] == pytest.approx(12.0, rel=0.01)
+    assert figures["recovery"]["assumed"]
+    assert all(row["agrees"] for row in said["checks"])
+    assert cli.status(["catalog", "--check", "TL074C"]) == 0
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert "slew, rising" in err
+    assert cli.status(["catalog", "--check", "TL074X"]) == 2
+    assert "TL074C" in capfd.readouterr().err
+
+
 def test_catalog(capfd: pytest.CaptureFixture[str]) -> None:
     assert cli.status(["catalog", "--json"]) == 0
     said = capfd.readouterr()

@@ -13,10 +13,11 @@ from designer.circuit import nominal_board
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import check_netlist, open_simulator
-from designer.opamp_bench import Bench
+from designer.opamp_bench import Bench, Check, checks
 from designer.opamp_model import RUNGS, Rung
 from designer.reduction import Reduction
 from designer.system import Drive
+from designer.vendor_model import PINS, VendorModel
 from tests.test_reduction import EXACT, circuit_of
 
 CATALOG = load_catalog()
@@ -205,3 +206,25 @@ def test_a_rung_without_figures() -> None:
             bare, nominal_board(bare), Excitation(400.0, 1.0), SolverSettings("trap", 1e-6),
             title="t", stop_time=1e-3, rung="dynamic",
         )  # fmt: skip
+
+
+@each
+@every_rung
+def test_every_figure_agrees_with_its_model(name: str, rung: Rung) -> None:
+    found = checks(CATALOG.opamp(name), rung)
+    assert [c.figure for c in found if not c.agrees] == []
+    assert len({c.figure for c in found}) == len(found) >= 6
+
+
+def test_a_figure_that_its_model_does_not_have_is_seen() -> None:
+    opamp = CATALOG.opamp("TL074C")
+    vendor = VendorModel(
+        "own", "vendor_x", PINS,
+        (".subckt vendor_x inp inn out vcc vee", "Eout out 0 inp inn 1e6", "Rs vcc vee 1e4",
+         ".ends vendor_x"), b"",
+    )  # fmt: skip
+    found = checks(replace(opamp, spice=vendor), "dynamic")
+    assert all(c.agrees for c in found), "below full the model is ours"
+    bench = Bench.of(replace(opamp, spice=vendor), "full")
+    assert bench.open_loop_gain() == pytest.approx(1e6, rel=1e-3)
+    assert not Check("gain", "V/V", 2e5, 1e6, 0.01, False).agrees
