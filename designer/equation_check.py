@@ -29,6 +29,7 @@ from designer.circuit import Circuit, nominal_board
 from designer.deck import Excitation, SolverSettings
 from designer.mechanics import SecondOrderSystem
 from designer.ngspice import SimulationFailed, Sweep
+from designer.reduction import Reduction
 from designer.responses import ModelResponse, peaks
 from designer.synthesis import Design
 from designer.system import Array
@@ -210,12 +211,22 @@ def _rests(
 # What ngspice is asked
 
 
-def _deck(design: Design, source: str, analysis: str) -> str:
-    """The deck that is simulated in time, with another generator line and analysis."""
+def _deck(design: Design, source: str, analysis: str, generator: float, contact: int) -> str:
+    """The deck that is simulated in time, with another generator line and analysis.
+
+    generator, contact : at the first operating point [V], which ngspice looks for from where the
+    reduction says it is: from zero it does not find every one.
+    """
     circuit = design.circuit
+    board = nominal_board(circuit, ideal=True)
+    try:
+        known = rest(Reduction(circuit, board), generator, contact)
+    except ArithmeticError:  # a floating net: ngspice shall say it
+        known = []
+    resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in known)] if known else []
     text = deck.write(
         circuit,
-        nominal_board(circuit, ideal=True),
+        board,
         Excitation(1.0, 1.0),
         SolverSettings("trap", 1.0, reltol=1e-6, abstol=1e-14, vntol=1e-9),
         title="equation check",
@@ -227,9 +238,23 @@ def _deck(design: Design, source: str, analysis: str) -> str:
         if word == circuit.generator.name:
             line = f"{circuit.generator.name} {circuit.generator.net} 0 {source}"
         elif word == ".tran":
-            line = analysis
+            line = "\n".join([*resting, analysis])
         lines.append(line)
     return "\n".join(lines) + "\n"
+
+
+def rest(reduction: Reduction, generator: float, contact: int) -> list[tuple[str, float]]:
+    """Every net with its voltage [V] where the circuit rests, in this contact, at a constant
+    generator voltage; exact, since a mode is linear."""
+    circuit = reduction.circuit
+    key = circuit.rest
+    if contact:
+        key = circuit.carrying(dict(circuit.stops[0].contacts)[contact])
+    mode = reduction.system().mode(key)
+    x = np.linalg.solve(mode.A, -(mode.B * generator + mode.d))
+    voltage = reduction.solution(key).voltage
+    known = np.concatenate([x, [generator, 1.0]])
+    return [(net, float(voltage[net] @ known)) for net in circuit.nets]
 
 
 def _volts(design: Design, force: float) -> float:
@@ -237,19 +262,22 @@ def _volts(design: Design, force: float) -> float:
     return -force * design.amplitude()
 
 
-def _ac(design: Design, rest: _Rest, low: float, high: float) -> SpiceJob[Sweep]:
-    held = 0.0 if rest.contact == 0 else _volts(design, 0.5 * (rest.near + rest.far))
-    text = _deck(design, f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}")
+def _ac(design: Design, resting: _Rest, low: float, high: float) -> SpiceJob[Sweep]:
+    held = 0.0 if resting.contact == 0 else _volts(design, 0.5 * (resting.near + resting.far))
+    text = _deck(
+        design, f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}", held, resting.contact
+    )
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _as_it_is, "ac")
 
 
-def _dc(design: Design, rest: _Rest) -> SpiceJob[Sweep]:
-    first, last = sorted((_volts(design, rest.near), _volts(design, rest.far)))
+def _dc(design: Design, resting: _Rest) -> SpiceJob[Sweep]:
+    first, last = sorted((_volts(design, resting.near), _volts(design, resting.far)))
     step = (last - first) / POINTS
     # Half a step more: the last point is not lost to rounding.
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
     nets = (design.circuit.state_nets[0], STAGE)
-    return SpiceJob(_deck(design, "DC 0", card), nets, last - 0.01 * step, _as_it_is, "dc")
+    text = _deck(design, "DC 0", card, first, resting.contact)
+    return SpiceJob(text, nets, last - 0.01 * step, _as_it_is, "dc")
 
 
 def _as_it_is(sweep: Sweep) -> Sweep:
@@ -261,18 +289,18 @@ def _as_it_is(sweep: Sweep) -> Sweep:
 
 
 def _transfer(
-    design: Design, model: SecondOrderSystem, rest: _Rest, heard: Sweep | SimulationFailed
+    design: Design, model: SecondOrderSystem, resting: _Rest, heard: Sweep | SimulationFailed
 ) -> Finding:
-    name = f"transfer, {_place(rest.contact)}"
+    name = f"transfer, {_place(resting.contact)}"
     bound = FLOOR
     if isinstance(heard, SimulationFailed):
         return Finding(name, float("nan"), bound, heard.reason)
     scales = design.errors.scales
     omega = 2.0 * np.pi * heard.axis * scales.seconds
     unit = -scales.volts[0] / design.amplitude()
-    wanted = unit * transfer(model, omega, rest.contact)
+    wanted = unit * transfer(model, omega, resting.contact)
     deviation = np.abs(heard.signals[design.circuit.state_nets[0]] / wanted - 1.0)
-    bounds = np.expm1(design.errors.max_error * explained(model, omega, rest.contact)) + FLOOR
+    bounds = np.expm1(design.errors.max_error * explained(model, omega, resting.contact)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return Finding(name, float(deviation[worst]), float(bounds[worst]))
 
@@ -299,7 +327,10 @@ def _curve(
         error = abs(np.log(slope / wanted)) if slope > 0.0 else np.inf
         findings.append(Finding(f"slope, {place}", float(error), bound))
         threshold = contact * (level - offset) / (slope - leftover)
+        # Both stops need not lie at the same distance: an offset of the generator centres them.
+        stated = design.errors.scales.threshold_lower if contact < 0 else float("nan")
         gap = model.clearances[0].gap * design.errors.scales.volts[0]
+        gap = stated if np.isfinite(stated) else gap
         findings.append(Finding(f"threshold, {place}", float(abs(threshold / gap - 1.0)), bound))
     share = float(abs(leftover / wanted) * design.model.mu)
     return [*findings, Finding("leftover slope", share, bound)]

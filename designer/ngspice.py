@@ -174,8 +174,8 @@ def require_version(found: str) -> str:
 # What may reach ngspice
 
 CARDS = frozenset(
-    ".subckt .ends .model .param .func .tran .ic .options .option .save .end .title .global "
-    ".temp .ac .dc .op .noise".split()
+    ".subckt .ends .model .param .func .tran .ic .nodeset .options .option .save .end .title "
+    ".global .temp .ac .dc .op .noise".split()
 )
 
 MODEL_TYPES = frozenset(

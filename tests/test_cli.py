@@ -544,6 +544,34 @@ def test_missing_ngspice_is_exit_3(home: Path, tmp_path: Path) -> None:
     assert not out.exists()
 
 
+@pytest.mark.parametrize("what", ["too old", "no library", "a library that crashes"])
+def test_an_ngspice_that_will_not_do_is_exit_3(home: Path, tmp_path: Path, what: str) -> None:
+    """Clear, before any long work, and nothing is written."""
+    out, environment = tmp_path / "out", {**os.environ, "PYTHONPATH": str(ROOT)}
+    if what == "too old":
+        old = tmp_path / "ngspice"
+        old.write_text("#!/bin/sh\necho '** ngspice-34 : Circuit level simulation program'\n")
+        old.chmod(0o755)
+        environment["PATH"] = f"{tmp_path}:{environment['PATH']}"
+        said = ("ngspice 34 found", "apt-get install")
+    elif what == "no library":
+        environment["NGSPICE_LIBRARY_PATH"] = os.devnull
+        said = ("libngspice does not load", "apt-get install")
+    else:
+        # A module of this name comes before PySpice's: loading the library ends the process.
+        (tmp_path / "PySpice").mkdir()
+        (tmp_path / "PySpice" / "__init__.py").write_text("import os\nos.kill(os.getpid(), 11)\n")
+        environment["PYTHONPATH"] = f"{tmp_path}:{ROOT}"
+        said = ("simulation workers do not start", "died (exit -11)")
+    process = _process("run", _model(home), "--out", out, "--json", env=environment)
+    stdout, stderr = process.communicate(timeout=120)
+    assert process.returncode == 3
+    assert stdout == ""
+    assert all(words in stderr for words in said), stderr
+    assert "Traceback" not in stderr
+    assert not out.exists()
+
+
 # ---------------------------------------------------------------------------------------------
 # Interrupted
 

@@ -228,3 +228,25 @@ def test_blocks_are_byte_equal_on_any_number_of_workers(pool: SpicePool, tmp_pat
     assert contents[0] == contents[1]
     assert known[0] is not None
     assert all(a.ngspice_nominal for a in known[0])
+
+
+class Broken:
+    """A pool whose workers die on every deck."""
+
+    def map(self, jobs: Iterable[SpiceJob[Any]]) -> Iterator[tuple[int, Any]]:
+        for i, _ in enumerate(jobs):
+            yield i, SimulationFailed("worker died (exit -11) twice")
+
+
+def test_a_library_that_crashes_costs_no_verdict() -> None:
+    p = asking()
+    alone = run_block(p, range(2), None, 1)
+    answers = run_block(p, range(2), Broken(), 1)  # type: ignore[arg-type]
+    assert [(a.verdict, a.response, a.radius) for a in answers] == [
+        (a.verdict, a.response, a.radius) for a in alone
+    ]
+    for a in answers:
+        assert (a.ngspice, a.ngspice_nominal) == ("failed", "failed")
+        assert a.ngspice_reason == a.ngspice_nominal_reason == "worker died (exit -11) twice"
+        assert a.agrees is None
+        assert a.agrees_from_nominal is None

@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 
 from designer.api import Synthesis, synthesise
-from designer.circuit import Resistor
+from designer.circuit import Circuit, Resistor
+from designer.coefficients import coefficient_errors
 from designer.equation_check import FLOOR, EquationCheck, Finding, check, explained, transfer
 from designer.mechanics import SecondOrderSystem
 from designer.model import Dimensionless
 from designer.modelfile import parse_model_file, read_model_file
-from designer.synthesis import Design
+from designer.synthesis import Certificate, Design
 from designer.workers import SpicePool
+from designer.zone import Sides
+from tests.stages import bought, one_sided, rectifier, stage
+from tests.stages import model as stage_model
 
 ROOT = Path(__file__).resolve().parent.parent
 COARSE = """
@@ -142,6 +146,39 @@ def test_right_circuits_pass(pool: SpicePool, name: str, findings: set[str]) -> 
     said = result.as_dict()
     assert said["passed"] is True
     assert len(said["findings"]) == len(findings)
+
+
+def around(circuit: Circuit, model: Dimensionless) -> Design:
+    """A design of a circuit that is there already."""
+    errors = coefficient_errors(circuit, model.second_order())
+    return Design(model, circuit, errors, Certificate("bound", 0.0, "none"), {}, {}, 0.0)
+
+
+STAGES: dict[str, tuple[Circuit, Sides]] = {
+    "rectifier": (stage("rectifier", "both", rectifier()), "both"),
+    "rectifier, bought": (stage("rectifier", "both", bought(rectifier(2.1))), "both"),
+    "rectifier, upper": (stage("rectifier", "upper", rectifier(sides="upper")), "upper"),
+    "rectifier, lower": (stage("rectifier", "lower", rectifier(sides="lower")), "lower"),
+    "saturation, upper": (stage("saturation", "upper", one_sided()), "upper"),
+    "saturation, lower": (stage("saturation", "lower", one_sided()), "lower"),
+}
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_every_stage_passes(pool: SpicePool, name: str) -> None:
+    circuit, sides = STAGES[name]
+    design = around(circuit, stage_model(sides))
+    result = check(design, (), pool)
+    contacts = {"both": ("upper", "lower"), "upper": ("upper",), "lower": ("lower",)}[sides]
+    kinds = ("transfer", "slope", "threshold")
+    expected = {f"{kind}, {c} contact" for c in contacts for kind in kinds}
+    assert set(by_name(result)) == {"transfer, open", "leftover slope", *expected}
+    assert result.passed, [str(f) for f in result.findings]
+    feedback = "R202" if sides != "lower" else "R205"
+    if name.startswith("rectifier"):
+        wrong = around(circuit, stage_model(sides))
+        spoilt = check(with_value(wrong, feedback, 1.05), (), pool)
+        assert not by_name(spoilt)[f"slope, {contacts[0]} contact"].passed
 
 
 @pytest.mark.parametrize(
