@@ -129,11 +129,14 @@ def _with_shift(
     own = near.take(order)
     row, hit = between(own["R200"], table["R200"] - 1e-6, table["R200"] + 1e-6)
     both = table.take(row).beside(ValueTable(("R211", "R212"), own.take(hit).values[:, 1:]))
-    values = both.columns
-    shift = steep(values) * t.target.supply * values["R200"] / values["R211"]
-    worst = np.maximum(error[row], np.abs(bias(t.target, values, np.exp(u))))
-    good = inside(shift / t.target.saturation, t.box.shift) & (worst <= level)
-    return both.take(np.flatnonzero(good)), worst[good]
+    error = error[row]
+    shift = steep(both.columns) * t.target.supply * both["R200"] / both["R211"]
+    # Only what lies in the range of c has a threshold at all.
+    good = np.flatnonzero(inside(shift / t.target.saturation, t.box.shift))
+    both, error = both.take(good), error[good]
+    worst = np.maximum(error, np.abs(bias(t.target, both.columns, np.exp(u))))
+    good = np.flatnonzero(worst <= level)
+    return both.take(good), worst[good]
 
 
 def noise_rules(t: Tables, slopes: Rows, nulls: Rows) -> list[Rule]:

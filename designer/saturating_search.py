@@ -57,12 +57,14 @@ class Stage:
     """One stage of the search: the values of each part and the ranges.
 
     slope, whole : whether the slope's tables, or all, hold every value that the conditions leave.
+    rescue : the stage is for where the ones before have no answer.
     """
 
     lists: Mapping[str, Array]
     box: Box
     slope: bool = False
     whole: bool = False
+    rescue: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,8 @@ def size(
 ) -> DeadZone | str:
     found = Search(None, 0.0, 0, "stop slope")
     for stage in _stages(target, resistors, base, ranking.free, ties):
+        if stage.rescue and found.best is not None:
+            break
         found = _search(target, stage, ties, ranking.free | {base}, found)
         if found.best is not None and found.error <= max(found.bound, 0.0) + EXACT:
             break
@@ -197,7 +201,8 @@ def _stages(
     else:
         last = free_box(target)
         yield Stage(slopes, replace(last, steep=far.steep), slope=True)
-    yield Stage(every if fits else slopes, last, slope=True, whole=fits)
+    lists = every if fits else slopes
+    yield Stage(lists, last, slope=True, whole=fits, rescue=target.strict)
 
 
 def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
