@@ -14,6 +14,7 @@ import numpy as np
 from designer import saturating_rows, saturating_stage
 from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget, parts_of
 from designer.saturating_tables import (
+    MOST_SHIFT,
     Box,
     Tables,
     box,
@@ -85,6 +86,8 @@ class Search:
 def size(
     target: DeadZoneTarget, resistors: Array, base: float, ranking: Ranking, ties: Ties
 ) -> DeadZone | str:
+    if target.shift[0] >= MOST_SHIFT:
+        return "dead-zone bias"
     found = Search(None, 0.0, 0, "stop slope")
     for stage in _stages(target, resistors, base, ranking.free, ties):
         if stage.rescue and found.best is not None:
@@ -101,7 +104,8 @@ def size(
     if picked is None:
         without = replace(ranking, most=None)
         free = saturating_rows.pick(t, least.error, least.u, without, LAST_LEVEL)
-        return "noise gain" if free is None else "distinct values"
+        rule = "noise gain" if np.isfinite(target.noise_gain) else "dead-zone bias"
+        return rule if free is None else "distinct values"
     values, word = picked
     values = {name: values[name] for name in parts_of(target.kind, target.sides)}
     return _answer(target, values, found, word)
