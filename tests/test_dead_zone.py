@@ -319,6 +319,7 @@ def test_an_interval_leaves_the_slope_free() -> None:
     assert wide.slope[0] <= slope / found.values["R50"] <= wide.slope[1]
 
 
+@pytest.mark.slow
 def test_slack_and_used_values_lessen_the_kinds() -> None:
     exact = sized(target(), E96)
     loose = sized(target(), E96, wishes=Wishes(slack=2e-3))
@@ -330,6 +331,7 @@ def test_slack_and_used_values_lessen_the_kinds() -> None:
     assert set(sized(target(), E96, wishes=preferred).values.values()) <= preferred.preferred
 
 
+@pytest.mark.slow
 def test_the_number_of_values_is_kept() -> None:
     used = frozenset({BASE, 22e3})
     free = sized(target(), E96, used)
