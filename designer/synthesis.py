@@ -8,11 +8,11 @@ values among its best. The finished circuit is then reduced and its error comput
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from designer import dead_zone, matching, topology
+from designer import matching, nonlinear_block, topology
 from designer.catalog import Catalog, OpAmp
 from designer.circuit import Circuit
 from designer.coefficients import CoefficientErrors, coefficient_errors
@@ -34,8 +34,6 @@ LOAD, SIGNAL = 2e3, (4.7e3, 5e5)
 """Least load of an output [ohm]; range of the signal resistors [ohm], for load and for noise."""
 BASE = 1e4
 """Resistors that only set a level (inverters, inputs of the gain stages) [ohm]."""
-LEAST_GAIN = 1.25
-"""Of the saturating path, so that it does saturate where the clearance is never closed."""
 GENERATOR_PEAK = 5.0
 """Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
 MOST_CUT = 4
@@ -48,10 +46,7 @@ FREES = {
     "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
     "signal resistors": "widen circuit.resistor_range, or set circuit.side_conditions = false",
     "coefficients": "add a series to circuit.resistors or circuit.capacitors, or widen the ranges",
-    "stop slope": "widen circuit.resistor_range (R50 is the stop) or take a finer series",
     "stop stiffness": "a smaller model.k0 or a wider circuit.resistor_range: R4 is too small",
-    "dead-zone null": "a finer series, or a larger model.b: the threshold may be too small a part "
-    "of the swing for the gain of the saturating path",
 }
 
 
@@ -146,7 +141,16 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
     # R6 and R12 do not enter the coefficients; ``_drive`` sizes them afterwards.
     values |= dict.fromkeys(("R6", "R12"), float(resistors[-1]))
     if model.k0 > 0.0:
-        zone = _dead_zone(model, opamp, saturation, swing, peaks, resistors, base, values, spec)
+        room = nonlinear_block.Room(
+            saturation=saturation,
+            swing=swing,
+            supply=spec.supply,
+            peaks=peaks.states,
+            penetration=peaks.penetration,
+            load=max(LOAD, float(resistors.min())) if spec.side_conditions else 0.0,
+            strict=spec.side_conditions,
+        )
+        zone = nonlinear_block.choose(model, values, room, resistors, base)
         values |= zone.values
         solver["dead zone"] = zone.solver
     circuit = _build(model, values, opamp, spec, saturation)
@@ -288,44 +292,6 @@ def _levels(resistors: Array, capacitors: Array, targets: Targets) -> float:
 
 def _next(level: float) -> float:
     return level * (1e3 if level < 1e-6 else GROWTH)
-
-
-def _dead_zone(
-    model: Dimensionless,
-    opamp: OpAmp,
-    saturation: float,
-    swing: float,
-    peaks: Peaks,
-    resistors: Array,
-    base: float,
-    values: dict[str, float],
-    spec: CircuitSpec,
-) -> dead_zone.DeadZone:
-    """Size the stage for the scales of the linear block alone."""
-    linear = replace(model, k0=0.0)
-    errors = coefficient_errors(
-        _build(linear, values, opamp, spec, saturation), linear.second_order()
-    )
-    relative = errors.scales.volts
-    top = swing / float((peaks.states * relative).max())
-    seconds = errors.scales.seconds
-    found = dead_zone.size(
-        dead_zone.DeadZoneTarget(
-            mu=model.mu,
-            slope=model.mu * values["C2"] * float(relative[1]) / seconds,
-            saturation=saturation,
-            threshold=min(model.b * top, saturation / LEAST_GAIN),
-            linear_gain=swing / (top * float(peaks.states[0])),
-            output_gain=swing / (top * max(peaks.penetration, 0.02 * float(peaks.states[0]))),
-            load=max(LOAD, float(resistors.min())) if spec.side_conditions else 0.0,
-        ),
-        resistors,
-        base,
-        frozenset(values.values()),
-    )
-    if isinstance(found, str):
-        raise Unreachable(None, "circuit", f"no dead zone; what binds: {found}", FREES[found])
-    return found
 
 
 def _build(
