@@ -26,7 +26,8 @@ class Bounds:
     seconds : range of the time scale. level : largest ratio between the peaks of the state
     voltages of one mass, and between the two velocities. share : how much larger than x1's the
     peak voltage of another state may be. stop : least R4 [ohm] that leaves room
-    for the stop's resistor. peaks : (4,) peaks of x1, x1', x2, x2' in model units.
+    for the stop's resistor. peaks : (4,) peaks of x1, x1', x2, x2' in model units. signal :
+    range of the linear block's resistors [ohm].
     """
 
     seconds: tuple[float, float]
@@ -34,6 +35,7 @@ class Bounds:
     share: float
     stop: float
     peaks: Array
+    signal: tuple[float, float] = (0.0, np.inf)
 
     @property
     def p_range(self) -> tuple[float, float]:

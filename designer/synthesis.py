@@ -12,16 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from designer import dead_zone, matching, topology
+from designer import dead_zone, linear_search, matching, topology
 from designer.catalog import Catalog, OpAmp
 from designer.circuit import Circuit
 from designer.coefficients import CoefficientErrors, coefficient_errors
 from designer.completion import Bounds
 from designer.errors import InputError, Unreachable
-from designer.linear_block import FIRST_LEVEL, GROWTH, LAST_LEVEL, Targets, ratio_table
+from designer.linear_block import Targets
+from designer.linear_search import PROOF_TOLERANCE, LinearBlock
 from designer.model import Dimensionless
 from designer.modelfile import CircuitSpec
-from designer.selection import Selection, select
+from designer.selection import Shortfall
 from designer.system import Array
 
 SWING_SHARE = 0.85
@@ -38,11 +39,8 @@ LEAST_GAIN = 1.25
 """Of the saturating path, so that it does saturate where the clearance is never closed."""
 GENERATOR_PEAK = 5.0
 """Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
-MOST_CUT = 4
-"""Levels whose tables had to be cut, one after the other, before the search gives up."""
 LEAST_SIGNAL = 10.0
 """Peak of x1 over the op-amp's largest offset: below it a circuit shows offsets, not dynamics."""
-PROOF_TOLERANCE = 1e-6
 FREES = {
     "frequency": "widen circuit.frequency or circuit.capacitor_range",
     "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
@@ -134,7 +132,7 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
         [catalog.part("capacitor", v, spec.capacitor_grade).price for v in capacitors.tolist()],
         dtype=float,
     )
-    chosen, bound, proved = _linear(model, spec, resistors, capacitors, prices, bounds)
+    chosen = _linear(model, resistors, capacitors, prices, bounds)
     values = {
         name: _nearest(resistors if name.startswith("R") else capacitors, value)
         for name, value in chosen.values.items()
@@ -160,7 +158,7 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
         model=model,
         circuit=circuit,
         errors=errors,
-        certificate=_certificate(errors.max_error, bound, chosen, proved),
+        certificate=_certificate(errors.max_error, chosen),
         conditions=_conditions(spec, bounds, swing),
         solver=solver,
         seconds=time.perf_counter() - began,
@@ -221,6 +219,7 @@ def _bounds(model: Dimensionless, spec: CircuitSpec, peaks: Peaks, resistors: Ar
         share=SHARE if spec.side_conditions else np.inf,
         stop=least * model.mu / gain,
         peaks=peaks.states,
+        signal=SIGNAL if spec.side_conditions else (0.0, np.inf),
     )
 
 
@@ -230,64 +229,18 @@ def _output_gain(model: Dimensionless, peaks: Peaks) -> float:
 
 
 def _linear(
-    model: Dimensionless,
-    spec: CircuitSpec,
-    resistors: Array,
-    capacitors: Array,
-    prices: Array,
-    bounds: Bounds,
-) -> tuple[Selection, float, bool]:
-    """(best linear block, proved lower bound of its error, whether the bound is its error)."""
+    model: Dimensionless, resistors: Array, capacitors: Array, prices: Array, bounds: Bounds
+) -> LinearBlock:
     targets = Targets.from_state_matrix(model.second_order().state_matrix())
-    free = _levels(resistors, capacitors, targets)
-    signal = resistors
-    if spec.side_conditions:
-        signal = resistors[(resistors >= SIGNAL[0]) & (resistors <= SIGNAL[1])]
-    binding = "signal resistors"
-    if len(signal) and bounds.stop > signal[-1]:
+    found = linear_search.best(targets, resistors, capacitors, prices, bounds)
+    if isinstance(found, Shortfall):
         raise Unreachable(
             None,
             "circuit",
-            "no choice of parts; what binds: stop stiffness",
-            FREES["stop stiffness"],
+            f"no choice of parts; what binds: {found.what}",
+            FREES.get(found.what, "a wider choice of parts"),
         )
-    level, lowest, cut = FIRST_LEVEL, 0.0, 0
-    while cut < MOST_CUT and level < LAST_LEVEL and len(signal):
-        searched = True
-        table = ratio_table(signal, capacitors, targets, level, bounds.p_range)
-        if len(table):
-            answer = select(table, signal, capacitors, prices, targets, bounds, level)
-            if isinstance(answer, Selection):
-                whole = answer.complete or answer.error <= free + PROOF_TOLERANCE
-                return answer, answer.error if whole else max(free, lowest), whole
-            binding, searched = answer.what, answer.whole
-        elif binding == "signal resistors":
-            binding = "coefficients"
-        if table.complete and searched:
-            lowest = level
-        cut += not (table.complete and searched)
-        level = _next(level)
-    raise Unreachable(
-        None,
-        "circuit",
-        f"no choice of parts; what binds: {binding}",
-        FREES.get(binding, "a wider choice of parts"),
-    )
-
-
-def _levels(resistors: Array, capacitors: Array, targets: Targets) -> float:
-    """Lower bound of the linear error over the whole catalogue, no side condition."""
-    level, previous = FIRST_LEVEL, 0.0
-    while level < LAST_LEVEL:
-        table = ratio_table(resistors, capacitors, targets, level)
-        if len(table):
-            return float(table.error[0]) if table.complete else previous
-        previous, level = level, _next(level)
-    return LAST_LEVEL
-
-
-def _next(level: float) -> float:
-    return level * (1e3 if level < 1e-6 else GROWTH)
+    return found
 
 
 def _dead_zone(
@@ -392,14 +345,10 @@ def _nearest(values: Array, wanted: float) -> float:
     return float(values[int(np.argmin(np.abs(np.log(values / wanted))))])
 
 
-def _certificate(reached: float, bound: float, chosen: Selection, proved: bool) -> Certificate:
-    join = (
-        "empty join of the scale-free combinations of the coefficient errors below the bound, "
-        "every value of the chosen series in the ranges of the conditions considered"
-    )
-    if proved and reached <= bound + PROOF_TOLERANCE:
-        return Certificate("optimal", bound, f"{join}; completed by {chosen.solver}")
-    return Certificate("bound", min(bound, reached), join)
+def _certificate(reached: float, chosen: LinearBlock) -> Certificate:
+    if chosen.proved and reached <= chosen.bound + PROOF_TOLERANCE:
+        return Certificate("optimal", chosen.bound, f"{chosen.proof}; completed by {chosen.solver}")
+    return Certificate("bound", min(chosen.bound, reached), chosen.proof)
 
 
 def _conditions(spec: CircuitSpec, bounds: Bounds, swing: float) -> dict[str, float]:

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from designer import selection
 from designer.completion import Bounds
 from designer.linear_block import _ELEMENTARY, _SCALES, Targets, ratio_table, window
+from designer.linear_search import LinearBlock, best
 from designer.model import Dimensionless
-from designer.modelfile import CircuitSpec
 from designer.selection import Selection, Shortfall, select
-from designer.synthesis import _linear
 from designer.system import Array
 from tests.oracles import best_linear, eight_term_error, elementary_vectors, minimax
 
@@ -149,12 +148,11 @@ def test_levels_lead_to_the_optimum_and_its_proof(seed: int) -> None:
     t = Targets.from_state_matrix(model.second_order().state_matrix())
     truth = best_linear(resistors.tolist(), capacitors.tolist(), wanted_of(t))
     assert truth < 0.1
-    answer, bound, proved = _linear(
-        model, CircuitSpec(side_conditions=False), resistors, capacitors, np.ones(3), OPEN
-    )
+    answer = best(t, resistors, capacitors, np.ones(3), OPEN)
+    assert isinstance(answer, LinearBlock)
     assert answer.error == pytest.approx(truth, abs=2e-6)
-    assert proved
-    assert bound <= truth + 2e-6
+    assert answer.proved
+    assert answer.bound <= truth + 2e-6
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -169,11 +167,10 @@ def test_a_lower_bound_is_one_where_rows_are_left_out(
     model, resistors, capacitors = near_exact(rng)
     t = Targets.from_state_matrix(model.second_order().state_matrix())
     truth = best_linear(resistors.tolist(), capacitors.tolist(), wanted_of(t))
-    answer, bound, _ = _linear(
-        model, CircuitSpec(side_conditions=False), resistors, capacitors, np.ones(3), OPEN
-    )
+    answer = best(t, resistors, capacitors, np.ones(3), OPEN)
+    assert isinstance(answer, LinearBlock)
     assert answer.error >= truth - 2e-6
-    assert bound <= truth + 2e-6
+    assert answer.bound <= truth + 2e-6
 
 
 @settings(max_examples=40)
