@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from designer import catalogentry
 from designer.catalog import Catalog, Kind, Rating
-from designer.circuit import Capacitor, Circuit, Resistor
+from designer.circuit import Capacitor, Circuit, Diode, Reference, Resistor
 from designer.modelfile import CircuitSpec
 from designer.quantity import format_quantity
 
@@ -49,11 +50,12 @@ class Line:
 
 
 def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, ...]:
-    """Resistors, capacitors and op-amp packages; the generator is an instrument, not a part.
+    """Passives, diodes, references and op-amp packages; the generator is an instrument, no part.
 
     Raises
     ------
     Unreachable : a value that cannot be bought at the grade.
+    InputError : a diode, a reference or an op-amp that is not in the catalogue.
     """
     passives: tuple[tuple[Kind, str, float, Sequence[Resistor | Capacitor]], ...] = (
         ("resistor", "Ω", spec.resistor_grade, circuit.resistors),
@@ -78,6 +80,7 @@ def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, .
                     grade=f"{part.family.grade:.3g}",
                 )
             )
+    lines += [*_diodes(circuit, catalog), *_references(circuit, catalog)]
     opamp = catalog.opamp(circuit.opamp)
     if circuit.packages:
         lines.append(
@@ -95,6 +98,44 @@ def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, .
             )
         )
     return tuple(lines)
+
+
+def _diodes(circuit: Circuit, catalog: Catalog) -> Iterator[Line]:
+    for name in sorted({d.model.name for d in circuit.diodes}):
+        here = [d for d in circuit.diodes if d.model.name == name]
+        part = catalog.diode(name)
+        volts = format_quantity(part.reverse_voltage.nominal, "V")
+        yield _named(part, here, "diode", f"{volts} reverse", "")
+
+
+def _references(circuit: Circuit, catalog: Catalog) -> Iterator[Line]:
+    for name in sorted({r.model for r in circuit.references}):
+        here = [r for r in circuit.references if r.model == name]
+        part = catalog.reference(name)
+        volts = format_quantity(part.voltage, "V")
+        yield _named(part, here, "shunt reference", volts, f"{part.grade:.3g}")
+
+
+def _named(
+    part: catalogentry.Diode | catalogentry.Reference,
+    here: Sequence[Diode | Reference],
+    kind: str,
+    rating: str,
+    grade: str,
+) -> Line:
+    """The line of parts that are bought by name."""
+    return Line(
+        quantity=len(here),
+        designators=tuple(sorted((p.name for p in here), key=natural)),
+        value=part.name,
+        description="; ".join([kind, *dict.fromkeys(p.role for p in here)]),
+        manufacturer=part.manufacturer,
+        part_number=part.part_number,
+        footprint=part.footprint,
+        rating=rating,
+        price_class=part.price,
+        grade=grade,
+    )
 
 
 def bill_csv(lines: Iterable[Line]) -> str:

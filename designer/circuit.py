@@ -6,12 +6,15 @@ the term of Eq. (10) that they realise.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from designer.diode_model import DiodeModel
 from designer.errors import InputError
 
 GROUND = "0"
+POSITIVE, NEGATIVE = "vcc", "vee"
+"""Nets of the supplies."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,10 @@ class Resistor:
     value: float
     role: str
 
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.a, self.b)
+
 
 @dataclass(frozen=True)
 class Capacitor:
@@ -34,6 +41,10 @@ class Capacitor:
     minus: str
     value: float
     role: str
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.plus, self.minus)
 
 
 @dataclass(frozen=True)
@@ -54,6 +65,55 @@ class Section:
     def package(self) -> str:
         return self.name[:-1]
 
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.inverting, self.noninverting, self.output)
+
+
+@dataclass(frozen=True)
+class Diode:
+    """A diode: model is its curve; rest : whether it conducts with everything at rest."""
+
+    name: str
+    anode: str
+    cathode: str
+    model: DiodeModel
+    rest: bool
+    role: str
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.anode, self.cathode)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A shunt reference that keeps v(cathode) - v(anode) at ``volts``, within ± grade.
+
+    model : its name in the catalogue.
+    """
+
+    name: str
+    cathode: str
+    anode: str
+    volts: float
+    grade: float
+    model: str
+    role: str
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.cathode, self.anode)
+
+
+@dataclass(frozen=True)
+class Supply:
+    """A rail of the power supply: ``volts`` from ``net`` to ground."""
+
+    name: str
+    net: str
+    volts: float
+
 
 @dataclass(frozen=True)
 class Generator:
@@ -64,20 +124,45 @@ class Generator:
 
 
 @dataclass(frozen=True)
-class Stop:
-    """How a clearance shows in the circuit: the section whose limits are its ends.
+class Contact:
+    """How one side of a stop shows: ``switch``, an op-amp section or a diode, leaves its rest
+    position for ``position`` where contact begins.
 
-    upper : the section's position (1 high, -1 low) in contact with the upper stop.
+    A section's position is 1 at its upper limit, -1 at its lower, 0 between; a diode's is 1 while
+    it conducts, else 0. others : further switches, with their positions while the stop carries.
+    """
+
+    switch: str
+    position: int
+    others: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Stop:
+    """How a clearance shows in the circuit; a side that does not exist is None.
+
     state : name of the capacitor whose voltage is the displacement.
     """
 
     clearance: str
-    section: str
-    upper: int
     state: str
+    upper: Contact | None
+    lower: Contact | None
+
+    @property
+    def contacts(self) -> tuple[tuple[int, Contact], ...]:
+        """The sides that exist, 1 upper and -1 lower, each with its contact."""
+        pairs = ((1, self.upper), (-1, self.lower))
+        return tuple((side, contact) for side, contact in pairs if contact is not None)
+
+    @property
+    def shared(self) -> bool:
+        """Whether both sides are ends of one switch: then they have one slope."""
+        switches = [contact.switch for _, contact in self.contacts]
+        return len(switches) == 2 and switches[0] == switches[1]
 
 
-Part = Resistor | Capacitor | Section
+Part = Resistor | Capacitor | Section | Diode | Reference
 
 
 @dataclass(frozen=True)
@@ -107,10 +192,6 @@ class Circuit:
             twice = sorted({n for n in names if names.count(n) > 1})
             raise InputError(None, "circuit.parts", ", ".join(twice), "each reference once")
 
-    def of(self, kind: type[Part]) -> Iterator[Part]:
-        """The parts of one kind, in order."""
-        return (p for p in self.parts if isinstance(p, kind))
-
     @property
     def resistors(self) -> tuple[Resistor, ...]:
         return tuple(p for p in self.parts if isinstance(p, Resistor))
@@ -124,6 +205,36 @@ class Circuit:
         return tuple(p for p in self.parts if isinstance(p, Section))
 
     @property
+    def diodes(self) -> tuple[Diode, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Diode))
+
+    @property
+    def references(self) -> tuple[Reference, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Reference))
+
+    @property
+    def supplies(self) -> tuple[Supply, ...]:
+        """The rails that a part other than an op-amp is connected to."""
+        rails = (Supply("VCC", POSITIVE, self.supply), Supply("VEE", NEGATIVE, -self.supply))
+        return tuple(r for r in rails if r.net in self.nets)
+
+    @property
+    def switches(self) -> tuple[str, ...]:
+        """What changes the circuit's mode: op-amp sections in order, then diodes."""
+        return (*(s.name for s in self.sections), *(d.name for d in self.diodes))
+
+    @property
+    def rest(self) -> tuple[int, ...]:
+        """Position of each switch at rest: op-amps linear, diodes as they say."""
+        return (*(0 for _ in self.sections), *(int(d.rest) for d in self.diodes))
+
+    def carrying(self, contact: Contact) -> tuple[int, ...]:
+        """Position of each switch while this stop carries force and nothing else has changed."""
+        moved = dict([(contact.switch, contact.position), *contact.others])
+        pairs = zip(self.switches, self.rest, strict=True)
+        return tuple(moved.get(name, position) for name, position in pairs)
+
+    @property
     def packages(self) -> tuple[str, ...]:
         """Op-amp packages in order of appearance."""
         return tuple(sorted({s.package for s in self.sections}))
@@ -131,20 +242,13 @@ class Circuit:
     @property
     def nets(self) -> tuple[str, ...]:
         """Every net but ground, sorted."""
-        found = {self.generator.net}
-        for p in self.parts:
-            if isinstance(p, Resistor):
-                found |= {p.a, p.b}
-            elif isinstance(p, Capacitor):
-                found |= {p.plus, p.minus}
-            else:
-                found |= {p.inverting, p.noninverting, p.output}
+        found = {self.generator.net}.union(*(p.nets for p in self.parts))
         return tuple(sorted(found - {GROUND}))
 
     @property
     def values(self) -> dict[str, float]:
         """Resistances [ohm] and capacitances [F] by part name."""
-        return {p.name: p.value for p in self.parts if not isinstance(p, Section)}
+        return {p.name: p.value for p in self.parts if isinstance(p, Resistor | Capacitor)}
 
 
 @dataclass(frozen=True)
@@ -153,7 +257,8 @@ class Board:
 
     values : ohm or farad by part name. offset : input offset [V] by section; rails : (low, high)
     output limits [V] by section. inverse_gain : 1/open-loop gain, 0 for ideal op-amps. bias :
-    current into each input [A].
+    current into each input [A]. reference : volts by name of the reference; drop : forward voltage
+    [V] by name of the diode, while it conducts.
     """
 
     values: Mapping[str, float]
@@ -161,10 +266,12 @@ class Board:
     rails: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inverse_gain: float = 0.0
     bias: float = 0.0
+    reference: Mapping[str, float] = field(default_factory=dict)
+    drop: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def mirror_symmetric(self) -> bool:
-        """No offset, no bias and equal rails: x → -x is a symmetry."""
+        """No offset, no bias and equal rails: x → -x is a symmetry of a stage that is even."""
         level = all(v == 0.0 for v in self.offset.values()) and self.bias == 0.0
         return level and all(low == -high for low, high in self.rails.values())
 
@@ -181,4 +288,6 @@ def nominal_board(circuit: Circuit, *, ideal: bool = False) -> Board:
         rails={s.name: (-limit, limit) for s in circuit.sections},
         inverse_gain=0.0 if ideal else 1.0 / circuit.gain,
         bias=0.0 if ideal else circuit.bias,
+        reference={r.name: r.volts for r in circuit.references},
+        drop={d.name: d.model.drop for d in circuit.diodes},
     )

@@ -2,8 +2,9 @@
 
 docs/definitions.md: the minimum over the time scale and a positive scale for each state of the
 largest |ln(realised/wanted)| over all coefficients of the state equations. The dead-zone null, a
-wanted zero, counts in units of K1: mu |ln(1 - leftover/slope)|. Realised coefficients come from
-the nodal reduction with ideal op-amps, never from the formulas that chose the parts.
+wanted zero, counts in units of K1: mu |ln(1 - leftover/slope)|. So does the constant force that a
+stage with one stop leaves inside the clearance, over K1 times the threshold. Realised coefficients
+come from the nodal reduction with ideal op-amps, never from the formulas that chose the parts.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.circuit import Board, Circuit, nominal_board
+from designer.dead_zone_parts import OUTPUT
 from designer.mechanics import SecondOrderSystem
 from designer.minimax import minimax
 from designer.reduction import Reduction
@@ -24,12 +26,23 @@ class Scales:
     """How circuit and model correspond: v_i = volts[i] · x_i, T = seconds · t.
 
     seconds : circuit seconds per unit of model time. volts : (states,) volts per unit of each
-    model state (x1, dx1/dt, …). threshold : v1 at the upper stop [V] (nan without a clearance).
+    model state (x1, dx1/dt, …). threshold : magnitude of v1 at the upper stop, or at the only one
+    [V]; threshold_lower : at the lower stop. nan where there is none.
     """
 
     seconds: float
     volts: Array
     threshold: float
+    threshold_lower: float = float("nan")
+
+    @property
+    def offcentre(self) -> float:
+        """How far the middle of the clearance lies from rest, over half the clearance.
+
+        Stated, not an error: a DC offset of the generator moves it. 0 with one stop or none.
+        """
+        both = self.threshold + self.threshold_lower
+        return float((self.threshold - self.threshold_lower) / both) if both == both else 0.0
 
     def frequency(self, omega: float) -> float:
         """Generator frequency [Hz] of a dimensionless frequency omega."""
@@ -68,9 +81,8 @@ def coefficient_errors(
     reduction = Reduction(circuit, board)
     system = reduction.system()
     open_mode = system.mode(system.start)
-    A_lin, slope, null, threshold = open_mode.A, None, 0.0, float("nan")
-    if circuit.stops:
-        A_lin, slope, null, threshold = _dead_zone(reduction)
+    zone = _dead_zone(reduction) if circuit.stops else None
+    A_lin = open_mode.A if zone is None else zone.A
     wanted = model.state_matrix()
     n = len(wanted)
     rows, targets, names = [], [], []
@@ -90,9 +102,10 @@ def coefficient_errors(
         for j in range(n):
             if wanted[i, j] != 0.0:
                 add(f"{_equation(i)} {_state(j)}", i, j, A_lin[i, j], wanted[i, j])
-    if slope is not None:
+    if zone is not None:
         stop = model.clearances[0]
-        add("stop slope", 1, 0, slope, -stop.stiffness / model.mass[stop.mass])
+        for name, slope in zone.slopes.items():
+            add(name, 1, 0, slope, -stop.stiffness / model.mass[stop.mass])
     h, D = np.array(targets), np.array(rows)
     if not np.all(np.isfinite(h)):
         wrong = [name for name, value in zip(names, h, strict=True) if not np.isfinite(value)]
@@ -104,14 +117,20 @@ def coefficient_errors(
     amplitude = 1.0
     if swing is not None:
         amplitude = swing[0] / float((swing[1] * relative).max())
-    if circuit.stops:
-        amplitude = threshold / model.clearances[0].gap
+    thresholds = {1: float("nan"), -1: float("nan")}
+    if zone is not None:
+        thresholds |= zone.thresholds
+        amplitude = next(iter(zone.thresholds.values())) / model.clearances[0].gap
         mu = model.clearances[0].stiffness / -wanted[1, 0] / model.mass[0]
-        errors["dead-zone null"] = float(mu * null)
+        errors["dead-zone null"] = float(mu * zone.null)
+        if len(zone.thresholds) == 1:
+            errors["dead-zone bias"] = zone.bias
+    upper, lower = thresholds[1], thresholds[-1]
     scales = Scales(
         seconds=float(np.exp(free[0])),
         volts=amplitude * relative,
-        threshold=threshold,
+        threshold=upper if np.isfinite(upper) else lower,
+        threshold_lower=lower,
     )
     drive = -open_mode.B * scales.seconds / scales.volts
     return CoefficientErrors(
@@ -122,28 +141,50 @@ def coefficient_errors(
     )
 
 
-def _dead_zone(reduction: Reduction) -> tuple[Array, float, float, float]:
-    """(A without the stop, slope of the stop in A, ln of the null's gain ratio, threshold [V])."""
+@dataclass(frozen=True)
+class _Zone:
+    """A : the state matrix without the stop. slopes : the stop's entry in A, by error name.
+
+    null : ln of the null's gain ratio, at the side where it is worst. bias : constant force inside
+    the clearance over K1 times the threshold. thresholds : magnitude of v1 [V] by side.
+    """
+
+    A: Array
+    slopes: dict[str, float]
+    null: float
+    bias: float
+    thresholds: dict[int, float]
+
+
+def _dead_zone(reduction: Reduction) -> _Zone:
     c = reduction.circuit
     stop = c.stops[0]
-    index = [s.name for s in c.sections].index(stop.section)
-    start = (0,) * len(c.sections)
-    contact = (*start[:index], stop.upper, *start[index + 1 :])
     system = reduction.system()
-    state = c.states.index(stop.state)
-    flat = float(reduction.solution(start).voltage["fv"][state])
-    steep = float(reduction.solution(contact).voltage["fv"][state])
-    A_open, A_contact = system.mode(start).A, system.mode(contact).A
-    per_gain = (A_contact - A_open) / (steep - flat)
-    guard = next(g for g in system.mode(start).guards if g.target == contact)
-    threshold = -guard.e / float(guard.C[state])
-    row = 1
-    return (
-        A_open - flat * per_gain,
-        float(steep * per_gain[row, state]),
-        float(np.log1p(-flat / steep)),
-        threshold,
-    )
+    state, row = c.states.index(stop.state), c.states.index(stop.state) + 1
+    rest, inside = system.mode(c.rest), reduction.solution(c.rest).voltage[OUTPUT]
+    flat = float(inside[state])
+    slopes: dict[str, float] = {}
+    thresholds: dict[int, float] = {}
+    nulls: list[float] = []
+    A, bias = rest.A, 0.0
+    for side, contact in stop.contacts:
+        key = c.carrying(contact)
+        steep = float(reduction.solution(key).voltage[OUTPUT][state])
+        per_gain = (system.mode(key).A - rest.A) / (steep - flat)
+        switch = c.switches.index(contact.switch)
+        guard = next(g for g in rest.guards if g.target[switch] == contact.position)
+        threshold = abs(guard.e / float(guard.C[state]))
+        if not thresholds:
+            A = rest.A - flat * per_gain
+            force = float(inside[-1] * per_gain[row, state])
+            bias = force / abs(float(A[row, state]) * threshold)
+        thresholds[side] = threshold
+        nulls.append(float(np.log1p(-flat / steep)))
+        name = {1: "upper stop slope", -1: "lower stop slope"}[side]
+        if stop.shared or len(stop.contacts) == 1:
+            name = "stop slope"
+        slopes.setdefault(name, float(steep * per_gain[row, state]))
+    return _Zone(A, slopes, max(nulls, key=abs), bias, thresholds)
 
 
 def _state(j: int) -> str:

@@ -12,6 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from designer.circuit import Board, Circuit
+from designer.dead_zone_parts import OUTPUT
+from designer.diode_model import card
 from designer.system import Array
 
 FORMAT = 1
@@ -67,11 +69,13 @@ def write(
         f"SIN({_n(excitation.offset)} {_n(excitation.amplitude)} {_n(excitation.frequency)} "
         "0 0 180)",
     ]
+    lines += _sources(circuit, board)
     voltages = dict(zip(circuit.states, initial if initial is not None else (), strict=False))
     lines += [f"{r.name} {r.a} {r.b} {_n(board.values[r.name])}" for r in circuit.resistors]
     for c in circuit.capacitors:
         start = float(voltages.get(c.name, 0.0))
         lines.append(f"{c.name} {c.plus} {c.minus} {_n(board.values[c.name])} IC={_n(start)}")
+    lines += _diodes(circuit)
     for s in circuit.sections:
         low, high = board.rails[s.name]
         lines.append(
@@ -81,7 +85,7 @@ def write(
         if board.bias:
             lines.append(f"I{s.name} {s.inverting} 0 {_n(board.bias)}")
     gain = 1.0 / board.inverse_gain if board.inverse_gain else 1e9
-    nets = [*circuit.state_nets, *(["fv"] if circuit.stops else []), circuit.generator.net]
+    nets = [*circuit.state_nets, *([OUTPUT] if circuit.stops else []), circuit.generator.net]
     lines += [
         ".subckt opamp inp inn out vos=0 low=-13 high=13",
         "Voffset inside inp {vos}",
@@ -96,6 +100,21 @@ def write(
         ".end",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _sources(circuit: Circuit, board: Board) -> list[str]:
+    """Supplies that a part uses; references at the board's value, fed as on the board."""
+    lines = [f"{s.name} {s.net} 0 {_n(s.volts)}" for s in circuit.supplies]
+    return lines + [
+        f"{r.name} {r.cathode} {r.anode} {_n(board.reference[r.name])}" for r in circuit.references
+    ]
+
+
+def _diodes(circuit: Circuit) -> list[str]:
+    """The diodes, and a model for each kind; its name in the catalogue stays out of the deck."""
+    kinds = list(dict.fromkeys(d.model for d in circuit.diodes))
+    lines = [f"{d.name} {d.anode} {d.cathode} diode{kinds.index(d.model)}" for d in circuit.diodes]
+    return lines + [card(model, f"diode{i}", charge=False) for i, model in enumerate(kinds)]
 
 
 def title_line(text: str) -> str:

@@ -81,6 +81,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             supply=float(said["circuit"]["supply"]),
             saturation=float(said["circuit"]["saturation"]),
             clearance="A" if model.k0 > 0.0 else None,
+            zone=topology.zone_of(spec.dead_zone, model.sides, catalog),
         )
         gain, bias = (float(said["circuit"][k]) for k in ("gain", "bias"))
         circuit = replace(circuit, gain=gain, bias=bias)

@@ -259,7 +259,10 @@ class Flow:
             for new, old in zip(room, self._tables, strict=True):
                 new[tuple(slice(0, s) for s in old.shape)] = old
             self._tables = room
-        _fill(self._tables, number, mode, self.drive)
+        touched = [
+            self.system.contact_rows(j)[side] if side else None for j, side in enumerate(mode.sides)
+        ]
+        _fill(self._tables, number, mode, touched, self.drive)
         self._index[key] = number
         self._keys.append(key)
         return number
@@ -302,12 +305,20 @@ def augmented(mode: Mode, drive: Drive) -> Array:
     return M
 
 
+def _augmented_row(C: Array, D: float, e: float, drive: Drive) -> Array:
+    """C·x + D·u + e as a row over (x, sin, cos, 1)."""
+    return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
+
+
 def _step_length(A: Array, omega: float) -> float:
     balanced, _ = matrix_balance(A, permute=False)
     return STEP / max(float(np.linalg.norm(balanced, 2)), omega)
 
 
-def _fill(tables: kernel.Tables, i: int, mode: Mode, drive: Drive) -> None:
+def _fill(
+    tables: kernel.Tables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
+) -> None:
+    """touched : for each clearance the row of the displacement past the stop in contact."""
     M = augmented(mode, drive)
     h = _step_length(mode.A, drive.omega)
     powers = tables.taylor[i]
@@ -319,11 +330,11 @@ def _fill(tables: kernel.Tables, i: int, mode: Mode, drive: Drive) -> None:
     tables.guards[i] = len(mode.guards)
     tables.side[i] = mode.sides
     tables.clipped[i] = mode.clipped
+    for j, past in enumerate(touched):
+        if past is not None:
+            tables.depth[i, j] = _augmented_row(past[:-2], past[-2], past[-1], drive) @ powers
     for g, guard in enumerate(mode.guards):
-        row = np.concatenate(
-            [guard.C, [guard.D * drive.amplitude, 0.0, guard.e + guard.D * drive.offset]]
-        )
-        taylor = row @ powers
+        taylor = _augmented_row(guard.C, guard.D, guard.e, drive) @ powers
         tables.guard[i, g] = taylor
         # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
         weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
@@ -343,6 +354,7 @@ def _empty_tables(modes: int, guards: int, width: int, clearances: int) -> kerne
         guards=np.zeros(modes, dtype=np.int64),
         target=np.full((modes, guards), -1, dtype=np.int64),
         clearance=np.full((modes, guards), -1, dtype=np.int64),
+        depth=np.zeros((modes, clearances, order, width)),
         side=np.zeros((modes, clearances), dtype=np.int64),
         clipped=np.zeros(modes, dtype=np.int64),
     )

@@ -39,6 +39,7 @@ class Tables(NamedTuple):
     step : (m,) h; propagator : (m, N, N); taylor : (m, ORDER + 1, N, N) with (M h)^k/k!;
     guard : (m, g, ORDER + 1, N) Taylor rows; chord : (m, g, N) majorant of |g''| h²/8;
     guards : (m,) how many; target : (m, g) mode index, -1 while unknown; clearance : (m, g);
+    depth : (m, c, ORDER + 1, N) Taylor rows of the displacement past the stop that is touched;
     side : (m, c); clipped : (m,).
     """
 
@@ -50,6 +51,7 @@ class Tables(NamedTuple):
     guards: Int
     target: Int
     clearance: Int
+    depth: Float
     side: Int
     clipped: Int
 
@@ -242,9 +244,21 @@ def _measure(
             v = c[0] if q == count else _value(c, end if q > count else found[q])
             log.extremes[i, 0] = min(log.extremes[i, 0], v)
             log.extremes[i, 1] = max(log.extremes[i, 1], v)
+    for j in range(tables.side.shape[1]):
+        if tables.side[mode, j] == 0:
+            continue
+        for k in range(c.shape[0]):
+            total = 0.0
+            for i in range(z.shape[0]):
+                total += tables.depth[mode, j, k, i] * z[i]
+            c[k] = total
+        count = _stationary(c, end, found)
+        for q in range(count):
+            depth[j] = max(depth[j], _value(c, found[q]))
+        depth[j] = max(depth[j], _value(c, end))
     for g in range(tables.guards[mode]):
         j = tables.clearance[mode, g]
-        if j < 0:
+        if j < 0 or tables.side[mode, j] != 0:
             continue
         for k in range(c.shape[0]):
             total = 0.0
@@ -252,11 +266,6 @@ def _measure(
                 total += tables.guard[mode, g, k, i] * z[i]
             c[k] = total
         count = _stationary(c, end, found)
-        if tables.side[mode, j] != 0:
-            for q in range(count):
-                depth[j] = max(depth[j], -_value(c, found[q]))
-            depth[j] = max(depth[j], -_value(c, end))
-            continue
         for q in range(count):
             v = _value(c, found[q])
             falls = _slope(c, min(found[q] + 1e-6, end)) <= 0.0

@@ -113,13 +113,8 @@ def job(subject: Subject, settings: SolverSettings, *, keep: bool = False) -> Sp
 
 
 def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
-    """Guard rows over (states, generator, 1) of the open mode towards the upper, lower stop."""
-    rows: dict[int, Array] = {}
-    mode = system.mode(system.start)
-    for guard in mode.guards:
-        if guard.clearance == 0:
-            side = system.mode(guard.target).sides[0]
-            rows[side] = np.concatenate([guard.C, [guard.D, guard.e]])
+    """Rows over (states, generator, 1) of the displacement past the upper, the lower stop."""
+    rows = system.contact_rows(0)
     return rows.get(1), rows.get(-1)
 
 

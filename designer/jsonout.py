@@ -255,10 +255,14 @@ def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
     if not design.circuit.stops:
         return None
     errors = design.errors
+    slopes = [error for name, error in errors.errors.items() if name.endswith("stop slope")]
     return {
         "kind": modelfile.circuit.dead_zone,
         "saturation": design.circuit.saturation,
         "threshold": errors.scales.threshold,
-        "slope_error": errors.errors.get("stop slope"),
+        "threshold_lower": errors.scales.threshold_lower,
+        "offcentre": errors.scales.offcentre,
+        "slope_error": max(slopes, key=abs),
         "null_error": errors.errors.get("dead-zone null"),
+        "bias_error": errors.errors.get("dead-zone bias"),
     }

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from designer import report_words as words
-from designer.circuit import Resistor, Section
+from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
 from designer.gate import shortest_contact
 from designer.montecarlo import Answer, Verdict, Yield
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
+from designer.plots import EXACT
 from designer.report_data import ReportData
 from designer.synthesis import Design
 
@@ -220,14 +221,24 @@ def bom_table(data: ReportData) -> Table | None:
 
 
 def part_table(data: ReportData) -> Table:
-    """Resistors and capacitors by what they do."""
+    """Everything but the op-amps, by what it does."""
     roles: dict[str, list[str]] = {}
     for part in data.design.circuit.parts:
         if not isinstance(part, Section):
-            unit = "Ω" if isinstance(part, Resistor) else "F"
-            said = f"{part.name}\u00a0=\u00a0{words.quantity(part.value, unit)}"
-            roles.setdefault(part.role, []).append(said)
+            roles.setdefault(part.role, []).append(f"{part.name}\u00a0=\u00a0{_value(part)}")
     return Table(("role", "parts"), tuple((r, ", ".join(p)) for r, p in roles.items()))
+
+
+def _value(part: Resistor | Capacitor | Diode | Reference) -> str:
+    match part:
+        case Diode():
+            return part.model.name
+        case Reference():
+            return f"{part.model} ({words.quantity(part.volts, 'V')})"
+        case Resistor():
+            return words.quantity(part.value, "Ω")
+        case Capacitor():
+            return words.quantity(part.value, "F")
 
 
 def opamp_table(data: ReportData) -> Table:
@@ -242,11 +253,11 @@ def error_table(design: Design) -> Table:
     rows = []
     for name, error in design.errors.errors.items():
         term = words.TERM.fullmatch(name)
-        want = "0" if name == "dead-zone null" else words.NONE
+        want = "0" if name in ("dead-zone null", "dead-zone bias") else words.NONE
         if term is not None:
             row, column = (2 * (int(term[i]) - 1) + len(term[i + 1]) for i in (1, 3))
             want = words.number(float(wanted[row - 1, column]))
-        elif name == "stop slope":
+        elif name.endswith("stop slope"):
             want = words.number(design.model.mu)
         rows.append((words.coefficient(name), want, words.error(error)))
     return Table(("coefficient", "wanted", "ln(realised/wanted)"), tuple(rows), (1, 2))
@@ -263,7 +274,7 @@ def scale_table(data: ReportData) -> Table:
         slow = mechanical.time_scale / scales.seconds
         rows.append(("mechanism's time per circuit time", f"{words.number(slow)} s/s"))
     if design.circuit.stops:
-        rows.append(("contact begins at (v1)", f"± {words.quantity(scales.threshold, 'V')}"))
+        rows.append(("contact begins at (v1)", _thresholds(design)))
     for state, volts in zip(("x₁", "x₁′", "x₂", "x₂′"), scales.volts, strict=False):
         rows.append((f"one unit of {state}", words.quantity(float(volts), "V")))
         if mechanical is not None:
@@ -279,6 +290,18 @@ def scale_table(data: ReportData) -> Table:
         if mechanical is not None:
             rows.append(("one generator volt", words.quantity(gain * mechanical.force_scale, "N")))
     return Table(("scale", "value"), tuple(rows), (1,))
+
+
+def _thresholds(design: Design) -> str:
+    """v1 where contact begins, with its sign; ± where both stops stand alike."""
+    scales = design.errors.scales
+    upper = words.quantity(scales.threshold, "V")
+    lower = f"−{words.quantity(scales.threshold_lower, 'V')}"
+    if not math.isfinite(scales.threshold_lower):
+        return upper
+    if design.circuit.stops[0].upper is None:
+        return lower
+    return f"± {upper}" if abs(scales.offcentre) < EXACT else f"{upper} and {lower}"
 
 
 def condition_table(design: Design) -> Table:

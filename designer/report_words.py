@@ -46,7 +46,10 @@ def coefficient(name: str) -> str:
     if term is None:
         return {
             "stop slope": "stiffness of a stop, over K1",
+            "upper stop slope": "stiffness of the upper stop, over K1",
+            "lower stop slope": "stiffness of the lower stop, over K1",
             "dead-zone null": "stiffness left inside the clearance, over K1",
+            "dead-zone bias": "force left inside the clearance, over K1 times the threshold",
         }.get(name, name)
     left, right = name.split()
     return f"{_pretty(right)} in the equation of {_pretty(left)}"

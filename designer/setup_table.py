@@ -79,6 +79,8 @@ def scales_csv(modelfile: ModelFile, design: Design, found: Sequence[ModelRespon
         rows.append(("mechanism seconds per circuit second", slow, "s/s", b0))
     if design.circuit.stops:
         rows.append(("threshold of contact", scales.threshold, "V", b0))
+        if abs(scales.offcentre) > 1e-9:
+            rows.append(("threshold of contact, lower stop", scales.threshold_lower, "V", b0))
     for b in dict.fromkeys([b0, *(r.b for r in found)]):
         rows += _amplitudes(modelfile, design, b)
     return csv_text(

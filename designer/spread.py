@@ -1,8 +1,9 @@
 """How boards differ: the reference spread ``bench-1`` of docs/definitions.md.
 
 Resistors and capacitors uniform over ± grade; op-amp offset normal, cut at its limit, each section
-its own; saturation uniform ± 5 %, each rail of each section its own. Every sample is drawn from
-(seed, sample index) alone, so a study is the same on one worker or many.
+its own; saturation uniform ± 5 %, each rail of each section its own; references uniform over ±
+their grade. Diodes are exact: their drop stands inside a loop. Every sample is drawn from (seed,
+sample index) alone, so a study is the same on one worker or many.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ SATURATION_SPREAD = 0.05
 @dataclass(frozen=True)
 class Spread:
     """resistor, capacitor : grades as fractions. offset_sigma, offset_limit [V]. saturation :
-    half-width as a fraction."""
+    half-width as a fraction. reference : half-width over the grade of each reference."""
 
     resistor: float
     capacitor: float
     offset_sigma: float
     offset_limit: float
     saturation: float = SATURATION_SPREAD
+    reference: float = 1.0
 
     @classmethod
     def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:
@@ -59,10 +61,17 @@ def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
         1.0 + spread.saturation * rng.uniform(-1.0, 1.0, size=(len(names), 2))
     )
     limits = np.minimum(limits, circuit.supply)  # no output passes its rail
+    # Drawn last, so that circuits without references keep the boards they had.
+    references = {
+        r.name: r.volts * (1.0 + spread.reference * r.grade * rng.uniform(-1.0, 1.0))
+        for r in circuit.references
+    }
     return Board(
         values=values,
         offset=dict(zip(names, (float(v) for v in offsets), strict=True)),
         rails={n: (-float(low), float(high)) for n, (low, high) in zip(names, limits, strict=True)},
         inverse_gain=1.0 / circuit.gain,
         bias=circuit.bias,
+        reference=references,
+        drop={d.name: d.model.drop for d in circuit.diodes},
     )

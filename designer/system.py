@@ -7,8 +7,8 @@ In each mode the state x (n entries) follows
 until a guard becomes positive. A guard is a linear function C x + D u + e of state and drive,
 negative inside its mode, and names the mode on its other side. A mode's key is a tuple of small
 integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an op-amp: -1 at its
-lower limit, 0 linear, 1 at its upper limit). Modes are built when first entered and kept, never
-enumerated.
+lower limit, 0 linear, 1 at its upper limit; a diode: 1 while it conducts, else 0). Modes are built
+when first entered and kept, never enumerated.
 
 The vector field is continuous across every boundary (springs and limiters are), so a crossing
 changes the mode and nothing else: the saltation matrix is the identity.
@@ -24,6 +24,12 @@ from numpy.typing import NDArray
 
 from designer.errors import InputError
 
+LONGEST_WALK = 512
+"""Mode changes after which the search for the mode of a state gives up."""
+
+ROUNDING = 1e-14
+"""Of the sum of a guard's terms' magnitudes: what cannot be told from zero."""
+
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -37,7 +43,7 @@ class Guard:
     C : (n,), D, e : the linear function C·x + D·u + e, negative while the mode lasts.
     target : key of the mode that is entered when it becomes positive.
     clearance : index of the clearance whose contact begins or ends here, or -1. Such guards are
-        scaled to displacement, so that -(C·x + D·u + e) is the distance to the boundary.
+        scaled to displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop.
     """
 
     C: Array
@@ -126,21 +132,50 @@ class PiecewiseLinearSystem:
         """Key of the mode that holds at state x (n,) and drive u.
 
         Walks from ``near`` (default: ``start``) across the most violated guard until none is
-        violated; a bounded walk, since a consistent network has exactly one answer.
+        violated. Where that walk meets a mode twice it goes on across the first violated guard
+        in the key's order, which cannot cycle in a network whose every state and drive has
+        exactly one answer (Murty's rule for such complementarity problems). From then on a
+        violation that is only rounding does not count: on a boundary two modes hold.
+
+        Raises
+        ------
+        ArithmeticError : no mode holds, within a bounded walk.
         """
         key = self.start if near is None else near
-        for _ in range(64):
+        seen: set[ModeKey] = set()
+        cycling = False
+        for _ in range(LONGEST_WALK):
             mode = self.mode(key)
-            if not mode.guards:
-                return key
+            cycling = cycling or key in seen
+            seen.add(key)
             values = [float(g.C @ x) + g.D * u + g.e for g in mode.guards]
-            worst = int(np.argmax(values))
-            if values[worst] <= 0.0:
+            floors = [ROUNDING * _size(g, x, u) if cycling else 0.0 for g in mode.guards]
+            violated = [i for i, value in enumerate(values) if value > floors[i]]
+            if not violated:
                 return key
-            key = mode.guards[worst].target
+            chosen = violated[0] if cycling else max(violated, key=values.__getitem__)
+            key = mode.guards[chosen].target
         raise ArithmeticError(f"no mode holds at x = {x}, u = {u}")
+
+    def contact_rows(self, clearance: int) -> dict[int, Array]:
+        """How far the displacement is past each stop, by side (1 upper, -1 lower).
+
+        Rows (n + 2,) over (states, drive, 1), scaled to displacement and positive in contact: the
+        guards of the mode that holds at rest. They hold however deep the contact is.
+        """
+        rest = self.mode(self.start)
+        rows: dict[int, Array] = {}
+        for guard in rest.guards:
+            if guard.clearance == clearance:
+                side = self.mode(guard.target).sides[clearance]
+                rows[side] = np.concatenate([guard.C, [guard.D, guard.e]])
+        return rows
 
     @property
     def built(self) -> int:
         """How many modes have been built so far."""
         return len(self._modes)
+
+
+def _size(guard: Guard, x: Array, u: float) -> float:
+    return float(np.abs(guard.C) @ np.abs(x)) + abs(guard.D * u) + abs(guard.e)

@@ -1,4 +1,4 @@
-"""From terms and values to the circuit: integrators, inverters, dead-zone stage.
+"""From terms and values to the circuit: integrators and inverters around the dead-zone stage.
 
 The nets of the paper's Fig. 4 and Fig. 5: v1 … v4 the states, v1n … v4n their inverses, s1 … s4
 the summing nodes, fv the nonlinear stage's output. Sections carry the paper's names for two
@@ -8,6 +8,7 @@ masses; for more, packages are filled in order.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from designer.catalog import OpAmp
 from designer.circuit import (
@@ -16,11 +17,15 @@ from designer.circuit import (
     Circuit,
     Generator,
     Part,
-    Resistor,
     Section,
     Stop,
 )
+from designer.dead_zone_parts import OUTPUT, dead_zone
 from designer.matching import Term, inverted_states
+from designer.resistors import Composite, Resistors
+from designer.zone import Zone, zone_of
+
+__all__ = ["Composite", "Zone", "build", "describe_quantity", "inverter_resistors", "zone_of"]
 
 GENERATOR = Generator("VM1", "vg")
 
@@ -34,8 +39,7 @@ _PAPER_SECTIONS = {
     ("inverter", 2): "U2B",
     ("inverter", 3): "U1D",
 }
-DEAD_ZONE_PARTS = tuple(f"R{i}" for i in range(200, 211))
-"""R200 … R210: the paper's nonlinear stage."""
+BOTH = Zone()
 
 
 def build(
@@ -46,23 +50,38 @@ def build(
     supply: float,
     saturation: float,
     clearance: str | None,
+    zone: Zone = BOTH,
+    composites: Mapping[str, Composite] = MappingProxyType({}),
 ) -> Circuit:
     """The circuit of these terms.
 
     values : ohm and farad by part name; holds R100 … for the inverters and, where there is a
-    clearance, R50 and R200 … R210.
+    clearance, R50 and the resistors of the dead-zone stage.
     clearance : its name, or None for a model without stops: then there is no nonlinear stage.
+    zone : which stage it is. composites : resistors NAME made of two, whose values are those of
+    NAMEA and NAMEB.
+
+    Raises
+    ------
+    InputError : a composite of what is no resistor here; a rectifier without its parts.
     """
+    resistors = Resistors(values, composites)
     masses = len({t.quantity[1] for t in terms})
     parts: list[Part] = []
     for state in range(2 * masses):
-        parts += _integrator(state, terms, values, clearance is not None and state == 1)
-    for state in inverted_states(terms):
-        parts += _inverter(state, values)
+        stop = clearance is not None and state == 1
+        parts += _integrator(state, terms, values, resistors, stop)
+    inverted = set(inverted_states(terms))
+    if clearance is not None and zone.kind == "rectifier":
+        inverted.add(0)  # it works on -v1, whether or not a term needs that
+    for state in sorted(inverted):
+        parts += _inverter(state, resistors)
     stops: tuple[Stop, ...] = ()
     if clearance is not None:
-        parts += _dead_zone(values)
-        stops = (Stop(clearance, "U3C", 1, "C1"),)
+        stage, stop_ = dead_zone(zone, clearance, resistors)
+        parts += stage
+        stops = (stop_,)
+    resistors.done()
     return Circuit(
         parts=tuple(parts),
         generator=GENERATOR,
@@ -94,7 +113,11 @@ def describe_quantity(term: Term) -> str:
 
 
 def _integrator(
-    state: int, terms: Sequence[Term], values: Mapping[str, float], stop: bool
+    state: int,
+    terms: Sequence[Term],
+    values: Mapping[str, float],
+    resistors: Resistors,
+    stop: bool,
 ) -> list[Part]:
     node, out, cap = f"s{state + 1}", f"v{state + 1}", f"C{state + 1}"
     what = "velocity" if state % 2 else "displacement"
@@ -110,49 +133,20 @@ def _integrator(
             net = GENERATOR.net
         else:
             net = f"v{t.source + 1}" + ("n" if t.inverted else "")
-        parts.append(Resistor(t.resistor, net, node, values[t.resistor], describe_quantity(t)))
+        parts += resistors(t.resistor, net, node, describe_quantity(t))
     if stop:
-        parts.append(Resistor("R50", "fv", node, values["R50"], "stop force on M1"))
+        parts += resistors("R50", OUTPUT, node, "stop force on M1")
     return parts
 
 
-def _inverter(state: int, values: Mapping[str, float]) -> list[Part]:
+def _inverter(state: int, resistors: Resistors) -> list[Part]:
     r_in, r_fb = inverter_resistors(state)
     node, net = f"i{state + 1}", f"v{state + 1}"
     role = f"inverter of {net}"
     return [
         Section(_section("inverter", state), node, GROUND, f"{net}n", role),
-        Resistor(r_in, net, node, values[r_in], role),
-        Resistor(r_fb, node, f"{net}n", values[r_fb], role),
-    ]
-
-
-def _dead_zone(values: Mapping[str, float]) -> list[Part]:
-    """Fig. 5: the saturating path U3B, U3C and the linear path U3A, added by U3D."""
-
-    def resistor(name: str, a: str, b: str, role: str) -> Resistor:
-        return Resistor(name, a, b, values[name], role)
-
-    def section(name: str, node: str, out: str, role: str) -> Section:
-        return Section(name, node, GROUND, out, role, limits=True)
-
-    steep, flat = "saturating path of the dead zone", "linear path of the dead zone"
-    return [
-        section("U3B", "d1", "w1", steep),
-        resistor("R200", "v1", "d1", steep),
-        resistor("R201", "d1", "w1", steep),
-        section("U3C", "d2", "w2", steep),
-        resistor("R202", "w1", "d2", steep),
-        resistor("R203", "d2", "w2", steep),
-        resistor("R204", "w2", "v11", "divider of the saturating path"),
-        resistor("R205", "v11", GROUND, "divider of the saturating path"),
-        section("U3A", "d3", "v12", flat),
-        resistor("R206", "v1", "d3", flat),
-        resistor("R207", "d3", "v12", flat),
-        section("U3D", "d4", "fv", "sum of the dead zone"),
-        resistor("R208", "v11", "d4", "sum of the dead zone"),
-        resistor("R209", "v12", "d4", "sum of the dead zone"),
-        resistor("R210", "d4", "fv", "sum of the dead zone"),
+        *resistors(r_in, net, node, role),
+        *resistors(r_fb, node, f"{net}n", role),
     ]
 
 

@@ -1,0 +1,103 @@
+"""The diode's curve from the figures of a data sheet: a drop for the exact rung, a card for SPICE.
+
+    i = saturation_current · (exp(u/(emission · Vt)) - 1),  u the voltage less i · resistance
+
+A sheet that gives a forward voltage means it at ``TEST_CURRENT``. What small-signal sheets leave
+out is assumed: the typical forward voltage where there is only a maximum, the emission coefficient
+and the series resistance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from designer.catalogentry import Diode
+from designer.errors import InputError
+
+TEST_CURRENT = 10e-3
+"""Current [A] at which the catalogue's forward voltage is meant."""
+WORKING_CURRENT = 1e-3
+"""Current [A] at which the constant drop is taken: what a stage of 10 kΩ parts carries."""
+TYPICAL_SHARE = 0.72
+"""Assumed: typical forward voltage over the maximum, where a sheet gives the maximum alone."""
+EMISSION, RESISTANCE = 1.8, 1.0
+"""Assumed: emission coefficient, and series resistance [ohm], of a small silicon diode."""
+LEAKAGE_SHARE = 0.5
+"""Largest saturation current over the reverse current that the sheet allows."""
+THERMAL = 0.025852
+"""Vt = kT/q [V] at 300 K."""
+
+
+@dataclass(frozen=True)
+class DiodeModel:
+    """name : in the catalogue. saturation_current [A], emission, resistance [ohm]: the curve.
+
+    capacitance [F] at 0 V; transit [s]; reverse_voltage [V]. assumed : whether the forward
+    voltage was, and not read from a sheet.
+    """
+
+    name: str
+    saturation_current: float
+    emission: float
+    resistance: float
+    capacitance: float
+    transit: float
+    reverse_voltage: float
+    assumed: bool
+
+    def forward(self, current: float) -> float:
+        """Voltage [V] at a forward current [A]."""
+        junction = self.emission * THERMAL * math.log1p(current / self.saturation_current)
+        return junction + current * self.resistance
+
+    @property
+    def drop(self) -> float:
+        """The constant forward voltage [V] of the exact rung."""
+        return self.forward(WORKING_CURRENT)
+
+
+def diode_model(diode: Diode) -> DiodeModel:
+    """The curve of a catalogued diode.
+
+    It passes through the typical forward voltage at ``TEST_CURRENT`` and leaks less than the sheet
+    allows. The transit time makes the recovery time of equal forward and reverse currents.
+
+    Raises
+    ------
+    InputError : the forward voltage is too small for a junction that leaks so little.
+    """
+    figure = diode.forward_voltage
+    volts = figure.typ if figure.typ is not None else TYPICAL_SHARE * figure.nominal
+    junction = volts - TEST_CURRENT * RESISTANCE
+    most = LEAKAGE_SHARE * diode.reverse_current.nominal
+    emission = EMISSION
+    current = TEST_CURRENT * math.exp(-junction / (emission * THERMAL))
+    if current > most:
+        current = most
+        emission = junction / (THERMAL * math.log(TEST_CURRENT / most))
+    if not (junction > 0.0 and 0.0 < current < TEST_CURRENT and emission > 0.5):
+        raise InputError(
+            None,
+            f"diode {diode.name}",
+            f"{volts:g} V at {TEST_CURRENT:g} A, {most:g} A of leakage",
+            "the figures of a diode",
+        )
+    return DiodeModel(
+        name=diode.name,
+        saturation_current=current,
+        emission=emission,
+        resistance=RESISTANCE,
+        capacitance=diode.capacitance.nominal,
+        transit=diode.recovery.nominal / math.log(2.0),
+        reverse_voltage=diode.reverse_voltage.nominal,
+        assumed=figure.typ is None,
+    )
+
+
+def card(model: DiodeModel, name: str, *, charge: bool) -> str:
+    """The ``.model`` line. charge : with capacitance and recovery, or the curve alone."""
+    fields = {"is": model.saturation_current, "n": model.emission, "rs": model.resistance}
+    if charge:
+        fields |= {"cjo": model.capacitance, "tt": model.transit, "bv": model.reverse_voltage}
+    return f".model {name} d(" + " ".join(f"{k}={float(v)!r}" for k, v in fields.items()) + ")"
