@@ -1,244 +1,298 @@
-"""Sizing the saturating dead zone (Fig. 5, Eq. (17)-(20)) for the op-amp's output limit.
+"""Sizing a dead-zone stage: the stages of the search, matched parts, and the proof.
 
-    fv = -R210 (v11/R208 + v12/R209),  v12 = -A_ v1,  v11 = beta · clip(A+ v1, ± Esat)
-    A+ = R201 R203/(R200 R202),  A_ = R207/R206,  beta = (R205 || R208)/(R204 + R205 || R208)
-
-With R208 = R209 the dead zone is flat when beta A+ = A_ (the divider's load counted), the
-threshold is Esat/A+, and the slope in contact is A_ R210/R209. Two errors count: the slope against
-the model's stop, and the null, weighted by mu. Again tables reduced by inequalities (rows whose
-error is inside a level), then a small program in cvxpy: least error, then fewest distinct values.
+The search begins with few values for the resistors that only set a level and with the threshold as
+high as the swing allows, and ends with the whole catalogue; it stops where the error is nothing or
+is the least of the whole catalogue. Every answer is computed anew from its values.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import islice, product
 
-import cvxpy as cp
 import numpy as np
 
-from designer.selection import SOLVER
+from designer import saturating_stage
+from designer.dead_zone_target import DeadZone, DeadZoneTarget
+from designer.saturating_stage import LARGEST, LAST_LEVEL, Box, Least, Tables
 from designer.system import Array
+from designer.value_program import Ranking
+from designer.wishes import NO_WISHES, Wishes
 
-THRESHOLD_ROOM = (1.06, 1.2)
-"""How far below the largest possible threshold the sized one may lie: a narrow range first."""
-FEW = 120
-"""Values of a list that is short enough to leave one more resistor free."""
-GROUPS, ROWS = 40, 15
-"""Gains A_, and rows of each table for each gain, that go into the program."""
-SLOPES = 24_000
-"""Rows of the slope's table that are looked at further."""
+__all__ = ["DeadZone", "DeadZoneTarget", "parts_of", "size"]
 
-
-@dataclass(frozen=True)
-class DeadZoneTarget:
-    """What the stage has to do.
-
-    mu : stop stiffness over K1. slope : wanted (fv slope)/R50 [1/ohm]. saturation [V].
-    threshold : largest v1 at the stop that keeps every state inside its swing [V].
-    linear_gain : largest A_ that keeps U3A linear; output_gain : largest fv slope that keeps U3D
-    linear. load : least resistance that an output may drive [ohm].
-    """
-
-    mu: float
-    slope: float
-    saturation: float
-    threshold: float
-    linear_gain: float
-    output_gain: float
-    load: float
+TOLERANCE = 1e-6
+"""An error up to it counts as none."""
+ROOMS = ((1.06, 1.6, 2.5), (1.2, 1.6, 2.5))
+"""How far below its largest value each of threshold, A- and fv slope may lie: first and at most."""
+OPEN = (np.inf, np.inf, np.inf)
+HANDY = 8
+"""Most values of a resistor that only sets a level, before all are tried."""
+TIED = 3000
+"""Combinations of values that are tried for parts that must be equal across tables."""
+LEVEL_SETTERS = ("R200", "R202", "R206", "R208", "R209")
+LIGHT = ("R205", "R211", "R212")
+"""Resistors that no output drives."""
+ATOMS = (
+    ("R206", "R207", "R209"),
+    ("R210", "R50"),
+    ("R200", "R201"),
+    ("R202", "R203"),
+    ("R204", "R205", "R208"),
+    ("R200", "R211", "R212"),
+)
+"""Parts that stand in one table of the saturating stage."""
 
 
-@dataclass(frozen=True)
-class DeadZone:
-    """Values of R50 and R200 … R210, their predicted errors, and whether the search was whole."""
-
-    values: dict[str, float]
-    slope_error: float
-    null_error: float
-    solver: str
+def parts_of(kind: str, sides: str) -> tuple[str, ...]:
+    """Names of the resistors that the stage has, R50 included."""
+    if kind == "rectifier":
+        halves = {
+            "both": range(200, 208),
+            "upper": (200, 201, 202, 206),
+            "lower": (203, 204, 205, 207),
+        }
+        return ("R50", *(f"R{i}" for i in halves[sides]))
+    last = 211 if sides == "both" else 213
+    return ("R50", *(f"R{i}" for i in range(200, last)))
 
 
 def size(
-    target: DeadZoneTarget, resistors: Array, base: float, used: frozenset[float]
+    target: DeadZoneTarget,
+    resistors: Array,
+    base: float,
+    used: frozenset[float],
+    wishes: Wishes = NO_WISHES,
+    fixed: Mapping[str, float] | None = None,
+    price: Mapping[float, float] | None = None,
 ) -> DeadZone | str:
     """The stage for this target, or the name of the condition that leaves none.
 
-    resistors : values that may be used [ohm], ascending. base : the value of every resistor that
-    only sets a level (inputs of the gain stages, R208, R209). used : values that the rest of the
-    circuit has already; they cost nothing in the second stage.
+    resistors : values that may be used [ohm], ascending. base : the first value tried for resistors
+    that only set a level. used : values that the rest of the circuit has; they cost nothing in the
+    second stage. fixed : values of parts outside the stage that matched groups may name. price :
+    price class by value.
     """
-    heavy = resistors[resistors >= target.load]
-    slopes = _slope_rows(target, resistors, heavy, base)
-    if len(slopes) == 0:
-        return "stop slope"
-    gains = np.unique(slopes[:, 4])
-    inputs = np.array([base])
-    nulls = np.zeros((0, 8))
-    for room in THRESHOLD_ROOM:
-        if len(nulls) == 0 or nulls[:, 6].min() > 1e-9:
-            nulls = _null_rows(target, resistors, heavy, inputs, base, gains, room)
-    if len(heavy) <= FEW and (len(nulls) == 0 or nulls[:, 6].min() > 1e-9):
-        # A coarse series reaches the null better with a free input resistor.
-        inputs = heavy[(heavy >= base) & (heavy < 10.0 * base)]
-        nulls = _null_rows(target, resistors, heavy, inputs, base, gains, THRESHOLD_ROOM[-1])
-    if len(nulls) == 0:
-        return "dead-zone null"
-    slopes, nulls, common = _best_groups(slopes, nulls)
-    i, j, word = _choose(slopes, nulls, common, used, base)
-    r206, r207, r210, r50 = slopes[i, :4]
-    r200, r201, r203, r204, r205 = nulls[j, [7, 0, 1, 2, 3]]
-    values = {
-        "R50": r50, "R200": r200, "R201": r201, "R202": base, "R203": r203, "R204": r204,
-        "R205": r205, "R206": r206, "R207": r207, "R208": base, "R209": base, "R210": r210,
-    }  # fmt: skip
+    began = time.perf_counter()
+    free = used | wishes.preferred
+    most = None
+    if wishes.most_values is not None:
+        most = wishes.most_values - len(used - wishes.preferred)
+        if most < 0:
+            return "distinct values"
+    ranking = Ranking(free, price or {}, TOLERANCE, wishes.slack, most)
+    ties = _ties(parts_of(target.kind, target.sides), wishes, fixed or {})
+    if ties is None:
+        return "matched parts"
+    found = _saturating(target, resistors, base, ranking, ties)
+    if isinstance(found, str):
+        return found
+    return replace(found, seconds=time.perf_counter() - began)
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Parts that must be equal: tie maps each to its group; value : those that are given [ohm]."""
+
+    tie: Mapping[str, str]
+    value: Mapping[str, float]
+
+
+def _ties(parts: tuple[str, ...], wishes: Wishes, fixed: Mapping[str, float]) -> Ties | None:
+    """The groups of the stage's own parts; None where two different values are asked of one."""
+    tie: dict[str, str] = {}
+    value: dict[str, float] = {}
+    for group in wishes.matched:
+        own = [name for name in group if name in parts]
+        if not own:
+            continue
+        roots = {tie.get(name, name) for name in own}
+        root = min(roots)
+        given = {fixed[name] for name in group if name in fixed}
+        given |= {value[r] for r in roots if r in value}
+        if len(given) > 1:
+            return None
+        members = [n for n in parts if tie.get(n, n) in roots]
+        tie |= dict.fromkeys(members, root)
+        value |= dict.fromkeys(members, given.pop()) if given else {}
+    return Ties(tie, value)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the search: the values of each part and the ranges.
+
+    slope, whole : whether the slope's tables, or all, hold every value that the conditions leave.
+    """
+
+    lists: Mapping[str, Array]
+    box: Box
+    slope: bool = False
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the stages found: the tables with the least error, a bound that holds for the whole
+    catalogue, rows looked at, and where there is nothing, the condition that binds."""
+
+    best: tuple[Tables, Least] | None
+    bound: float
+    looked_at: int
+    binding: str
+
+    @property
+    def error(self) -> float:
+        return LAST_LEVEL if self.best is None else self.best[1].error
+
+
+def _saturating(
+    target: DeadZoneTarget, resistors: Array, base: float, ranking: Ranking, ties: Ties
+) -> DeadZone | str:
+    found = Search(None, 0.0, 0, "stop slope")
+    for stage in _stages(target, resistors, base, ranking.free, ties):
+        found = _search(target, stage, ties, ranking.free | {base}, found)
+        if found.best is not None and found.error <= max(found.bound, 0.0) + TOLERANCE:
+            break
+        if found.best is not None and stage.whole:
+            break
+    if found.best is None:
+        return found.binding
+    picked = saturating_stage.pick(*found.best, ranking)
+    if picked is None:
+        return "distinct values" if ranking.most is not None else "noise gain"
+    values, word = picked
+    values = {name: values[name] for name in parts_of(target.kind, target.sides)}
+    return _answer(target, values, found, word)
+
+
+def _search(
+    target: DeadZoneTarget, stage: Stage, ties: Ties, free: frozenset[float], so_far: Search
+) -> Search:
+    """One stage, for every value of the parts that are tied across tables."""
+    best, looked_at, binding = so_far.best, so_far.looked_at, so_far.binding
+    bound = np.inf
+    for lists in _tied_lists(stage.lists, ties):
+        if lists is None:
+            bound = 0.0
+            break
+        level = LAST_LEVEL if best is None else best[1].error
+        t = saturating_stage.tables(target, lists, ties.tie, stage.box, free, level)
+        why = t.empty()
+        if why is not None:
+            binding = why if best is None else binding
+            continue
+        slope = float(saturating_stage.slope_errors(t).min())
+        if t.steep_count() > LARGEST:
+            bound = min(bound, slope)
+            continue
+        least = saturating_stage.least_error(t, TOLERANCE)
+        looked_at += len(t.left) + len(t.right) + len(t.divider) + t.steep_count()
+        bound = min(bound, least.error if stage.whole else slope)
+        if least.error <= LAST_LEVEL and (best is None or least.error < best[1].error - 1e-12):
+            best = (t, least)
+        elif best is None:
+            binding = "dead-zone bias" if slope > LAST_LEVEL else "dead-zone null"
+        if best is not None and best[1].error <= TOLERANCE:
+            break
+    if best is not None:
+        bound = min(bound, best[1].error)  # no row of the tables is better than the best known
+    if not (stage.slope or stage.whole) or (best is not None and best[1].error <= TOLERANCE):
+        bound = 0.0
+    return Search(best, bound, looked_at, binding)
+
+
+def _answer(
+    target: DeadZoneTarget,
+    values: dict[str, float],
+    found: Search,
+    word: str,
+) -> DeadZone:
+    errors = saturating_stage.errors(target, values)
+    worst = max(abs(e) for e in errors.values())
+    bound = min(found.bound, worst)
+    if worst <= TOLERANCE:
+        proof = "nothing to improve: every error of the dead zone is at most 1e-6"
+    elif worst <= bound + TOLERANCE:
+        proof = (
+            "every value of R206, R207, R209 with the nearest R210/R50, in the order of the slope "
+            "error, each with the nearest A+ and loaded divider of the whole catalogue"
+        )
+    else:
+        proof = "best found; the whole catalogue was not searched"
     return DeadZone(
-        values={k: float(v) for k, v in values.items()},
-        slope_error=float(slopes[i, 5]),
-        null_error=float(nulls[j, 6]),
+        values=values,
+        errors=errors,
+        threshold=saturating_stage.threshold(target, values),
+        bound=bound,
+        proved=worst <= max(bound, 0.0) + TOLERANCE,
+        proof=proof,
         solver=word,
+        looked_at=found.looked_at,
+        seconds=0.0,
     )
 
 
-def _slope_rows(target: DeadZoneTarget, resistors: Array, heavy: Array, base: float) -> Array:
-    """Columns R206, R207, R210, R50, ln A_, |slope error|: the nearest R50 for each choice."""
-    wide = heavy[(heavy >= base / 5) & (heavy <= base * 20)]
-    r206, r207 = (a.ravel() for a in np.meshgrid(wide[(wide >= base) & (wide < 10 * base)], wide))
-    gain = r207 / r206
-    fine = (gain <= target.linear_gain) & (gain >= target.linear_gain / 1.6)
-    r206, r207, gain = r206[fine], r207[fine], gain[fine]
-    feedback = resistors[(resistors >= target.load) & (resistors <= 100 * base)]
-    i, j = (a.ravel() for a in np.meshgrid(np.arange(len(gain)), np.arange(len(feedback))))
-    total = gain[i] * feedback[j] / base
-    wanted = np.log(total / target.slope)
-    # R50 has to be on the list; of what is left, the larger slopes: they need less noise gain.
-    fine = (total <= target.output_gain) & (wanted <= np.log(heavy[-1]) + 0.05)
-    fine &= wanted >= np.log(heavy[0]) - 0.05
-    if not fine.any():
-        return np.zeros((0, 6))
-    fine &= total >= total[fine].max() / 2.5
-    i, j, total, wanted = i[fine], j[fine], total[fine], wanted[fine]
-    r50, error = _nearest(np.log(heavy), wanted)
-    rows = np.stack([r206[i], r207[i], feedback[j], heavy[r50], np.log(gain[i]), error], axis=1)
-    rows = rows[error < 0.05]
-    return rows[np.argsort(rows[:, 5], kind="stable")][:SLOPES]
+def _stages(
+    target: DeadZoneTarget, resistors: Array, base: float, free: frozenset[float], ties: Ties
+) -> Iterator[Stage]:
+    near, far = (saturating_stage.box(target, *room) for room in ROOMS)
+    names = parts_of(target.kind, target.sides)
+    heavy = resistors[resistors >= target.load]
+    every = {name: resistors if name in LIGHT else heavy for name in names}
+    every |= {name: heavy[np.isclose(heavy, v, rtol=1e-9)] for name, v in ties.value.items()}
+    handy = _handy(heavy, base, free)
+    few = {name: np.intersect1d(every[name], handy[:1]) for name in LEVEL_SETTERS}
+    some = {name: np.intersect1d(every[name], handy) for name in LEVEL_SETTERS}
+    given = {name: every[name] for name in ties.value}
+    slopes = every | some | given | {name: every[name] for name in ("R206", "R209")}
+    fits = len(resistors) ** 3 <= LARGEST
+    yield Stage(every | few | given, near)
+    yield Stage(every | few | given, far)
+    yield Stage(every | some | given, far)
+    yield Stage(slopes, far, slope=target.strict)
+    if target.strict:
+        if fits:
+            yield Stage(every, far, whole=True)
+        last = saturating_stage.box(target, *OPEN)
+    else:
+        last = saturating_stage.free_box(target)
+        yield Stage(slopes, replace(last, steep=far.steep), slope=True)
+    yield Stage(every if fits else slopes, last, slope=True, whole=fits)
 
 
-def _null_rows(
-    target: DeadZoneTarget,
-    resistors: Array,
-    heavy: Array,
-    inputs: Array,
-    base: float,
-    gains: Array,
-    room: float,
-) -> Array:
-    """Columns R201, R203, R204, R205, ln A+, ln A_, mu |ln(beta A+/A_)|, R200 of ``inputs``."""
-    wide = heavy[(heavy >= base) & (heavy <= 100 * base)]
-    r200, r201, r203 = (a.ravel() for a in np.meshgrid(inputs, wide, wide))
-    steep = r201 * r203 / (r200 * base)
-    least = target.saturation / target.threshold
-    # U3B must still be linear where U3C reaches its limit.
-    fine = (steep >= least) & (steep <= room * least) & (r203 / base >= 1.15)
-    r200, r201, r203, steep = r200[fine], r201[fine], r203[fine], np.log(steep[fine])
-    # R204 alone carries the output's current; R205 may be as small as the list goes.
-    top = heavy[heavy <= 100 * base]
-    r204, r205 = (a.ravel() for a in np.meshgrid(top, resistors[resistors <= 20 * base]))
-    loaded = r205 * base / (r205 + base)
-    beta = np.log(loaded / (r204 + loaded))
-    order = np.argsort(beta, kind="stable")
-    r204, r205, beta = r204[order], r205[order], beta[order]
-    if len(steep) == 0 or len(beta) == 0:
-        return np.zeros((0, 8))
-    out = []
-    for gain in gains:
-        index, error = _nearest(beta, gain - steep)
-        keep = np.argsort(error, kind="stable")[:20]
-        keep = keep[error[keep] < 0.05]
-        k = index[keep]
-        same = np.full(len(keep), gain)
-        out.append(
-            np.stack(
-                [
-                    r201[keep],
-                    r203[keep],
-                    r204[k],
-                    r205[k],
-                    steep[keep],
-                    same,
-                    target.mu * error[keep],
-                    r200[keep],
-                ],
-                axis=1,
-            )
-        )
-    return np.concatenate(out)
+def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
+    """Values for resistors that only set a level, the first first: few where the list is long."""
+    if len(heavy) == 0:
+        return heavy
+    room = [v for v in sorted(free) if base <= v <= 10.0 * base]
+    wanted = [base, *room, *(base * f for f in (2.0, 5.0, 10.0, 3.0, 1.5, 4.0, 7.0))]
+    near = [float(heavy[np.argmin(np.abs(np.log(heavy / v)))]) for v in wanted]
+    most = int(np.clip(LARGEST / 2.5 / len(heavy) ** 2, 2, HANDY))
+    return np.array(list(dict.fromkeys(near))[:most])
 
 
-def _nearest(table: Array, wanted: Array) -> tuple[Array, Array]:
-    """Index of the nearest entry of a sorted table, and the distance, for each wanted value."""
-    right = np.clip(np.searchsorted(table, wanted), 1, len(table) - 1)
-    left = right - 1
-    index = np.where(np.abs(table[left] - wanted) <= np.abs(table[right] - wanted), left, right)
-    return index, np.abs(table[index] - wanted)
+def _tied_lists(lists: Mapping[str, Array], ties: Ties) -> Iterator[Mapping[str, Array] | None]:
+    """The lists with each group that stands in several tables at one value, for every value.
 
-
-def _best_groups(slopes: Array, nulls: Array) -> tuple[Array, Array, Array]:
-    """Rows of the gains A_ that both tables have and whose larger least error is smallest.
-
-    At most ``GROUPS`` gains with ``ROWS`` rows each: what the program holds.
+    Ends with None where not every combination could be tried.
     """
-    key1, key2 = np.round(slopes[:, 4], 12), np.round(nulls[:, 5], 12)
-    common = np.intersect1d(key1, key2)
-    least1, least2 = (np.full(len(common), np.inf) for _ in range(2))
-    for least, key, error in ((least1, key1, slopes[:, 5]), (least2, key2, nulls[:, 6])):
-        known = np.isin(key, common)
-        np.minimum.at(least, np.searchsorted(common, key[known]), error[known])
-    chosen = np.sort(common[np.argsort(np.maximum(least1, least2), kind="stable")[:GROUPS]])
-    out = []
-    for rows, key, error in ((slopes, key1, slopes[:, 5]), (nulls, key2, nulls[:, 6])):
-        keep = []
-        for gain in chosen:
-            own = np.flatnonzero(key == gain)
-            keep.append(own[np.argsort(error[own], kind="stable")[:ROWS]])
-        out.append(rows[np.concatenate(keep)])
-    return out[0], out[1], chosen
-
-
-def _choose(
-    slopes: Array, nulls: Array, common: Array, used: frozenset[float], base: float
-) -> tuple[int, int, str]:
-    """One row of each table with the same A_: least error, then fewest new values."""
-    z1, z2 = cp.Variable(len(slopes), boolean=True), cp.Variable(len(nulls), boolean=True)
-    error = cp.Variable(nonneg=True)
-    g1, g2 = np.round(slopes[:, 4], 12), np.round(nulls[:, 5], 12)
-    m1 = (g1[None, :] == common[:, None]).astype(float)
-    m2 = (g2[None, :] == common[:, None]).astype(float)
-    rules = [
-        cp.sum(z1) == 1,
-        cp.sum(z2) == 1,
-        m1 @ z1 == m2 @ z2,
-        cp.sum(m1 @ z1) == 1,
-        z1 @ slopes[:, 5] <= error,
-        z2 @ nulls[:, 6] <= error,
+    groups: dict[str, list[str]] = {}
+    for name, root in ties.tie.items():
+        groups.setdefault(root, []).append(name)
+    across = [
+        g for g in groups.values() if len(g) > 1 and not any(set(g) <= set(atom) for atom in ATOMS)
     ]
-    # Both errors count, so the program's objective is their largest, then their sum.
-    total = z1 @ slopes[:, 5] + z2 @ nulls[:, 6]
-    problem = cp.Problem(cp.Minimize(error + 1e-3 * total), rules)
-    problem.solve(solver=cp.HIGHS, **SOLVER)
-    if z1.value is None or z2.value is None:
-        raise ArithmeticError(f"HiGHS: {problem.status}")
-    best = int(np.argmax(z1.value)), int(np.argmax(z2.value))
-    reached = max(slopes[best[0], 5], nulls[best[1], 6])
-    values = np.unique(np.concatenate([slopes[:, :4].ravel(), nulls[:, [0, 1, 2, 3, 7]].ravel()]))
-    values = values[~np.isin(values, [*used, base])]
-    kinds = cp.Variable(len(values), nonneg=True)
-    uses = []
-    for z, columns in ((z1, slopes[:, :4]), (z2, nulls[:, [0, 1, 2, 3, 7]])):
-        for column in columns.T:
-            member = (column[None, :] == values[:, None]).astype(float)
-            uses.append(member @ z <= kinds)
-    stage = cp.Problem(cp.Minimize(cp.sum(kinds)), [*rules, *uses, error <= reached + 1e-9])
-    stage.solve(solver=cp.HIGHS, **SOLVER)
-    if z1.value is not None and abs(z1.value.max() - 1) < 1e-6 and abs(z2.value.max() - 1) < 1e-6:
-        best = int(np.argmax(z1.value)), int(np.argmax(z2.value))
-    return (*best, f"HiGHS: {problem.status}")
+    common = []
+    for group in across:
+        shared = lists[group[0]]
+        for name in group[1:]:
+            shared = np.intersect1d(shared, lists[name])
+        common.append(shared)
+    for chosen in islice(product(*common), TIED):
+        own = {n: np.array([v]) for g, v in zip(across, chosen, strict=True) for n in g}
+        yield {**lists, **own}
+    if np.prod([float(len(c)) for c in common]) > TIED:
+        yield None

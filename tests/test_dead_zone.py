@@ -20,7 +20,7 @@ BASE = 10e3
 
 def target(mu: float = 19.0, threshold: float = 4.0, gain: float = 1.0) -> DeadZoneTarget:
     return DeadZoneTarget(
-        mu=mu, slope=mu * 2e-5, saturation=13.0, threshold=threshold, linear_gain=gain,
+        mu=mu, slope=(mu * 2e-5, mu * 2e-5), saturation=13.0, threshold=threshold, linear_gain=gain,
         output_gain=2.0 * gain, load=2e3,
     )  # fmt: skip
 
@@ -46,7 +46,7 @@ def test_sized_stage_is_what_it_says(resistors: Array, wanted: DeadZoneTarget) -
     # The two errors, recomputed.
     null = wanted.mu * abs(math.log(steep * through / slope))
     assert found.null_error == pytest.approx(null, abs=1e-9)
-    off = abs(math.log(slope / v["R50"] / wanted.slope))
+    off = abs(math.log(slope / v["R50"] / wanted.slope[0]))
     assert found.slope_error == pytest.approx(off, abs=1e-9)
     assert found.slope_error < 0.05
     # The promises about swings and loads.
@@ -89,7 +89,7 @@ def test_more_values_are_no_worse() -> None:
 
 def test_what_leaves_none_is_named() -> None:
     assert size(target(gain=1e-3), E24, BASE, frozenset()) == "stop slope"
-    assert size(target(threshold=1e-4), E24, BASE, frozenset()) == "dead-zone null"
+    assert size(target(threshold=1e-5), E24, BASE, frozenset()) == "dead-zone null"
 
 
 def test_tiny_catalogues_are_answered() -> None:

@@ -97,7 +97,7 @@ def test_the_paper_s_case(series: tuple[str, ...]) -> None:
         replace(read_model_file(EXAMPLES / "paper.toml").circuit, resistors=series),
         paper_peaks(),
     )
-    assert design.errors.max_error < (2e-3 if series == ("E24",) else 1e-9)
+    assert design.errors.max_error < (2e-5 if series == ("E24",) else 1e-6)
     assert design.amplitude() <= 5.0
 
 

@@ -1,0 +1,88 @@
+"""What a dead-zone stage has to do, and what sizing it returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+EXCURSION_MARGIN = 1.05
+"""Of the largest excursion on the free side of a one-sided stop."""
+LEAST_SPAN, SPAN_ROOM = 1.25, 1.6
+"""Least ratio of the free side's reach to the threshold, and how far above its least it may be."""
+
+
+@dataclass(frozen=True)
+class DeadZoneTarget:
+    """What the stage has to do.
+
+    mu : stop stiffness over K1. slope : least and largest wanted (fv slope)/R50 [1/ohm]; inside the
+    interval the slope has no error. saturation : of U3C [V].
+    threshold : largest v1 at the stop that keeps every state inside its swing [V].
+    linear_gain : largest A- that keeps U3A linear; output_gain : largest fv slope that keeps the
+    output of the stage inside its swing, a diode's drop included. load : least resistance that an
+    output may drive [ohm]. noise_gain : largest noise gain of an amplifier of the stage.
+    strict : whether these limits are conditions; otherwise they only say where the search begins.
+    excursion : largest excursion on the free side of a one-sided stop, over the clearance.
+    supply [V], reference [V], reference_current : least and largest current of the reference [A],
+    margins included.
+    """
+
+    mu: float
+    slope: tuple[float, float]
+    saturation: float
+    threshold: float
+    linear_gain: float
+    output_gain: float
+    load: float
+    noise_gain: float = float("inf")
+    strict: bool = True
+    kind: Literal["saturation", "rectifier"] = "saturation"
+    sides: Literal["both", "upper", "lower"] = "both"
+    excursion: float = 1.0
+    supply: float = 15.0
+    reference: float = 5.0
+    reference_current: tuple[float, float] = (0.0, float("inf"))
+
+    @property
+    def shift(self) -> tuple[float, float]:
+        """Range of c/Esat = (L - b)/(L + b) of a one-sided stage; L reaches past the excursion."""
+        if self.sides == "both":
+            return 0.0, 0.0
+        span = max(self.excursion * EXCURSION_MARGIN, LEAST_SPAN)
+        return (span - 1.0) / (span + 1.0), (span * SPAN_ROOM - 1.0) / (span * SPAN_ROOM + 1.0)
+
+
+@dataclass(frozen=True)
+class DeadZone:
+    """Values of R50 and R200 … [ohm], and what is known of them.
+
+    errors : each error of the stage, signed, from the values alone; error : the largest size.
+    threshold : v1 at the stop [V]. bound : no choice under the stated conditions has a smaller
+    error; proved : the error is within 1e-6 of the bound, or of none; proof : how that is known.
+    solver : what the solver said. looked_at : rows of tables that the search went through;
+    seconds : wall time.
+    """
+
+    values: dict[str, float]
+    errors: dict[str, float]
+    threshold: float
+    bound: float
+    proved: bool
+    proof: str
+    solver: str
+    looked_at: int
+    seconds: float
+
+    @property
+    def error(self) -> float:
+        return max(abs(e) for e in self.errors.values())
+
+    @property
+    def slope_error(self) -> float:
+        """Size of the stop slope's error."""
+        return abs(self.errors["stop slope"])
+
+    @property
+    def null_error(self) -> float:
+        """Size of the leftover slope in the dead zone, in units of K1; 0 for the rectifier."""
+        return abs(self.errors.get("dead-zone null", 0.0))

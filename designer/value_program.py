@@ -1,0 +1,174 @@
+"""The last step of sizing a dead zone: one row of each table, by a mixed-integer program.
+
+Least error, then the fewest new values, then the lowest price. The tables are reduced before, so
+the program is small; cvxpy states it and HiGHS solves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from designer.selection import SOLVER
+from designer.system import Array, Index
+from designer.value_tables import ValueTable, new_values
+
+PRICE_WEIGHT = 1e-3
+"""Of one price class against one distinct value: price only breaks ties."""
+ERROR_WEIGHT = 1e-4
+"""Of the error over its limit: it decides where values and price are the same."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """One table of the program: its values, the error of each row, and a key that the rows chosen
+    from all tables must share."""
+
+    table: ValueTable
+    error: Array
+    key: Index
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def take(self, which: Index) -> Rows:
+        """The rows of an index array."""
+        return Rows(self.table.take(which), self.error[which], self.key[which])
+
+
+@dataclass(frozen=True)
+class Rule:
+    """low <= sum over the tables of the chosen row's weight <= high."""
+
+    weights: tuple[Array, ...]
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What counts after the error.
+
+    free : values that cost nothing. price : price class by value. tolerance : errors up to it count
+    as none. slack : how far above its least the error may be. most : limit on new values.
+    """
+
+    free: frozenset[float]
+    price: Mapping[float, float]
+    tolerance: float
+    slack: float
+    most: int | None = None
+
+
+@dataclass(frozen=True)
+class Pick:
+    """The chosen row of each table, the largest error, and the solver's word."""
+
+    rows: tuple[int, ...]
+    error: float
+    solver: str
+
+
+def choose(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> Pick | None:
+    """Rows with the same key that keep every rule; None where there are none."""
+    tables, kept = _shared_keys(tables)
+    if any(len(t) == 0 for t in tables):
+        return None
+    rules = [
+        Rule(tuple(w[k] for w, k in zip(r.weights, kept, strict=True)), r.low, r.high)
+        for r in rules
+    ]
+    picks = [cp.Variable(len(t), boolean=True) for t in tables]
+    error = cp.Variable(nonneg=True)
+    linear = _linear(tables, picks, rules)
+    linear += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
+    kinds, price, uses = _kinds(tables, picks, ranking)
+    if ranking.most is not None:
+        # Only here does the number of values constrain the first stage.
+        uses.append(cp.sum(kinds) <= ranking.most)
+    first = _solve(error, linear + (uses if ranking.most is not None else []), picks)
+    if first is None:
+        return None
+    rows, word = first
+    reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
+    limit = max(reached, ranking.tolerance) + ranking.slack
+    second = _solve(
+        cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / max(limit, 1e-9) * error,
+        [*linear, *uses, error <= limit * (1.0 + 1e-9) + 1e-12],
+        picks,
+    )
+    if second is not None:
+        rows = second[0]
+        reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
+    found = tuple(int(k[i]) for k, i in zip(kept, rows, strict=True))
+    return Pick(found, reached, f"HiGHS: {word}")
+
+
+def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:
+    """The rows whose key every table has, and their places."""
+    common = tables[0].key
+    for t in tables[1:]:
+        common = np.intersect1d(common, t.key)
+    kept = [np.flatnonzero(np.isin(t.key, common)) for t in tables]
+    return [t.take(k) for t, k in zip(tables, kept, strict=True)], kept
+
+
+def _linear(
+    tables: Sequence[Rows], picks: Sequence[cp.Variable], rules: Sequence[Rule]
+) -> list[object]:
+    """One row of each table, all with the same key, and the rules."""
+    out: list[object] = [cp.sum(z) == 1 for z in picks]
+    keys = np.unique(tables[0].key)
+    members = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
+    if len(keys) > 1:
+        out += [members[0] @ picks[0] == m @ z for m, z in zip(members[1:], picks[1:], strict=True)]
+    for rule in rules:
+        total = sum(w @ z for w, z in zip(rule.weights, picks, strict=True))
+        if np.isfinite(rule.low):
+            out.append(total >= rule.low)
+        if np.isfinite(rule.high):
+            out.append(total <= rule.high)
+    return out
+
+
+def _kinds(
+    tables: Sequence[Rows], picks: Sequence[cp.Variable], ranking: Ranking
+) -> tuple[cp.Variable, Any, list[object]]:
+    """One variable per value that is not free, at least as large as the use made of it."""
+    every = np.unique(np.concatenate([t.table.values.ravel() for t in tables]))
+    every = every[~np.isin(every, np.array(sorted(ranking.free), dtype=float))]
+    kinds = cp.Variable(max(len(every), 1), nonneg=True)
+    uses: list[object] = []
+    price: Any = 0.0
+    for t, z in zip(tables, picks, strict=True):
+        for column in t.table.values.T:
+            own = np.intersect1d(column, every)
+            if len(own):
+                member = (column[None, :] == own[:, None]).astype(float)
+                uses.append(member @ z <= kinds[np.searchsorted(every, own)])
+            cost = np.array([ranking.price.get(float(v), 0.0) for v in column])
+            if cost.any():
+                price = price + cost @ z
+    return kinds, price, uses
+
+
+def _solve(
+    objective: object, rules: Sequence[object], picks: Sequence[cp.Variable]
+) -> tuple[tuple[int, ...], str] | None:
+    problem = cp.Problem(cp.Minimize(objective), list(rules))
+    problem.solve(solver=cp.HIGHS, **SOLVER)
+    for z in picks:
+        # An infeasible or interrupted program may leave zeros behind: rows count only if whole.
+        if z.value is None or abs(z.value.sum() - 1.0) > 1e-6 or abs(z.value.max() - 1.0) > 1e-6:
+            return None
+    return tuple(int(np.argmax(z.value)) for z in picks), str(problem.status)
+
+
+def fewest(rows: Rows, free: frozenset[float], most: int) -> Index:
+    """Places of the ``most`` rows with the fewest new values, then the smallest error."""
+    count = new_values(rows.table.values, free)
+    return np.lexsort((rows.error, count))[:most]
