@@ -61,3 +61,12 @@ class Resistors:
             raise InputError(
                 None, "composites", ", ".join(sorted(self._composites)), "resistors of the circuit"
             )
+
+
+def effective(values: Mapping[str, float], composites: Mapping[str, Composite]) -> dict[str, float]:
+    """Values by the names of a circuit without composites: NAME instead of NAMEA and NAMEB."""
+    out = dict(values)
+    for name, kind in composites.items():
+        a, b = out.pop(f"{name}A"), out.pop(f"{name}B")
+        out[name] = a + b if kind == "series" else a * b / (a + b)
+    return out
