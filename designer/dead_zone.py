@@ -8,14 +8,14 @@ is the least of the whole catalogue. Every answer is computed anew from its valu
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
 import numpy as np
 
-from designer import saturating_stage
-from designer.dead_zone_target import DeadZone, DeadZoneTarget
+from designer import rectifier_stage, saturating_stage
+from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget
 from designer.saturating_stage import LARGEST, LAST_LEVEL, Box, Least, Tables
 from designer.system import Array
 from designer.value_program import Ranking
@@ -23,8 +23,6 @@ from designer.wishes import NO_WISHES, Wishes
 
 __all__ = ["DeadZone", "DeadZoneTarget", "parts_of", "size"]
 
-TOLERANCE = 1e-6
-"""An error up to it counts as none."""
 ROOMS = ((1.06, 1.6, 2.5), (1.2, 1.6, 2.5))
 """How far below its largest value each of threshold, A- and fv slope may lie: first and at most."""
 OPEN = (np.inf, np.inf, np.inf)
@@ -82,11 +80,16 @@ def size(
         most = wishes.most_values - len(used - wishes.preferred)
         if most < 0:
             return "distinct values"
-    ranking = Ranking(free, price or {}, TOLERANCE, wishes.slack, most)
-    ties = _ties(parts_of(target.kind, target.sides), wishes, fixed or {})
+    ranking = Ranking(free, price or {}, EXACT, wishes.slack, most)
+    inherent = rectifier_stage.EQUAL if target.kind == "rectifier" else ()
+    groups = (*inherent, *wishes.matched)
+    ties = _ties(parts_of(target.kind, target.sides), groups, fixed or {})
     if ties is None:
         return "matched parts"
-    found = _saturating(target, resistors, base, ranking, ties)
+    if target.kind == "rectifier":
+        found = rectifier_stage.size(target, resistors, ranking, ties.tie, ties.value)
+    else:
+        found = _saturating(target, resistors, base, ranking, ties)
     if isinstance(found, str):
         return found
     return replace(found, seconds=time.perf_counter() - began)
@@ -100,11 +103,13 @@ class Ties:
     value: Mapping[str, float]
 
 
-def _ties(parts: tuple[str, ...], wishes: Wishes, fixed: Mapping[str, float]) -> Ties | None:
+def _ties(
+    parts: tuple[str, ...], groups: Sequence[Sequence[str]], fixed: Mapping[str, float]
+) -> Ties | None:
     """The groups of the stage's own parts; None where two different values are asked of one."""
     tie: dict[str, str] = {}
     value: dict[str, float] = {}
-    for group in wishes.matched:
+    for group in groups:
         own = [name for name in group if name in parts]
         if not own:
             continue
@@ -154,7 +159,7 @@ def _saturating(
     found = Search(None, 0.0, 0, "stop slope")
     for stage in _stages(target, resistors, base, ranking.free, ties):
         found = _search(target, stage, ties, ranking.free | {base}, found)
-        if found.best is not None and found.error <= max(found.bound, 0.0) + TOLERANCE:
+        if found.best is not None and found.error <= max(found.bound, 0.0) + EXACT:
             break
         if found.best is not None and stage.whole:
             break
@@ -188,18 +193,20 @@ def _search(
         if t.steep_count() > LARGEST:
             bound = min(bound, slope)
             continue
-        least = saturating_stage.least_error(t, TOLERANCE)
+        least = saturating_stage.least_error(t, EXACT)
         looked_at += len(t.left) + len(t.right) + len(t.divider) + t.steep_count()
         bound = min(bound, least.error if stage.whole else slope)
-        if least.error <= LAST_LEVEL and (best is None or least.error < best[1].error - 1e-12):
+        # A wider range only where it is of use: the narrow one has the better threshold.
+        margin = 0.0 if best is None or best[0].box == stage.box else EXACT
+        if least.error <= (LAST_LEVEL if best is None else best[1].error - margin - 1e-12):
             best = (t, least)
         elif best is None:
             binding = "dead-zone bias" if slope > LAST_LEVEL else "dead-zone null"
-        if best is not None and best[1].error <= TOLERANCE:
+        if best is not None and best[1].error <= EXACT:
             break
     if best is not None:
         bound = min(bound, best[1].error)  # no row of the tables is better than the best known
-    if not (stage.slope or stage.whole) or (best is not None and best[1].error <= TOLERANCE):
+    if not (stage.slope or stage.whole) or (best is not None and best[1].error <= EXACT):
         bound = 0.0
     return Search(best, bound, looked_at, binding)
 
@@ -213,9 +220,9 @@ def _answer(
     errors = saturating_stage.errors(target, values)
     worst = max(abs(e) for e in errors.values())
     bound = min(found.bound, worst)
-    if worst <= TOLERANCE:
+    if worst <= EXACT:
         proof = "nothing to improve: every error of the dead zone is at most 1e-6"
-    elif worst <= bound + TOLERANCE:
+    elif worst <= bound + EXACT:
         proof = (
             "every value of R206, R207, R209 with the nearest R210/R50, in the order of the slope "
             "error, each with the nearest A+ and loaded divider of the whole catalogue"
@@ -227,7 +234,7 @@ def _answer(
         errors=errors,
         threshold=saturating_stage.threshold(target, values),
         bound=bound,
-        proved=worst <= max(bound, 0.0) + TOLERANCE,
+        proved=worst <= max(bound, 0.0) + EXACT,
         proof=proof,
         solver=word,
         looked_at=found.looked_at,

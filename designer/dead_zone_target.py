@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+EXACT = 1e-6
+"""An error up to it counts as none, and an error this close to its bound as proved."""
 EXCURSION_MARGIN = 1.05
 """Of the largest excursion on the free side of a one-sided stop."""
 LEAST_SPAN, SPAN_ROOM = 1.25, 1.6
@@ -86,3 +90,9 @@ class DeadZone:
     def null_error(self) -> float:
         """Size of the leftover slope in the dead zone, in units of K1; 0 for the rectifier."""
         return abs(self.errors.get("dead-zone null", 0.0))
+
+
+def outside(found: float, interval: tuple[float, float]) -> float:
+    """ln of how far a positive value lies above (below: negative) an interval; 0 inside."""
+    over, under = np.log(found / interval[1]), np.log(found / interval[0])
+    return float(max(over, 0.0) + min(under, 0.0))

@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from designer.dead_zone_target import DeadZoneTarget
+from designer.dead_zone_target import DeadZoneTarget, outside
 from designer.system import Array, Index, Mask
 from designer.value_program import Ranking, Rows, Rule, choose, fewest
 from designer.value_tables import (
@@ -46,7 +46,7 @@ LAST_LEVEL = 0.1
 """Errors above it are no answer."""
 LARGEST = 3_000_000
 """Rows of a table past which the whole catalogue is not enumerated."""
-KEYS, ROWS, TRIES = 30, 12, 200
+KEYS, ROWS, TRIES = 40, 20, 200
 """Values of u, rows of each table for each, that go into the program; values of u looked at."""
 EXPANDED = 400_000
 """Rows of a join that are ranked by their new values before the rest is left out."""
@@ -172,9 +172,11 @@ def tables(
     """The tables of these lists. Of rows with the same logarithm, that with the fewest values that
     are not ``free`` stays; of R206, R207, R209 only rows with a slope error up to ``level``."""
     gain = limits.noise_gain
+    noisy = bool(np.isfinite(gain))
     right = combinations(("R210", "R50"), lists, tie)
     right = right.take(_inside(right["R50"], limits.stop))
-    right = _fewest_of_each(right, np.log(right["R210"] / right["R50"]), free)
+    quiet = -right["R210"] if noisy else None
+    right = _fewest_of_each(right, np.log(right["R210"] / right["R50"]), free, quiet)
     left = _left(target, lists, tie, limits, free, right, level)
     first = combinations(("R200", "R201"), lists, tie)
     ratio = first["R201"] / first["R200"]
@@ -197,10 +199,12 @@ def tables(
         first = _fewest_of_each(first, np.log(first["R201"] / first["R200"]), free)
     return replace(
         out,
-        left=_fewest_of_each(left, out.left_logs, free),
+        left=_fewest_of_each(left, out.left_logs, free, left["R209"] if noisy else None),
         first=first,
         second=_fewest_of_each(second, np.log(second["R203"] / second["R202"]), free),
-        divider=_fewest_of_each(divider, out.divider_logs, free),
+        divider=_fewest_of_each(
+            divider, out.divider_logs, free, _quiet(divider) if noisy else None
+        ),
     )
 
 
@@ -244,13 +248,26 @@ def _inside(values: Array, limits: tuple[float, float]) -> Mask:
     return np.asarray((values >= limits[0] * (1.0 - 1e-9)) & (values <= limits[1] * (1.0 + 1e-9)))
 
 
-def _fewest_of_each(table: ValueTable, logs: Array, free: frozenset[float]) -> ValueTable:
-    """One row for each different logarithm, ascending."""
+def _fewest_of_each(
+    table: ValueTable, logs: Array, free: frozenset[float], quiet: Array | None = None
+) -> ValueTable:
+    """One row for each different logarithm, ascending: that with the fewest values that are not
+    free, and with ``quiet`` also the one where that is largest."""
     if len(table) == 0:
         return table
-    order = np.argsort(new_values(table.values, free), kind="stable")
-    _, first = np.unique(np.round(logs[order], DIGITS), return_index=True)
-    return table.take(order[first])
+    kept = []
+    for rank in (new_values(table.values, free), None if quiet is None else -quiet):
+        if rank is not None:
+            order = np.argsort(rank, kind="stable")
+            kept.append(order[np.unique(np.round(logs[order], DIGITS), return_index=True)[1]])
+    both = np.unique(np.concatenate(kept))
+    return table.take(both[np.argsort(np.round(logs[both], DIGITS), kind="stable")])
+
+
+def _quiet(divider: ValueTable) -> Array:
+    """What R208 and the divider behind it are from U3D's summing node to ground [ohm]."""
+    v = divider
+    return np.asarray(v["R208"] + v["R204"] * v["R205"] / (v["R204"] + v["R205"]))
 
 
 @dataclass(frozen=True)
@@ -419,7 +436,7 @@ def noise_rules(t: Tables, slopes: Rows, nulls: Rows) -> list[Rule]:
     rest = t.box.noise_gain - 1.0 - s["R210"] / s["R209"]
     # Where R209 alone takes all of it, no row of the other table will do.
     need = np.where(rest > 0.0, np.log(s["R210"] / np.where(rest > 0.0, rest, 1.0)), 1e3)
-    have = np.log(n["R208"] + n["R204"] * n["R205"] / (n["R204"] + n["R205"]))
+    have = np.log(_quiet(n))
     return [Rule((-need, have), -1e-9, np.inf)]
 
 
@@ -443,10 +460,9 @@ def errors(target: DeadZoneTarget, values: Mapping[str, float]) -> dict[str, flo
     """The errors of finished values, from the formulas above."""
     v = {name: np.asarray(value) for name, value in values.items()}
     per_ohm = v["R207"] / v["R206"] / v["R209"]
-    total = float(np.log(per_ohm * v["R210"] / v["R50"]))
-    low, high = np.log(target.slope)
+    total = float(per_ohm * v["R210"] / v["R50"])
     out = {
-        "stop slope": min(total - low, 0.0) + max(total - high, 0.0),
+        "stop slope": outside(total, target.slope),
         "dead-zone null": float(target.mu * np.log(_steep(v) / _through(v) / per_ohm)),
     }
     if target.sides != "both":

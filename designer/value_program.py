@@ -78,34 +78,57 @@ def choose(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> P
     tables, kept = _shared_keys(tables)
     if any(len(t) == 0 for t in tables):
         return None
-    rules = [
-        Rule(tuple(w[k] for w, k in zip(r.weights, kept, strict=True)), r.low, r.high)
-        for r in rules
-    ]
-    picks = [cp.Variable(len(t), boolean=True) for t in tables]
-    error = cp.Variable(nonneg=True)
-    linear = _linear(tables, picks, rules)
-    linear += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
-    kinds, price, uses = _kinds(tables, picks, ranking)
-    if ranking.most is not None:
-        # Only here does the number of values constrain the first stage.
-        uses.append(cp.sum(kinds) <= ranking.most)
-    first = _solve(error, linear + (uses if ranking.most is not None else []), picks)
+    rules = [_of_rows(rule, kept) for rule in rules]
+    first = _solve(tables, rules, ranking, None)
     if first is None:
         return None
     rows, word = first
     reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
-    limit = max(reached, ranking.tolerance) + ranking.slack
-    second = _solve(
-        cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / max(limit, 1e-9) * error,
-        [*linear, *uses, error <= limit * (1.0 + 1e-9) + 1e-12],
-        picks,
-    )
+    limit = (max(reached, ranking.tolerance) + ranking.slack) * (1.0 + 1e-9) + 1e-12
+    useful = _promising(tables, rules, ranking, limit)
+    fewer = [t.take(k) for t, k in zip(tables, useful, strict=True)]
+    second = _solve(fewer, [_of_rows(rule, useful) for rule in rules], ranking, limit)
     if second is not None:
-        rows = second[0]
+        rows = tuple(int(k[i]) for k, i in zip(useful, second[0], strict=True))
         reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
     found = tuple(int(k[i]) for k, i in zip(kept, rows, strict=True))
     return Pick(found, reached, f"HiGHS: {word}")
+
+
+def _of_rows(rule: Rule, kept: Sequence[Index]) -> Rule:
+    """The rule for the rows that are kept of each table."""
+    return Rule(tuple(w[k] for w, k in zip(rule.weights, kept, strict=True)), rule.low, rule.high)
+
+
+def _promising(
+    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, limit: float
+) -> list[Index]:
+    """Places of the rows that stand in some choice inside the limit with the fewest new values.
+
+    The tables are short, so the choices of one key are simply counted; what is left to the program
+    is the price, and the error where that is the same too.
+    """
+    inside = [np.flatnonzero(t.error <= limit) for t in tables]
+    best = sum(t.table.values.shape[1] for t in tables)
+    kept: list[list[Index]] = []
+    for key in np.unique(tables[0].key):
+        own = [k[t.key[k] == key] for t, k in zip(tables, inside, strict=True)]
+        grid = [a.ravel() for a in np.meshgrid(*own, indexing="ij")]
+        good = np.ones(len(grid[0]), dtype=bool)
+        for rule in rules:
+            total = sum(w[g] for w, g in zip(rule.weights, grid, strict=True))
+            good &= (total >= rule.low) & (total <= rule.high)
+        grid = [g[good] for g in grid]
+        values = np.hstack([t.table.values[g] for t, g in zip(tables, grid, strict=True)])
+        count = new_values(values, ranking.free)
+        least = int(count.min(initial=best + 1))
+        if least < best:
+            best, kept = least, []
+        if least == best:
+            kept.append([np.unique(g[count == best]) for g in grid])
+    if not kept:
+        return inside
+    return [np.sort(np.concatenate(places)) for places in zip(*kept, strict=True)]
 
 
 def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:
@@ -115,24 +138,6 @@ def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:
         common = np.intersect1d(common, t.key)
     kept = [np.flatnonzero(np.isin(t.key, common)) for t in tables]
     return [t.take(k) for t, k in zip(tables, kept, strict=True)], kept
-
-
-def _linear(
-    tables: Sequence[Rows], picks: Sequence[cp.Variable], rules: Sequence[Rule]
-) -> list[object]:
-    """One row of each table, all with the same key, and the rules."""
-    out: list[object] = [cp.sum(z) == 1 for z in picks]
-    keys = np.unique(tables[0].key)
-    members = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
-    if len(keys) > 1:
-        out += [members[0] @ picks[0] == m @ z for m, z in zip(members[1:], picks[1:], strict=True)]
-    for rule in rules:
-        total = sum(w @ z for w, z in zip(rule.weights, picks, strict=True))
-        if np.isfinite(rule.low):
-            out.append(total >= rule.low)
-        if np.isfinite(rule.high):
-            out.append(total <= rule.high)
-    return out
 
 
 def _kinds(
@@ -157,9 +162,32 @@ def _kinds(
 
 
 def _solve(
-    objective: object, rules: Sequence[object], picks: Sequence[cp.Variable]
+    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, limit: float | None
 ) -> tuple[tuple[int, ...], str] | None:
-    problem = cp.Problem(cp.Minimize(objective), list(rules))
+    """Rows of least error; with a ``limit`` of the error, of fewest values and least price."""
+    picks = [cp.Variable(len(t), boolean=True) for t in tables]
+    error = cp.Variable(nonneg=True)
+    held: list[object] = [cp.sum(z) == 1 for z in picks]
+    keys = np.unique(tables[0].key)
+    members = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
+    if len(keys) > 1:
+        for member, z in zip(members[1:], picks[1:], strict=True):
+            held.append(members[0] @ picks[0] == member @ z)
+    for rule in rules:
+        total = sum(w @ z for w, z in zip(rule.weights, picks, strict=True))
+        held += [total >= rule.low] if np.isfinite(rule.low) else []
+        held += [total <= rule.high] if np.isfinite(rule.high) else []
+    held += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
+    objective: Any = error
+    if limit is not None or ranking.most is not None:
+        kinds, price, uses = _kinds(tables, picks, ranking)
+        held += uses
+    if ranking.most is not None:
+        held.append(cp.sum(kinds) <= ranking.most)
+    if limit is not None:
+        objective = cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / limit * error
+        held.append(error <= limit)
+    problem = cp.Problem(cp.Minimize(objective), held)
     problem.solve(solver=cp.HIGHS, **SOLVER)
     for z in picks:
         # An infeasible or interrupted program may leave zeros behind: rows count only if whole.
