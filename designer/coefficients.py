@@ -75,7 +75,8 @@ def coefficient_errors(
 
     Raises
     ------
-    ArithmeticError : a coefficient has the wrong sign, so no scale makes it right.
+    ArithmeticError : a coefficient has the wrong sign, so no scale makes it right; or an op-amp
+        clips or a diode switches inside the clearance, so its stiffness is not one number.
     """
     board = nominal_board(circuit, ideal=True) if board is None else board
     reduction = Reduction(circuit, board)
@@ -173,7 +174,9 @@ def _dead_zone(reduction: Reduction) -> _Zone:
         per_gain = (system.mode(key).A - rest.A) / (steep - flat)
         switch = c.switches.index(contact.switch)
         guard = next(g for g in rest.guards if g.target[switch] == contact.position)
-        threshold = abs(guard.e / float(guard.C[state]))
+        end = -guard.e / float(guard.C[state])
+        threshold = abs(end)
+        _stays_linear(reduction, state, end, contact.switch)
         if not thresholds:
             A = rest.A - flat * per_gain
             force = float(inside[-1] * per_gain[row, state])
@@ -185,6 +188,17 @@ def _dead_zone(reduction: Reduction) -> _Zone:
             name = "stop slope"
         slopes.setdefault(name, float(steep * per_gain[row, state]))
     return _Zone(A, slopes, max(nulls, key=abs), bias, thresholds)
+
+
+def _stays_linear(reduction: Reduction, state: int, end: float, ends: str) -> None:
+    """The mode at rest has to hold up to where contact begins, at ``end`` [V]."""
+    c = reduction.circuit
+    for guard in reduction.system().mode(c.rest).guards:
+        pairs = zip(c.switches, c.rest, guard.target, strict=True)
+        switch = next(name for name, here, there in pairs if here != there)
+        reach = abs(float(guard.C[state]) * end) + abs(guard.e)
+        if switch != ends and float(guard.C[state]) * end + guard.e > 1e-9 * reach:
+            raise ArithmeticError(f"{switch} changes inside the clearance, before v1 = {end:.4g} V")
 
 
 def _state(j: int) -> str:

@@ -71,13 +71,8 @@ class Program:
     curved: frozenset[str]
 
 
-def improve(order: Order, made: Attempt) -> tuple[Attempt, dict[str, Composite]] | None:
-    """The attempt with composites, and which resistors they are; None where none lowers the error.
-
-    Raises
-    ------
-    ArithmeticError : the solver has no answer to a program that always has one.
-    """
+def improve(order: Order, made: Attempt) -> Attempt | None:
+    """The attempt with composites; None where none lowers the error."""
     if made.errors.max_error <= EXACT:
         return None
     asked = order.spec.composites
@@ -96,7 +91,7 @@ def improve(order: Order, made: Attempt) -> tuple[Attempt, dict[str, Composite]]
     errors = order.errors(circuit, swing_of(order, made))
     if errors.max_error >= made.errors.max_error - EXACT:
         return None
-    return replace(made, values=values, circuit=circuit, errors=errors), kinds
+    return replace(made, values=values, circuit=circuit, errors=errors)
 
 
 def swing_of(order: Order, made: Attempt) -> float:

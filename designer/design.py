@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from designer.circuit import Circuit
 from designer.coefficients import CoefficientErrors
 from designer.model import Dimensionless
+from designer.resistors import Composite, composites_of
 from designer.system import Array
 
 TOLERANCE = 2e-3
@@ -83,8 +83,7 @@ class Design:
     errors are of the reduced circuit. conditions : side conditions that were kept, by name, with
     their values. solver : what the solver said of each stage. seconds : wall time. checks : the
     conditions as verified on the finished circuit. binding : the max_error that the design would
-    have without a condition, for those that cost some. composites : resistors of two parts, by
-    name, whose values stand under NAMEA and NAMEB.
+    have without a condition, for those that cost some.
     """
 
     model: Dimensionless
@@ -96,7 +95,11 @@ class Design:
     seconds: float
     checks: tuple[Check, ...] = ()
     binding: Mapping[str, float] = field(default_factory=dict)
-    composites: Mapping[str, Literal["series", "parallel"]] = field(default_factory=dict)
+
+    @property
+    def composites(self) -> dict[str, Composite]:
+        """Resistors NAME that are two parts, NAMEA and NAMEB, and how those are joined."""
+        return composites_of(self.circuit)
 
     @property
     def distinct_values(self) -> int:

@@ -106,7 +106,6 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             seconds=float(said["cost"]["synthesis_seconds"]),
             checks=tuple(Check(**check) for check in told["checked"]),
             binding=dict(told["binding"]),
-            composites=dict(said.get("composites", {})),
         )
     except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(

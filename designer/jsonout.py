@@ -73,7 +73,7 @@ def synthesis_json(
             "saturation": circuit.saturation,
         },
         "parts": circuit.values,
-        "composites": dict(design.composites),
+        "composites": design.composites,
         "errors": errors.errors,
         "max_error": errors.max_error,
         "certificate": dict(design.certificate.__dict__),

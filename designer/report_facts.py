@@ -189,10 +189,19 @@ def _study_note(data: ReportData) -> str:
         f"within ± {100 * s.resistor:g} %, capacitors within ± {100 * s.capacitor:g} %, op-amp "
         f"offset normal with σ = {words.quantity(s.offset_sigma, 'V')}, cut at "
         f"{words.quantity(s.offset_limit, 'V')}, saturation uniform within "
-        f"± {100 * s.saturation:g} %, each section and rail its own. Boards run as built: the "
+        f"± {100 * s.saturation:g} %, each section and rail its own{_references(data)}. Boards run "
+        "as built: the "
         "generator stays at the settings above. Verdicts are those of the exact circuit. "
         "Intervals are Wilson's, at 95 %."
     )
+
+
+def _references(data: ReportData) -> str:
+    references = data.design.circuit.references
+    if not references or data.plan is None:
+        return ""
+    grade = data.plan.spread.reference * max(r.grade for r in references)
+    return f", references uniform within ± {100 * grade:g} %, diodes exact"
 
 
 def _parts_note(data: ReportData) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from designer.circuit import Resistor
+from designer.circuit import Circuit, Resistor
 from designer.errors import InputError
 
 Composite = Literal["series", "parallel"]
@@ -70,3 +70,15 @@ def effective(values: Mapping[str, float], composites: Mapping[str, Composite]) 
         a, b = out.pop(f"{name}A"), out.pop(f"{name}B")
         out[name] = a + b if kind == "series" else a * b / (a + b)
     return out
+
+
+def composites_of(circuit: Circuit) -> dict[str, Composite]:
+    """The resistors of a circuit that are two parts, and how those are joined."""
+    found: dict[str, Composite] = {}
+    by_name = {r.name: r for r in circuit.resistors}
+    for name, first in by_name.items():
+        second = by_name.get(f"{name[:-1]}B")
+        if name.endswith("A") and second is not None:
+            parallel = (first.a, first.b) == (second.a, second.b)
+            found[name[:-1]] = "parallel" if parallel else "series"
+    return found

@@ -9,7 +9,7 @@ the search repeated.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
@@ -30,7 +30,6 @@ from designer.reduction import Reduction
 from designer.remedies import REMEDIES
 from designer.responses import ModelResponse
 from designer.selection import Shortfall
-from designer.topology import Composite
 
 __all__ = [
     "LOAD",
@@ -186,7 +185,6 @@ def _verified(
     made: Attempt,
     kept: frozenset[str],
     found: Sequence[ModelResponse],
-    composites: Mapping[str, Composite] | None = None,
 ) -> Design:
     """The design of an attempt, its conditions checked on its circuit."""
     design = Design(
@@ -197,7 +195,6 @@ def _verified(
         conditions={},
         solver=made.solver,
         seconds=0.0,
-        composites=composites or {},
     )
     needed = None
     if found and kept & {"swing", "load"}:
@@ -234,8 +231,7 @@ def _with_composites(
     better = composites.improve(order, reached.made)
     if better is None:
         return design
-    made, kinds = better
-    improved = _verified(order, made, order.spec.kept, found, kinds)
+    improved = _verified(order, better, order.spec.kept, found)
     if not all(check.holds for check in improved.checks):
         return design
     exact = improved.errors.max_error <= PROOF_TOLERANCE

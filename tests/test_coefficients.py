@@ -190,6 +190,13 @@ def test_wrong_signs_have_no_scale() -> None:
         coefficient_errors(circuit_of(values), flipped)
 
 
+def test_a_path_that_clips_before_the_stop_is_no_dead_zone() -> None:
+    """U3B at its limit where U3C is not: the ends are then not where they seem to be."""
+    values = exact_for_paper() | {"R201": 620e3, "R203": 9e3}
+    with pytest.raises(ArithmeticError, match="U3B"):
+        coefficient_errors(circuit_of(values), PAPER.second_order())
+
+
 def test_a_board_s_own_values_count() -> None:
     values = exact_for_paper()
     circuit = circuit_of(values)

@@ -120,3 +120,32 @@ def test_the_leftover_stiffness_has_the_spread_that_theory_says() -> None:
         ratio = math.log(steep2 * through2 / slope2) - math.log(steep * through / slope)
         variance += (ratio / math.log(1.0001) * one_percent) ** 2
     assert np.std(left) == pytest.approx(scale * math.sqrt(variance), rel=0.05)
+
+
+def test_boards_of_a_design_are_those_that_they_always_were() -> None:
+    """Figures drawn before circuits had references: later kinds of part are drawn last."""
+    board = draw(CIRCUIT, SPREAD, 17, 3)
+    assert board.values["R1"] == 99822.06260192711
+    assert board.values["R210"] == 99793.84738799756
+    assert board.values["C4"] == 9.79792707351779e-08
+    assert board.offset["U3D"] == -0.001715270381739697
+    assert board.rails["U3D"] == (-12.447047818900929, 12.384324654675924)
+    assert board.reference == {}
+
+
+def test_references_are_uniform_over_their_grade() -> None:
+    from tests.stages import rectifier, stage
+
+    circuit = stage("rectifier", "both", rectifier())
+    drawn = [draw(circuit, SPREAD, 17, i) for i in range(1500)]
+    for reference in circuit.references:
+        assert (reference.volts, reference.grade) == (5.0, 0.005)
+        off = np.array([b.reference[reference.name] / 5.0 - 1.0 for b in drawn]) / 0.005
+        assert np.abs(off).max() <= 1.0
+        assert kstest(off, "uniform", args=(-1.0, 2.0)).pvalue > 1e-3
+    both = np.array([[b.reference["VR1"], b.reference["VR2"]] for b in drawn])
+    assert abs(np.corrcoef(both.T)[0, 1]) < 0.15
+    drop = {d.name: d.model.drop for d in circuit.diodes}
+    assert all(b.drop == drop for b in drawn)
+    exact = draw(circuit, Spread(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 3, 3)
+    assert dict(exact.reference) == {"VR1": 5.0, "VR2": 5.0}

@@ -1,0 +1,126 @@
+"""Designs with either stage, through files, gate, study and report; parts chosen by hand."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from designer import design_files, pipeline
+from designer.api import Synthesis
+from designer.bom import bill
+from designer.circuit import Circuit
+from designer.coefficients import coefficient_errors
+from designer.folder import Folder
+from designer.jsonout import dumps, synthesis_json
+from designer.modelfile import ModelFile, read_model_file
+from designer.montecarlo import run_block
+from designer.provenance import provenance
+from designer.report import render_html, render_markdown
+from designer.report_data import ReportData
+from designer.responses import find
+from designer.synthesis import Certificate, Design
+from designer.workers import SpicePool
+from designer.zone import Kind, Sides
+from tests.stages import CATALOG, bought, one_sided, stage
+from tests.test_rectifier_ngspice import LOW, SCALED
+
+EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
+CASES: dict[str, tuple[Kind, Sides, dict[str, float], tuple[float, ...]]] = {
+    "rectifier": ("rectifier", "both", SCALED, (1.55,)),
+    "upper half": ("rectifier", "upper", LOW, (1.2,)),
+    "lower half": ("rectifier", "lower", LOW, (0.41,)),
+    "saturation, upper": ("saturation", "upper", bought(one_sided()), (1.2,)),
+    "saturation, lower": ("saturation", "lower", bought(one_sided()), (0.54,)),
+}
+
+
+def made(name: str, tmp_path: Path) -> Synthesis:
+    """The design as a synthesis would leave it."""
+    kind, sides, values, omegas = CASES[name]
+    text = EXAMPLE.read_text().replace('sides = "both"', f'sides = "{sides}"')
+    text = text.replace('dead_zone = "saturation"', f'dead_zone = "{kind}"')
+    text = text.split("[[response]]")[0] + text[text.index("[circuit]") :]
+    for omega in omegas:
+        text = text.replace("[circuit]", f"[[response]]\nomega = {omega}\n\n[circuit]")
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    modelfile = read_model_file(path)
+    circuit = stage(kind, sides, values)
+    return Synthesis(modelfile, CATALOG, find(modelfile.model, modelfile.responses),
+                     design_of(modelfile, circuit))  # fmt: skip
+
+
+def design_of(modelfile: ModelFile, circuit: Circuit) -> Design:
+    errors = coefficient_errors(circuit, modelfile.model.second_order())
+    return Design(modelfile.model, circuit, errors, Certificate("bound", 0.0, "none"), {}, {}, 0.0)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_files_are_read_back_as_the_same_design(name: str, tmp_path: Path) -> None:
+    first = made(name, tmp_path)
+    texts = design_files.texts(first)
+    folder = Folder(tmp_path / "out")
+    folder.path.mkdir()
+    for file, text in texts.items():
+        (folder.path / file).write_text(text)
+    said = synthesis_json(first.modelfile, first.design, first.found, {}, first.seconds)
+    (folder.path / "design.json").write_text(dumps(said))
+    again = design_files.load(folder, first.modelfile, CATALOG)
+    assert again.design.circuit == first.design.circuit
+    zone = said["dead_zone"]
+    assert zone["kind"] == CASES[name][0]
+    assert abs(zone["slope_error"]) <= first.design.errors.max_error
+    both = CASES[name][1] == "both"
+    assert (zone["bias_error"] is None) is both
+    assert math.isfinite(zone["threshold_lower"]) is (CASES[name][1] != "upper")
+
+
+@pytest.mark.parametrize("name", ["rectifier", "saturation, upper"])
+def test_the_deck_runs_in_plain_ngspice(name: str, tmp_path: Path) -> None:
+    deck = tmp_path / "circuit.cir"
+    deck.write_text(design_files.texts(made(name, tmp_path))["circuit.cir"])
+    done = subprocess.run(
+        ["ngspice", "-b", str(deck)], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert done.returncode == 0
+    rows = [r for r in done.stdout.splitlines() if r[:1].isdigit()]
+    assert len(rows) > 1000
+    assert "aborted" not in done.stderr
+
+
+@pytest.mark.parametrize("name", ["rectifier", "upper half", "saturation, lower"])
+def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
+    """Every engine shows the same response; the report names the stage's parts."""
+    first = made(name, tmp_path)
+    with SpicePool(2) as pool:
+        checked = pipeline.check(first.design, first.found, pool)
+        plan = pipeline.plan_study(
+            first.modelfile, first.design, checked, CATALOG, samples=2, seed=1
+        )
+        answers = [a for block in plan.blocks() for a in run_block(plan, block, pool, 2)]
+    for c in checked:
+        assert c.gate is not None
+        assert c.gate.passed
+        assert c.agrees, (c.model.orbit.response, c.circuit.response)
+    assert all(a.agrees is not False for a in answers)
+    data = ReportData(
+        modelfile=first.modelfile,
+        design=first.design,
+        checked=checked,
+        yields=pipeline.yields(plan, answers),
+        answers=tuple(answers),
+        plan=plan,
+        bom=[
+            line.cells() for line in bill(first.design.circuit, first.modelfile.circuit, CATALOG)
+        ],
+        provenance=provenance(first.modelfile, CATALOG.hash, seed=1, spread={}),
+        command="designer run model.toml",
+    )  # fmt: skip
+    page = render_html(data)
+    assert render_markdown(data)
+    if CASES[name][0] == "rectifier":
+        assert "1N4148" in page
+        assert "LM4040C50" in page
