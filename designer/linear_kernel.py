@@ -16,6 +16,8 @@ from designer.system import Array, Index, Mask
 
 TINY = 1e-12
 """Allowance for rounding in every comparison of logarithms."""
+PAIR, COMPLETION = 3, 20
+"""Steps that a pair of resistors and a completion count for: a step is some nanoseconds."""
 R1, R2, R3, R4, R5, R7, R8, R9, R10, R11, C1, C2, C3, C4 = range(14)
 
 
@@ -135,7 +137,7 @@ def _ranges(
     """Ranges (low, high) of ln R4 and ln R11 that the conditions leave, in out[0], out[1].
 
     a, p : scales, each within ``slack`` of the nominal ones; c2 : range of ln C2.
-    """  # fmt: skip
+    """
     r, w, peaks = values.r, rules.w, rules.peaks
     low, high = r[0], r[-1]
     c_low = max(c2[0], rules.seconds[0] - a) - slack
@@ -166,6 +168,23 @@ def _ranges(
 
 
 @compiled
+def _tied(rules: Rules, delta: float, p: float, slack: float) -> bool:
+    """Whether ties between the masses allow these ratios of capacitors and of velocities.
+
+    Where R1 = R7 and C1 = C3, equal stiffness resistors need equal wanted products.
+    """
+    if not (rules.ties[R1, R7] and rules.ties[C1, C3]):
+        return True
+    w = rules.w
+    wanted = (-w[2], -p - delta - w[6], p - w[3], -delta - w[7])
+    for i, one in enumerate((R4, R10, R5, R11)):
+        for j, two in enumerate((R4, R10, R5, R11)):
+            if rules.ties[one, two] and abs(wanted[i] - wanted[j]) > slack:
+                return False
+    return True
+
+
+@compiled
 def _ratios(
     values: Values,
     rules: Rules,
@@ -175,30 +194,40 @@ def _ratios(
     by_upper: bool,
     centre: float,
     half: float,
+    most: int,
     found: Index,
-) -> int:
-    """Ratios within ``half`` of ``centre`` that some allowed pair of resistors has.
+) -> tuple[int, int]:
+    """Ratios within ``half`` of ``centre`` that some allowed pair of resistors has; the steps.
 
-    allowed : range of ln of the upper (else lower) resistor of the pair of parts.
-    """  # fmt: skip
-    count = 0
+    allowed : range of ln of the upper (else lower) resistor of the pair of parts. most : distinct
+    resistors that there may be, with those chosen already.
+    """
+    count, steps = 0, 0
     k = _below(values.ratios, centre - half)
     while k < len(values.ratios) and values.ratios[k] <= centre + half:
         for i in range(values.first[k], values.first[k + 1]):
+            steps += PAIR
             upper, lower = values.upper[i], values.lower[i]
             anchor = values.r[upper] if by_upper else values.r[lower]
             if (
-                anchor >= allowed[0]
-                and anchor <= allowed[1]
-                and _agree(rules, parts, pair[0], upper)
-                and _agree(rules, parts, pair[1], lower)
-                and (upper == lower or not rules.ties[pair[0], pair[1]])
+                anchor < allowed[0]
+                or anchor > allowed[1]
+                or not _agree(rules, parts, pair[0], upper)
+                or not _agree(rules, parts, pair[1], lower)
+                or (upper != lower and rules.ties[pair[0], pair[1]])
             ):
-                found[count] = k
-                count += 1
-                break
+                continue
+            if most < 10:
+                parts[pair[0]], parts[pair[1]] = upper, lower
+                kinds = _kinds(rules, parts)
+                parts[pair[0]] = parts[pair[1]] = -1
+                if kinds > most:
+                    continue
+            found[count] = k
+            count += 1
+            break
         k += 1
-    return count
+    return count, steps
 
 
 @compiled
@@ -232,6 +261,8 @@ def join(
             continue
         own = values.delta_c2[values.delta_first[i_delta] : values.delta_first[i_delta + 1]]
         c2 = (values.c[own[0]], values.c[own[-1]])
+        # C2 and C4 have a value of their own, and where they differ two, unless it is preferred.
+        most = rules.most - (0 if rules.free_c.any() else 1 + (abs(delta) > TINY))
         parts[:] = -1
         parts[R2] = i2
         v[0] = r[i2] + w2
@@ -258,6 +289,8 @@ def join(
                 centre = rules.peaks[1] - rules.peaks[3]
                 if abs(p - centre) > rules.level + 4 * level:
                     continue
+                if not _tied(rules, delta, p, 8 * level + TINY):
+                    continue
                 mean = 0.5 * (v[0] + v[1])
                 if not _ranges(values, rules, delta, c2, mean, p, 4 * level + TINY, allowed):
                     continue
@@ -277,25 +310,27 @@ def join(
                         abs(2 * v[0] - v[2] - v[3]) / 4,
                         abs(2 * v[1] - v[2] - v[3]) / 4,
                     )
-                    if not fits or spread > level + TINY or _kinds(rules, parts) > rules.most:
+                    if not fits or spread > level + TINY or _kinds(rules, parts) > most:
                         i8 += 1
                         continue
                     half = 4 * level + TINY
-                    count4 = _ratios(
+                    count4, taken = _ratios(
                         values, rules, parts, (R4, R10), allowed[0], True,
-                        delta + p + w[6] - w[2], half, found4,
+                        delta + p + w[6] - w[2], half, most, found4,
                     )  # fmt: skip
+                    steps += taken
                     if count4:
-                        count5 = _ratios(
+                        count5, taken = _ratios(
                             values, rules, parts, (R5, R11), allowed[1], False,
-                            delta + p + w[7] - w[3], half, found5,
+                            delta + p + w[7] - w[3], half, most, found5,
                         )  # fmt: skip
+                        steps += taken
                         for k in range(count5):
                             fives[k] = 0.5 * (values.ratios[found5[k]] - delta + w[3] - w[7])
                         for h in range(count4):
                             v[4] = 0.5 * (values.ratios[found4[h]] - delta + w[2] - w[6])
                             for k in range(count5):
-                                steps += 1
+                                steps += PAIR
                                 v[5] = fives[k]
                                 if abs(v[4] - v[5]) > 2 * level + TINY:
                                     continue
@@ -352,21 +387,22 @@ def _side(
     level: float,
     found: Index,
     numbers: Array,
-) -> tuple[int, bool]:
+) -> tuple[int, bool, int]:
     """Completions of one mass: stiffness pair, displacement integrator; error at most ``level``.
 
     found (room, 4) gets the upper and lower resistor, the integrator's resistor and capacitor;
     numbers (room, 4) the two further numbers of the minimax, the scale q and the error so far.
-    Returns how many, and whether there was room.
-    """  # fmt: skip
+    Returns how many, whether there was room, and the steps.
+    """
     r, w, peaks = values.r, rules.w, rules.peaks
     alpha, p = scales
     c2 = values.c[parts[C2]]
     upper, lower, resistor, capacitor = (R5, R11, R7, C3) if second else (R4, R10, R1, C1)
     w_up, w_low = (w[3], w[7]) if second else (w[2], w[6])
     place = 8 if second else 6
-    middle, count = 0.5 * (v[0] + v[1]), 0
+    middle, count, steps = 0.5 * (v[0] + v[1]), 0, 0
     for k in range(values.first[ratio], values.first[ratio + 1]):
+        steps += PAIR
         up, low = values.upper[k], values.lower[k]
         parts[upper] = parts[lower] = parts[resistor] = parts[capacitor] = -1
         if not _agree(rules, parts, upper, up):
@@ -390,6 +426,7 @@ def _side(
         wanted = 2 * middle + c2 - anchor
         i = _below(values.sums, wanted - 4 * level - TINY)
         while i < len(values.sums) and values.sums[i] <= wanted + 4 * level + TINY:
+            steps += COMPLETION
             parts[resistor] = parts[capacitor] = -1
             fits = _agree(rules, parts, resistor, values.sum_r[i])
             fits = fits and _agree(rules, parts, capacitor, values.sum_c[i])
@@ -401,7 +438,7 @@ def _side(
                 error = max(_largest(rules.six, v), _largest(rules.two if second else rules.one, v))
                 if error <= level + TINY:
                     if count == len(found):
-                        return count, False
+                        return count, False, steps
                     found[count, 0], found[count, 1] = up, low
                     found[count, 2], found[count, 3] = values.sum_r[i], values.sum_c[i]
                     numbers[count, 0], numbers[count, 1] = v[place], v[place + 1]
@@ -409,7 +446,7 @@ def _side(
                     count += 1
             i += 1
     parts[upper] = parts[lower] = parts[resistor] = parts[capacitor] = -1
-    return count, True
+    return count, True, steps
 
 
 @compiled
@@ -497,22 +534,23 @@ def complete(
         row = rows[i]
         delta = values.deltas[row[0]]
         for pick in range(values.delta_first[row[0]], values.delta_first[row[0] + 1]):
-            steps += 1
+            steps += COMPLETION
             good, alpha, p = _own(values, rules, row, pick, parts, v)
             if not good:
                 continue
             reached = max(reached, 1)
             scales = (alpha, p)
-            n1, full1 = _side(
+            n1, full1, taken1 = _side(
                 values, rules, parts, v, delta, scales, False, row[5], least, found1, numbers1
             )
+            steps += taken1
             if n1 == 0:
                 continue
-            n2, full2 = _side(
+            n2, full2, taken2 = _side(
                 values, rules, parts, v, delta, scales, True, row[6], least, found2, numbers2
             )
             whole = whole and full1 and full2
-            steps += n1 + n2
+            steps += taken2
             if n2 == 0:
                 continue
             reached = max(reached, 2)
@@ -527,7 +565,7 @@ def complete(
                 for k in order2:
                     if numbers2[k, 3] > least - gain:
                         break
-                    steps += 1
+                    steps += COMPLETION
                     _put(parts, found1[j], False)
                     error = _pair(rules, parts, v, p, found2[k], numbers1[j], numbers2[k])
                     if error > least - gain:
@@ -561,7 +599,7 @@ def gather(
     choice of the fewest. fewest : a number of distinct values that is known to be reached, or
     more. Returns the fewest values, how many groups and completions were written, whether nothing
     was left out for want of room or ``patience`` steps, and the steps.
-    """  # fmt: skip
+    """
     found1, found2 = np.zeros((room, 4), dtype=np.int64), np.zeros((room, 4), dtype=np.int64)
     numbers1, numbers2 = np.zeros((room, 4)), np.zeros((room, 4))
     kinds1, kinds2 = np.zeros((room, 1)), np.zeros((room, 1))
@@ -578,14 +616,14 @@ def gather(
             if not good or _kinds(rules, parts) > fewest:
                 continue
             scales = (alpha, p)
-            n1, full1 = _side(
+            n1, full1, taken1 = _side(
                 values, rules, parts, v, delta, scales, False, row[5], level, found1, numbers1
             )
-            n2, full2 = _side(
+            n2, full2, taken2 = _side(
                 values, rules, parts, v, delta, scales, True, row[6], level, found2, numbers2
             )
             whole = whole and full1 and full2
-            steps += 1 + n1 + n2
+            steps += COMPLETION + taken1 + taken2
             for k in range(n1):
                 _put(parts, found1[k], False)
                 kinds1[k, 0] = _kinds(rules, parts)
@@ -605,7 +643,7 @@ def gather(
                         reached and max(kinds1[j, 0], kinds2[k, 0]) >= fewest
                     ):
                         break
-                    steps += 1
+                    steps += COMPLETION
                     _put(parts, found1[j], False)
                     _put(parts, found2[k], True)
                     kinds = _kinds(rules, parts)

@@ -26,7 +26,7 @@ FIRST_LEVEL, GROWTH, LAST_LEVEL = 1e-9, 1.6, 0.1
 """Levels: the first, then 1e-6 and on by this factor, up to the last."""
 PROOF_TOLERANCE = 1e-6
 """An error this close to its lower bound counts as proved."""
-MOST_STEPS = 150_000_000
+MOST_STEPS = 600_000_000
 """Steps of the compiled loops that one search may take: a few seconds."""
 THINNED = (8, 4, 2)
 """Where the work runs out with nothing found: every 8th, 4th, 2nd resistor alone is searched."""
@@ -113,18 +113,21 @@ def best(
     if not np.isfinite(found.error):
         return _why(found, targets, signal, resistors, capacitors, bounds, wishes)
     limit = found.error + max(wishes.slack, 0.0)
-    pool, parts = pool_of(values, rules, found.parts, limit, prices, MOST_STEPS // 4)
+    pool, parts = pool_of(values, rules, found.parts, limit, prices, MOST_STEPS // 8)
     chosen = select(values, rules, pool, parts, limit, prices)
     index = chosen.parts
+    error = error_of(values, rules, index)
+    least = min(error, found.error)  # with work left over, the second stage may find better
+    bound = found.error if found.whole else min(found.empty, least)
     return LinearBlock(
         values={
             name: float((signal if i < 10 else capacitors)[index[i]])
             for i, name in enumerate(PARTS)
         },
-        error=error_of(values, rules, index),
-        least=found.error,
-        bound=found.error if found.whole else found.empty,
-        proved=found.whole or found.error <= found.empty + PROOF_TOLERANCE,
+        error=error,
+        least=least,
+        bound=bound,
+        proved=least <= bound + PROOF_TOLERANCE,
         proof=_proof(found, len(signal), len(capacitors)),
         solver=chosen.solver,
         cost=Cost(time.perf_counter() - began, found.rows, found.steps),

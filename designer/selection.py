@@ -20,7 +20,7 @@ from designer.system import Array, Index
 
 ROOM, GROUPS, COMPLETIONS = 1 << 13, 1 << 12, 1 << 14
 """Completions of one mass that are held for one group; groups and completions in all."""
-LARGEST = 600
+LARGEST = 300
 """Completions that the program holds; of more, those with the fewest values and least price."""
 SOLVER: dict[str, float | int] = {
     "mip_rel_gap": 0.0,
@@ -135,31 +135,34 @@ def _rows_of(parts: Index, places: list[int]) -> Index:
 
 def _largest(rules: Rules, pool: Pool, prices: Array) -> Pool:
     """Without the rows that have too many values by themselves, and no larger than the program
-    can be: whole groups, by the fewest values and the lowest price that their rows have."""
-    keep1 = kinds_of(rules, pool.parts1) <= pool.fewest
-    keep2 = kinds_of(rules, pool.parts2) <= pool.fewest
-    both = np.intersect1d(pool.group1[keep1], pool.group2[keep2])
-    score = {}
-    for g in both.tolist():
-        one, two = keep1 & (pool.group1 == g), keep2 & (pool.group2 == g)
-        own = int(kinds_of(rules, pool.parts1[one]).min() + kinds_of(rules, pool.parts2[two]).min())
-        price = float(prices[pool.parts1[one][0, [11, 13]]].sum())
-        score[g] = (own, price, g, int(one.sum() + two.sum()))
-    taken: list[int] = []
-    room = LARGEST
-    for _, _, g, size in sorted(score.values()):
-        if size <= room:
-            taken.append(g)
-            room -= size
-    keep1 &= np.isin(pool.group1, taken)
-    keep2 &= np.isin(pool.group2, taken)
+    can be: groups and rows with the fewest values and the lowest price first, and always the
+    choice that is known."""
+    sides = []
+    for parts, group in ((pool.parts1, pool.group1), (pool.parts2, pool.group2)):
+        kinds = kinds_of(rules, parts)
+        price = np.where(parts[:, 10:] >= 0, prices[np.maximum(parts[:, 10:], 0)], 0.0).sum(axis=1)
+        order = np.lexsort((np.arange(len(parts)), price, kinds))
+        order = order[kinds[order] <= pool.fewest]
+        sides.append((parts[order], group[order], kinds[order]))
+    (parts1, group1, kinds1), (parts2, group2, kinds2) = sides
+    both = np.intersect1d(group1, group2)
+    least = [kinds1[group1 == g].min() + kinds2[group2 == g].min() for g in both]
+    taken1, taken2 = np.zeros(len(parts1), dtype=bool), np.zeros(len(parts2), dtype=bool)
+    room, cut = LARGEST, False
+    for g in [0, *both[np.argsort(least, kind="stable")].tolist()]:
+        for group, taken in ((group1, taken1), (group2, taken2)):
+            own = np.flatnonzero((group == g) & ~taken)
+            share = max(room // 2, 0)
+            taken[own[:share]] = True
+            cut = cut or len(own) > share
+        room = LARGEST - int(taken1.sum() + taken2.sum())
     return Pool(
-        pool.parts1[keep1],
-        pool.group1[keep1],
-        pool.parts2[keep2],
-        pool.group2[keep2],
+        parts1[taken1],
+        group1[taken1],
+        parts2[taken2],
+        group2[taken2],
         pool.fewest,
-        pool.whole and len(taken) == len(both),
+        pool.whole and not cut,
     )
 
 
@@ -259,7 +262,7 @@ def _solve(
         cp.sum(z2) == 1,
         member[0] @ z1 == member[1] @ z2,
         cp.abs(offsets[0].T @ z1 + offsets[1].T @ z2 + D @ shift) <= 1.0 + 1e-7,
-        kinds >= pool.fewest,
+        kinds == pool.fewest,
     ]
     if np.isfinite(rules.share):
         # ln of x2's peak voltage over x1's: p - q1 + q3.
