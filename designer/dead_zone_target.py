@@ -96,3 +96,16 @@ def outside(found: float, interval: tuple[float, float]) -> float:
     """ln of how far a positive value lies above (below: negative) an interval; 0 inside."""
     over, under = np.log(found / interval[1]), np.log(found / interval[0])
     return float(max(over, 0.0) + min(under, 0.0))
+
+
+def parts_of(kind: str, sides: str) -> tuple[str, ...]:
+    """Names of the resistors that the stage has, R50 included."""
+    if kind == "rectifier":
+        halves = {
+            "both": range(200, 208),
+            "upper": (200, 201, 202, 206),
+            "lower": (203, 204, 205, 207),
+        }
+        return ("R50", *(f"R{i}" for i in halves[sides]))
+    last = 211 if sides == "both" else 213
+    return ("R50", *(f"R{i}" for i in range(200, last)))

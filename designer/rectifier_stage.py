@@ -16,7 +16,14 @@ import numpy as np
 from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget, outside
 from designer.system import Array, Mask
 from designer.value_program import Ranking, Rows, choose, fewest
-from designer.value_tables import ValueTable, between, combinations, distance, how_many_between
+from designer.value_tables import (
+    ValueTable,
+    between,
+    combinations,
+    distance,
+    how_many_between,
+    inside,
+)
 
 HALVES = {
     "both": ("R200", "R201", "R202", "R206"),
@@ -124,7 +131,7 @@ def _pairs(target: DeadZoneTarget, lists: Lists, limits: Limits) -> tuple[ValueT
     source, _, feedback, _ = lists.names
     pairs = combinations((source, feedback), lists.of, lists.tie)
     gain = pairs[feedback] / pairs[source]
-    pairs = pairs.take(_inside(gain, limits.gain))
+    pairs = pairs.take(inside(gain, limits.gain))
     if len(pairs) == 0:
         return pairs, "stop slope"
     inputs, place = np.unique(pairs[source], return_inverse=True)
@@ -235,7 +242,7 @@ def _main_rows(
     like = next(name for name in rows.table.names if lists.group(name) == lists.group(feed))
     table = rows.table.beside(_column(feed, rows.table[like]))
     current = _current(target, table[feed], table[reference])
-    fine = _inside(current, target.reference_current)
+    fine = inside(current, target.reference_current)
     fine &= np.isin(table[feed], lists.of[feed])
     rows = Rows(table, rows.error, rows.key).take(np.flatnonzero(fine))
     return rows.take(fewest(rows, free, ROWS))
@@ -249,7 +256,7 @@ def _feed_rows(target: DeadZoneTarget, lists: Lists, main: Rows, free: frozenset
     for key in np.unique(main.key):
         value = main.table[reference][main.key == key][:1]
         every = lists.of[feed]
-        fine = every[_inside(_current(target, every, value), target.reference_current)]
+        fine = every[inside(_current(target, every, value), target.reference_current)]
         order = np.lexsort((-fine, ~np.isin(fine, known)))
         found.append((fine[order[:FEEDS]], int(key)))
     values = np.concatenate([v for v, _ in found])
@@ -268,10 +275,6 @@ def _equal(rows: Rows, lists: Lists, name: str, fine: Mask | None = None) -> Row
 
 def _column(name: str, values: Array) -> ValueTable:
     return ValueTable((name,), values[:, None])
-
-
-def _inside(values: Array, limits: tuple[float, float]) -> Mask:
-    return np.asarray((values >= limits[0] * (1.0 - 1e-9)) & (values <= limits[1] * (1.0 + 1e-9)))
 
 
 def errors(target: DeadZoneTarget, values: Mapping[str, float]) -> dict[str, float]:

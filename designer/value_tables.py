@@ -31,6 +31,11 @@ class ValueTable:
         """(rows,) values of one part."""
         return np.asarray(self.values[:, self.names.index(name)])
 
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Values by part."""
+        return {name: self[name] for name in self.names}
+
     def take(self, which: Index | Mask) -> ValueTable:
         """The rows of an index or mask array."""
         return ValueTable(self.names, self.values[which])
@@ -108,3 +113,8 @@ def new_values(values: Array, free: frozenset[float]) -> Index:
     ordered = np.sort(np.where(known, 0.0, values), axis=-1)
     kinds = 1 + (np.diff(ordered, axis=-1) > 0.0).sum(axis=-1)
     return np.asarray(kinds - known.any(axis=-1))
+
+
+def inside(values: Array, limits: tuple[float, float]) -> Mask:
+    """Which values lie in a range, its ends included."""
+    return np.asarray((values >= limits[0] * (1.0 - 1e-9)) & (values <= limits[1] * (1.0 + 1e-9)))
