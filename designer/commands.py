@@ -115,6 +115,9 @@ def run(
 def synthesise(
     model: Source,
     out: Out = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Beside the paper's values; needs no --out.")
+    ] = False,
     seed: Seed = 1,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
@@ -127,11 +130,15 @@ def synthesise(
     """Choose the parts and write the design folder."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer import job
+        from designer.modelfile import read_model_file
 
         options = job.Options(seed, jobs, overwrite=overwrite, resume=resume)
         options.check()
-        modelfile, folder = job.source(model, out)
-        outcome = job.synthesise_into(modelfile, folder, options, progress)
+        if compare and out is None and not model.is_dir():
+            outcome = job.compare_in_memory(read_model_file(model), options, progress)
+        else:
+            modelfile, folder = job.source(model, out)
+            outcome = job.synthesise_into(modelfile, folder, options, progress, compare=compare)
     return _answer(outcome, json, quiet, "synthesise")
 
 
@@ -323,7 +330,10 @@ def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
             "tolerance": show.tolerance,
         }
         shows[verb](answer)
-        show.files(outcome.folder, outcome.reused)
+        if "comparison" in answer:
+            show.compared(answer["comparison"])
+        if outcome.folder is not None:
+            show.files(outcome.folder, outcome.reused)
     return 0 if outcome.satisfied else 1
 
 

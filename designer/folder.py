@@ -1,10 +1,10 @@
 """The design folder on disk: its manifest, what may be replaced, what is complete.
 
 ``manifest.json`` lists every file that the tool wrote, with its hash, and the stages (``design``,
-``study``) with the hash of their inputs. A stage with the same inputs is not done again; one with
-others only with ``--overwrite``, which touches listed files and no others. A stage's files are
-listed before the first of them is written, so that interrupted work can be told from foreign
-files.
+``study``, ``comparison``) with the hash of their inputs. A stage with the same inputs is not done
+again; one with others only with ``--overwrite``, which touches listed files and no others. A
+stage's files are listed before the first of them is written, so that interrupted work can be told
+from foreign files.
 """
 
 from __future__ import annotations
@@ -27,10 +27,13 @@ MODEL = "model.toml"
 DESIGN = "design.json"
 TOLERANCE = "tolerance.json"
 REPORTS = ("report.html", "report.md")
+COMPARISON, COMPARISON_PICTURES = "compare.json", ("compare.svg", "compare.png")
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "bom.csv", "setup.csv", "scales.csv")
 
-StageName = Literal["design", "study"]
-STAGES: tuple[StageName, ...] = ("design", "study")
+StageName = Literal["design", "study", "comparison"]
+STAGES: tuple[StageName, ...] = ("design", "study", "comparison")
+OF_DESIGN: tuple[StageName, ...] = ("study", "comparison")
+"""Stages that depend on the design, and on it alone."""
 State = Literal["new", "same", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000
 
@@ -143,7 +146,7 @@ class Folder:
                     "another than in manifest.json, or no file",
                     "the file as it was written, or --overwrite to make it again",
                 )
-            if state != "same" or changed is not None or (todo and stage == "study"):
+            if state != "same" or changed is not None or ("design" in todo and stage in OF_DESIGN):
                 todo.append(stage)
         listed = {} if self.manifest is None else self.manifest.files
         for stage in todo:
@@ -182,10 +185,11 @@ class Folder:
         manifest = self.manifest or Manifest()
         with _writing(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-        if "design" in wanted and manifest.stages.get("study"):
-            del manifest.stages["study"]
+        if "design" in wanted:
+            for stage in OF_DESIGN:
+                manifest.stages.pop(stage, None)
             manifest.files = {
-                n: ("replaced" if s == "study" else s, d) for n, (s, d) in manifest.files.items()
+                n: ("replaced" if s in OF_DESIGN else s, d) for n, (s, d) in manifest.files.items()
             }
         for stage, (inputs, names) in wanted.items():
             manifest.files = {

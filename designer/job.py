@@ -13,13 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import __version__, api, design_files, simulate_plots, simulation
+from designer import __version__, api, compare_files, design_files, simulate_plots, simulation
 from designer.api import RunResult, Synthesis
 from designer.blocks import BlockStore, block_names
 from designer.catalog import Catalog, load_catalog
 from designer.design_files import load
 from designer.errors import InputError
 from designer.folder import (
+    COMPARISON,
     DESIGN,
     DESIGN_FILES,
     MODEL,
@@ -29,7 +30,14 @@ from designer.folder import (
     StageName,
     is_design_folder,
 )
-from designer.jsonout import dumps, plain, run_json, simulate_json, study_json
+from designer.jsonout import (
+    dumps,
+    plain,
+    run_json,
+    simulate_json,
+    study_json,
+    synthesis_json,
+)
 from designer.modelfile import ModelFile, read_model_file
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
@@ -78,12 +86,13 @@ class Options:
 class Outcome:
     """What a verb answers: the JSON object, and whether the answer is yes.
 
-    reused : whether the folder held the answer already. result : None where it was reused.
+    folder : None where nothing was to be written. reused : whether the folder held the answer
+    already. result : None where it was reused.
     """
 
     answer: dict[str, Any]
     satisfied: bool
-    folder: Path
+    folder: Path | None
     reused: bool
     result: RunResult | None = None
 
@@ -120,24 +129,48 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
 
 
 def synthesise_into(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress, *, compare: bool = False
 ) -> Outcome:
-    """The verb ``synthesise``."""
+    """The verb ``synthesise``; with ``compare`` the comparison is a stage of its own."""
     options.check()
     catalog = load_catalog()
     folder = Folder(out)
     wanted = _wanted(modelfile, catalog, options, study=False)
-    if not folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
-        answer = folder.json(DESIGN)
-        return Outcome(answer, _all_found(answer), out, True)
+    if compare:
+        wanted["comparison"] = (wanted["design"][0], list(compare_files.NAMES))
+    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
+    if "design" in todo:
+        progress.stage("responses of the model, parts")
+        made = api.synthesise(modelfile, catalog)
+        with naming(modelfile):
+            files = design_files.texts(made)
+    elif todo:
+        made = load(folder, modelfile, catalog)
+    compared = compare_files.make(made, progress) if "comparison" in todo else None
+    if todo:
+        folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+    if "design" in todo:
+        design_files.write(folder, made, files)
+        folder.finish("design")
+    if compared is not None:
+        compare_files.write(folder, compared)
+        folder.finish("comparison")
+    answer = folder.json(DESIGN)
+    if compare:
+        answer = compare_files.beside(answer, folder.json(COMPARISON))
+    return Outcome(answer, _all_found(answer), out, not todo)
+
+
+def compare_in_memory(modelfile: ModelFile, options: Options, progress: Progress) -> Outcome:
+    """The verb ``synthesise`` with ``--compare`` and no folder: nothing is written."""
+    options.check()
     progress.stage("responses of the model, parts")
-    made = api.synthesise(modelfile, catalog)
-    with naming(modelfile):
-        files = design_files.texts(made)
-    folder.begin(wanted, design_files.design_provenance(made))
-    answer = design_files.write(folder, made, files)
-    folder.finish("design")
-    return Outcome(answer, _all_found(answer), out, False)
+    made = api.synthesise(modelfile)
+    compared = compare_files.make(made, progress)
+    said = design_files.design_provenance(made)
+    design = plain(synthesis_json(modelfile, made.design, made.found, said, made.seconds))
+    answer = compare_files.beside(design, plain(compared.file))
+    return Outcome(answer, _all_found(answer), None, False)
 
 
 def run_into(

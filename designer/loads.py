@@ -40,7 +40,7 @@ NEAR = 0.02
 BRACKET, ROUNDS = 16, 4
 """Parts of a bracket, and how often the best one is divided again."""
 WALK = 64
-"""Most modes between a guess and the mode that holds."""
+"""Steps that all states take together; what is not settled by then is looked up by itself."""
 
 
 @dataclass(frozen=True)
@@ -162,14 +162,17 @@ class _Sampled:
         self.system = reduction.system()
         self.run = run
         self.flow = Flow(self.system, run.drive)
-        self._strobe(LEAST_POINTS)
-        fastest = max(
-            run.drive.omega,
-            *(float(np.abs(np.linalg.eigvals(self.system.mode(k).A)).max()) for k in self.keys),
-        )
-        points = int(np.ceil(run.drive.period * fastest / RESOLUTION))
-        if points > LEAST_POINTS:
-            self._strobe(min(points, MOST_POINTS))
+        points = 0
+        needed = LEAST_POINTS
+        while needed > points:  # a finer look may meet a mode that a coarse one misses
+            points = needed
+            self._strobe(points)
+            fastest = max(run.drive.omega, *(_fastest(self.system.mode(k)) for k in self._held()))
+            needed = min(int(np.ceil(run.drive.period * fastest / RESOLUTION)), MOST_POINTS)
+
+    def _held(self) -> list[ModeKey]:
+        """Modes that hold at a strobe: not those that are only crossed in an instant."""
+        return [self.keys[int(i)] for i in np.unique(self.at)]
 
     def extremes(self) -> dict[tuple[str, str], float]:
         """By section: -lowest and highest voltage, largest current out of and into the output."""
@@ -256,6 +259,10 @@ class _Sampled:
         return values
 
 
+def _fastest(mode: Mode) -> float:
+    return float(np.abs(np.linalg.eigvals(mode.A)).max())
+
+
 def _brackets(values: Array) -> tuple[Index, Array, Array]:
     """Where a quantity (columns) may have its largest value: column, left and right strobe."""
     top = values.max(axis=0)
@@ -302,7 +309,12 @@ def _modes(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeKey
         if not moved:
             return at
         open_points = np.concatenate(moved)
-    raise ArithmeticError("no mode holds on the way")
+    for i in open_points:
+        key = system.mode_at(x[i], float(u[i]))
+        if key not in keys:
+            keys.append(key)
+        at[i] = keys.index(key)
+    return at
 
 
 def _guards(mode: Mode, x: Array, u: Array) -> Array:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any, BinaryIO, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -93,8 +93,8 @@ def to_svg(figure: Figure) -> str:
     return _LONG.sub(_short, text[text.index("<svg") :])
 
 
-def to_png(figure: Figure, path: Path, dpi: float = 160.0) -> None:
-    """Write the figure as PNG."""
+def to_png(figure: Figure, path: Path | BinaryIO, dpi: float = 160.0) -> None:
+    """Write the figure as PNG to a file or an open stream."""
     with style():
         figure.savefig(path, format="png", dpi=dpi, metadata={"Software": None})
 

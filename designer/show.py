@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from designer import compare_table
 from designer.catalog import Catalog
 from designer.quantity import format_quantity
 
@@ -126,6 +127,18 @@ def simulated(answer: Mapping[str, Any]) -> None:
             _line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
 
 
+def compared(answer: Mapping[str, Any]) -> None:
+    """The design beside the paper's."""
+    console = _console()
+    head, *rest = compare_table.rows(answer)
+    table = _table("Side by side", *head)
+    for cells in rest:
+        _row(table, *cells)
+    console.print(table)
+    for note in compare_table.notes(answer):
+        _line(console, note)
+
+
 def pictures(folder: Path, names: Sequence[str]) -> None:
     """Where the pictures are."""
     said = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
@@ -196,6 +209,7 @@ def _line(console: Console, text: str) -> None:
 
 __all__: Sequence[str] = (
     "catalog",
+    "compared",
     "files",
     "pictures",
     "run",

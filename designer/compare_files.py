@@ -1,0 +1,57 @@
+"""The stage ``comparison`` of a design folder: what is computed, and the files that hold it."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from designer.api import Synthesis
+from designer.compare import compare
+from designer.compare_json import comparison_json, file_json, in_answer
+from designer.design_files import design_provenance
+from designer.folder import COMPARISON, COMPARISON_PICTURES, Folder
+from designer.jsonout import dumps
+from designer.progress import Progress
+
+NAMES = (COMPARISON, *COMPARISON_PICTURES)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """file : the object of ``compare.json``."""
+
+    file: dict[str, Any]
+
+
+def make(made: Synthesis, progress: Progress) -> Compared:
+    """Compare; writes nothing."""
+    began = time.perf_counter()
+    answer = comparison_json(compare(made, lambda name: _said(progress, name)))
+    seconds = time.perf_counter() - began
+    return Compared(file_json(answer, made.modelfile.title, design_provenance(made), seconds))
+
+
+def write(folder: Folder, compared: Compared) -> None:
+    """The stage's files; the folder lists them already."""
+    from designer import compare_plots, plots  # matplotlib is not needed before this
+
+    folder.write(COMPARISON, dumps(compared.file))
+    figure = compare_plots.comparison(compared.file["columns"])
+    svg, png = COMPARISON_PICTURES
+    folder.write(svg, plots.to_svg(figure))
+    stream = io.BytesIO()
+    plots.to_png(figure, stream)
+    folder.write(png, stream.getvalue())
+
+
+def beside(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``synthesise --compare`` prints: the design's object, and the comparison in it."""
+    cost = {**design["cost"], "comparison_seconds": file["cost"]["seconds"]}
+    return {**design, "comparison": in_answer(file), "cost": cost}
+
+
+def _said(progress: Progress, name: str) -> None:
+    progress.stage(f"comparison: {name}")
