@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from designer.circuit import GROUND, Circuit, Section
+from designer.circuit import GROUND, Circuit, Resistor, Section
 
 
 @dataclass(frozen=True)
 class Branch:
-    """Conductance [S] between two nets: one resistor, or two in series that meet nothing else."""
+    """Conductance [S] between two nets."""
 
     a: str
     b: str
@@ -23,19 +24,21 @@ class Branch:
 
 
 def branches(circuit: Circuit) -> tuple[Branch, ...]:
-    """Every resistor; resistors in series that share a net with no other part are one branch."""
+    """The resistors, with the nets that only resistors meet taken out, star to mesh: the middle of
+    two in series, the tap of a divider."""
     found = [Branch(r.a, r.b, 1.0 / r.value) for r in circuit.resistors]
-    held = {GROUND, circuit.generator.net}.union(
-        *(p.nets for p in circuit.parts if p not in circuit.resistors)
-    )
+    held = {GROUND, circuit.generator.net, *(supply.net for supply in circuit.supplies)}
+    held = held.union(*(p.nets for p in circuit.parts if not isinstance(p, Resistor)))
     for net in circuit.nets:
-        at = [f for f in found if net in (f.a, f.b)]
-        if net in held or len(at) != 2:
+        if net in held:
             continue
-        one, two = at
-        together = 1.0 / (1.0 / one.siemens + 1.0 / two.siemens)
-        found = [f for f in found if f not in at]
-        found.append(Branch(one.other(net), two.other(net), together))
+        star = [f for f in found if net in (f.a, f.b)]
+        total = sum(f.siemens for f in star)
+        found = [f for f in found if f not in star]
+        found += [
+            Branch(one.other(net), two.other(net), one.siemens * two.siemens / total)
+            for one, two in combinations(star, 2)
+        ]
     return tuple(found)
 
 

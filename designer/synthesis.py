@@ -156,27 +156,32 @@ def _rounds(
 
 
 def _counted(order: Order, within: Limits) -> Attempt | Shortfall:
-    """An attempt that keeps the limit on distinct values, where there is one."""
+    """An attempt that keeps the limit on distinct values, where there is one.
+
+    What is over the limit is taken from the linear block's share, after a round in which whatever
+    only sets a level does with values that the linear block has.
+    """
     wishes = wishes_of(order.spec)
-    most = wishes.most_values
-    for number in range(ROUNDS):
-        linear = linear_block(order, within, wishes)
+    most, share = wishes.most_values, wishes.most_values
+    for number in range(ROUNDS + 1):
+        linear = linear_block(order, within, replace(wishes, most_values=share))
         if isinstance(linear, Shortfall):
             return linear
         made = attempt(order, within, wishes, linear, thrifty=number > 0)
         if most is None:
             return made
         if isinstance(made, Shortfall):
-            if made.what != "distinct values":
+            # With few values left the dead zone may fail for any reason.
+            if number == 0 and made.what != "distinct values":
                 return made
             over = 1
         else:
             over = made.kinds(wishes.preferred) - most
             if over <= 0:
                 return made
-        if number > 0:  # first without further values for what only sets a level
+        if number > 0:
             own = len(set(linear.values.values()) - wishes.preferred)
-            wishes = replace(wishes, most_values=max(own - over, 1))
+            share = max(min(own, most) - over, 1)
     return Shortfall("distinct values", False)
 
 
@@ -256,10 +261,11 @@ def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> 
         return float("inf") if isinstance(other, Shortfall) else other.design.errors.max_error
 
     active = [n for n in SIDE_CONDITIONS if n in kept and _acts(order, reached, n)]
-    if len(active) > 1 and without(kept) > error - WORTH:
+    least = error - WORTH - order.spec.slack  # inside the slack an error may lie anywhere
+    if len(active) > 1 and without(kept) > least:
         return {}
     costs = {name: without(frozenset({name})) for name in active}
-    return {name: cost for name, cost in costs.items() if cost < error - WORTH}
+    return {name: cost for name, cost in costs.items() if cost < least}
 
 
 def _acts(order: Order, reached: Reached, name: str) -> bool:
