@@ -180,16 +180,32 @@ def attempt(
             return Shortfall(found, True)
         zone = found
         values |= zone.values
+    try:
+        return _driven(order, limits, values, linear, zone, thrifty=thrifty)
+    except ArithmeticError:  # an output that is meant to be linear is not, within the clearance
+        return Shortfall("swing", False)
+
+
+def _driven(
+    order: Order,
+    limits: Limits,
+    values: dict[str, float],
+    linear: LinearBlock,
+    zone: DeadZone | None,
+    *,
+    thrifty: bool,
+) -> Attempt | Shortfall:
+    """The attempt with the drive's resistors, and the errors of its circuit."""
     # R6 and R12 do not enter the coefficients, so any value will do to find what they need.
     placeholder = float(order.resistors[-1])
     trial = values | dict.fromkeys(drive.NAMES, placeholder)
     errors = order.errors(order.build(trial), limits.swing)
-    driven = _drive(order, values, drive.per_ohm(model, errors, placeholder), thrifty)
+    driven = _drive(order, values, drive.per_ohm(order.model, errors, placeholder), thrifty)
     if isinstance(driven, Shortfall):
         return driven
-    values |= driven
-    circuit = order.build(values)
-    return Attempt(values, circuit, order.errors(circuit, limits.swing), linear, zone)
+    complete = values | driven
+    circuit = order.build(complete)
+    return Attempt(complete, circuit, order.errors(circuit, limits.swing), linear, zone)
 
 
 def _dead_zone(

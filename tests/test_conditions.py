@@ -90,9 +90,7 @@ def test_loads_count_every_resistor_at_an_output() -> None:
     def parallel(*ohms: float) -> float:
         return 1.0 / sum(1.0 / r for r in ohms)
 
-    assert by_name["U1A"].load == pytest.approx(
-        parallel(v["R4"], v["R10"], v["R100"], v["R200"], v["R206"])
-    )
+    assert by_name["U1A"].load == pytest.approx(parallel(v["R4"], v["R100"], v["R200"], v["R206"]))
     assert by_name["U3D"].load == pytest.approx(parallel(v["R50"], v["R210"]))
     divider = v["R204"] + parallel(v["R205"], v["R208"])
     assert by_name["U3C"].load == pytest.approx(parallel(v["R203"], divider))
