@@ -11,6 +11,7 @@ from typing import Any
 
 from designer import equation_check, pipeline
 from designer.catalog import Catalog, load_catalog
+from designer.design import Design
 from designer.equation_check import EquationCheck
 from designer.modelfile import ModelFile
 from designer.montecarlo import Answer, StudyPlan, Yield
@@ -19,7 +20,6 @@ from designer.preconditions import at_least, cores, naming, need_responses, requ
 from designer.progress import Progress
 from designer.responses import ModelResponse
 from designer.study import SAMPLES, SEED, Study, tolerance
-from designer.synthesis import Design
 from designer.workers import SpicePool
 
 

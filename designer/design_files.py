@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from designer import deck, matching, topology
 from designer.api import Synthesis
 from designer.bom import bill, bill_csv
@@ -13,6 +15,7 @@ from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.coefficients import coefficient_errors
 from designer.deck import Excitation, SolverSettings
+from designer.design import Certificate, Check, Design
 from designer.errors import InputError
 from designer.folder import DESIGN, MODEL, Folder
 from designer.jsonout import dumps, synthesis_json
@@ -23,7 +26,6 @@ from designer.provenance import provenance
 from designer.responses import find, on_circuit, peaks
 from designer.selection import SOLVER
 from designer.setup_table import scales_csv, setup_csv
-from designer.synthesis import SWING_SHARE, Certificate, Design
 
 DECK_PERIODS = 20
 """Drive periods that ``circuit.cir`` runs for."""
@@ -81,23 +83,29 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             supply=float(said["circuit"]["supply"]),
             saturation=float(said["circuit"]["saturation"]),
             clearance="A" if model.k0 > 0.0 else None,
-            zone=topology.zone_of(spec.dead_zone, model.sides, catalog),
-            composites=said["circuit"].get("composites", {}),
+            zone=topology.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+            composites=said.get("composites", {}),
         )
         gain, bias = (float(said["circuit"][k]) for k in ("gain", "bias"))
         circuit = replace(circuit, gain=gain, bias=bias)
-        swing = (SWING_SHARE * circuit.saturation, peaks(model, found).states)
+        held = peaks(model, found).states
+        volts = np.array(list(said["scales"]["volts"].values()), dtype=float)
+        swing = (float((volts * held).max()), held)
         errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
         if abs(errors.max_error - float(said["max_error"])) > 1e-9:
             raise ValueError("parts and max_error do not belong together")
+        kept = said["conditions"]
+        told = {key: kept.get(key, ()) for key in ("checked", "at_limit", "binding")}
         design = Design(
             model=model,
             circuit=circuit,
             errors=errors,
             certificate=Certificate(**said["certificate"]),
-            conditions=dict(said["conditions"]),
+            conditions={k: float(v) for k, v in kept.items() if k not in told},
             solver=dict(said["solver"]),
             seconds=float(said["cost"]["synthesis_seconds"]),
+            checks=tuple(Check(**check) for check in told["checked"]),
+            binding=dict(told["binding"]),
         )
     except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.design import Design
     from designer.equation_check import EquationCheck
     from designer.modelfile import ModelFile
     from designer.montecarlo import Answer
@@ -22,7 +23,6 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.responses import ModelResponse
     from designer.simulation import Simulated
     from designer.study import Study
-    from designer.synthesis import Design
 
 FORMAT = 1
 
@@ -59,7 +59,6 @@ def synthesis_json(
     seconds: float,
 ) -> dict[str, Any]:
     """What ``synthesise`` prints and ``design.json`` holds."""
-    from designer.resistors import composites_of
     from designer.setup_table import STATES, settings
 
     errors, circuit = design.errors, design.circuit
@@ -73,9 +72,9 @@ def synthesis_json(
             "bias": circuit.bias,
             "supply": circuit.supply,
             "saturation": circuit.saturation,
-            "composites": composites_of(circuit),
         },
         "parts": circuit.values,
+        "composites": design.composites,
         "errors": errors.errors,
         "max_error": errors.max_error,
         "certificate": dict(design.certificate.__dict__),
@@ -97,7 +96,7 @@ def synthesis_json(
         ],
         "dead_zone": _dead_zone(modelfile, design),
         "distinct_values": design.distinct_values,
-        "conditions": design.conditions,
+        "conditions": _conditions(design),
         "solver": design.solver,
         "provenance": provenance,
         "cost": {"seconds": seconds, "synthesis_seconds": design.seconds},
@@ -270,6 +269,16 @@ def _kind(answer: Answer) -> str:
     if answer.reason.startswith("asymmetric by"):
         return "asymmetric"
     return answer.reason
+
+
+def _conditions(design: Design) -> dict[str, Any]:
+    """Limits by name; what the finished circuit has; which conditions are near, which cost."""
+    return {
+        **design.conditions,
+        "checked": [dict(check.__dict__) for check in design.checks],
+        "at_limit": sorted({check.name for check in design.checks if check.at_limit}),
+        "binding": dict(design.binding),
+    }
 
 
 def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:

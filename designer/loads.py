@@ -17,12 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from designer.design import Design
 from designer.errors import InputError
 from designer.flow import Flow, FlowStatus
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.responses import ModelResponse, circuit_flow, on_circuit
-from designer.synthesis import Design
 from designer.system import Array, Drive, Index, Mode, ModeKey, PiecewiseLinearSystem
 
 REST = 20

@@ -26,27 +26,37 @@ from typing import Annotated, Literal, NoReturn
 
 from pydantic import BaseModel, Field
 
+from designer.circuitspec import CircuitSpec, CircuitTable
 from designer.errors import InputError
-from designer.eseries import SERIES
 from designer.model import Dimensionless, Mechanical, Sides
 from designer.schema import (
     STRICT,
     Accepts,
     checked,
     choice,
-    did_you_mean,
     exactly,
     flag,
     line,
     number,
     parse_toml,
+    physical,
     shown,
     span,
 )
 
+__all__ = [
+    "MAX_BYTES",
+    "MAX_PERIODS",
+    "CircuitSpec",
+    "Expect",
+    "ModelFile",
+    "Response",
+    "Twin",
+    "parse_model_file",
+    "read_model_file",
+]
+
 Twin = Literal["either", "exact"]
-DeadZone = Literal["saturation", "rectifier"]
-Objective = Literal["match", "yield"]
 
 MAX_BYTES = 1_000_000
 """A model file is a page of text; anything larger is something else."""
@@ -104,30 +114,6 @@ class Response:
     def accepts(self, n: int, p: int, q: int) -> bool:
         """Whether n-p-q is what is expected here; without an expectation, anything is."""
         return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
-
-
-@dataclass(frozen=True)
-class CircuitSpec:
-    """What the circuit is to be made of and how it is to be chosen; the defaults of a model file.
-
-    supply, saturation [V] (saturation None: the catalogue's); grades as fractions (0.01 is 1 %);
-    resistor_range [Ω], capacitor_range [F]; frequency [Hz] is the band for ω = 1.
-    """
-
-    opamp: str = "TL074C"
-    supply: float = 15.0
-    saturation: float | None = None
-    resistors: tuple[str, ...] = ("E96",)
-    capacitors: tuple[str, ...] = ("E12",)
-    resistor_grade: float = 0.01
-    capacitor_grade: float = 0.01
-    resistor_range: tuple[float, float] = (1e3, 1e6)
-    capacitor_range: tuple[float, float] = (1e-9, 1e-6)
-    frequency: tuple[float, float] = (50.0, 1000.0)
-    dead_zone: DeadZone = "saturation"
-    objective: Objective = "match"
-    composites: bool = False
-    side_conditions: bool = True
 
 
 @dataclass(frozen=True)
@@ -295,42 +281,9 @@ def _positive(value: float) -> bool:
     return value > 0.0
 
 
-def _not_negative(value: float) -> bool:
-    return value >= 0.0
-
-
 def _plain(domain: str) -> Accepts:
     """A number; ``Dimensionless`` holds it to the domain, which is only told here."""
     return number("", f"a number {domain}")
-
-
-def _physical(unit: str, *, zero: bool = False) -> Accepts:
-    bound = ">= 0" if zero else "> 0"
-    expected = f"a number {bound} in {unit}, or text such as {_EXAMPLES[unit]}"
-    return number(unit, expected, _not_negative if zero else _positive)
-
-
-_EXAMPLES = {
-    "kg": '"2.5 kg"',
-    "N s/m": '"55 N s/m"',
-    "N/m": '"12 kN/m"',
-    "m": '"0.5 mm"',
-    "N": '"80 N"',
-    "rad/s": '"240 rad/s"',
-    "V": '"15 V"',
-    "Ω": '"22.1k"',
-    "F": '"100nF"',
-    "Hz": '"1 kHz"',
-}
-
-
-def _physical_span(unit: str) -> Accepts:
-    expected = f"a range [low, high] of numbers > 0 in {unit}, or texts such as {_EXAMPLES[unit]}"
-    return span(unit, expected, _positive)
-
-
-def _grade() -> Accepts:
-    return number("", "a fraction in (0, 1): 0.01 is 1 %", lambda value: 0.0 < value < 1.0)
 
 
 def _omega() -> Accepts:
@@ -364,21 +317,6 @@ def _clearance() -> Accepts:
     return Accepts(expected, check)
 
 
-def _series() -> Accepts:
-    def check(value: object) -> tuple[str, ...]:
-        names = [value] if isinstance(value, str) else value
-        if not isinstance(names, list) or not names:
-            raise ValueError
-        for name in names:
-            if not isinstance(name, str):
-                raise ValueError
-            if name not in SERIES:
-                raise ValueError(did_you_mean(name, SERIES))
-        return tuple(dict.fromkeys(names))
-
-    return Accepts("one or a list of " + ", ".join(SERIES), check)
-
-
 # The tables of a file, key by key.
 
 
@@ -396,47 +334,27 @@ class _ModelTable(BaseModel):
 
 class _MechanicalTable(BaseModel):
     model_config = STRICT
-    M1: Annotated[float, _physical("kg")]
-    M2: Annotated[float, _physical("kg")]
-    C1: Annotated[float, _physical("N s/m")]
-    C2: Annotated[float, _physical("N s/m", zero=True)]
-    K0: Annotated[float, _physical("N/m", zero=True)]
-    K1: Annotated[float, _physical("N/m")]
-    K2: Annotated[float, _physical("N/m", zero=True)]
-    B: Annotated[float, _physical("m")]
-    P1: Annotated[float, _physical("N", zero=True)]
-    P2: Annotated[float, _physical("N", zero=True)]
+    M1: Annotated[float, physical("kg")]
+    M2: Annotated[float, physical("kg")]
+    C1: Annotated[float, physical("N s/m")]
+    C2: Annotated[float, physical("N s/m", zero=True)]
+    K0: Annotated[float, physical("N/m", zero=True)]
+    K1: Annotated[float, physical("N/m")]
+    K2: Annotated[float, physical("N/m", zero=True)]
+    B: Annotated[float, physical("m")]
+    P1: Annotated[float, physical("N", zero=True)]
+    P2: Annotated[float, physical("N", zero=True)]
     sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
 
 
 class _ResponseTable(BaseModel):
     model_config = STRICT
     omega: Annotated[float | Literal["best"] | None, _omega()] = None
-    Omega: Annotated[float | None, _physical("rad/s")] = None
+    Omega: Annotated[float | None, physical("rad/s")] = None
     expect: Annotated[Expect | None, _expect()] = None
     twin: Annotated[Twin, choice("either", "exact")] = "either"
     symmetric: Annotated[bool | None, flag()] = None
     b: Annotated[float | tuple[float, float] | None, _clearance()] = None
-
-
-class _CircuitTable(BaseModel):
-    model_config = STRICT
-    opamp: Annotated[str, line("the name of an op-amp of the catalogue")] = CircuitSpec.opamp
-    supply: Annotated[float, _physical("V")] = CircuitSpec.supply
-    saturation: Annotated[float | None, _physical("V")] = CircuitSpec.saturation
-    resistors: Annotated[tuple[str, ...], _series()] = CircuitSpec.resistors
-    capacitors: Annotated[tuple[str, ...], _series()] = CircuitSpec.capacitors
-    resistor_grade: Annotated[float, _grade()] = CircuitSpec.resistor_grade
-    capacitor_grade: Annotated[float, _grade()] = CircuitSpec.capacitor_grade
-    resistor_range: Annotated[tuple[float, float], _physical_span("Ω")] = CircuitSpec.resistor_range
-    capacitor_range: Annotated[tuple[float, float], _physical_span("F")] = (
-        CircuitSpec.capacitor_range
-    )
-    frequency: Annotated[tuple[float, float], _physical_span("Hz")] = CircuitSpec.frequency
-    dead_zone: Annotated[DeadZone, choice("saturation", "rectifier")] = CircuitSpec.dead_zone
-    objective: Annotated[Objective, choice("match", "yield")] = CircuitSpec.objective
-    composites: Annotated[bool, flag()] = CircuitSpec.composites
-    side_conditions: Annotated[bool, flag()] = CircuitSpec.side_conditions
 
 
 class _File(BaseModel):
@@ -448,4 +366,4 @@ class _File(BaseModel):
     response: tuple[_ResponseTable, ...] = Field(
         (), strict=False, description="one table [[response]] for each response"
     )
-    circuit: _CircuitTable = Field(_CircuitTable(), description="a table [circuit]")
+    circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")

@@ -15,6 +15,7 @@ from designer import gate
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.deck import Excitation
+from designer.design import Design
 from designer.flow import Flow
 from designer.gate import GateResult
 from designer.modelfile import ModelFile
@@ -24,7 +25,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.responses import ModelResponse, circuit_flow, find, on_circuit, peaks
 from designer.spread import Spread
-from designer.synthesis import Design, check_choices, synthesise
+from designer.synthesis import check_choices, synthesise
 from designer.system import Array, Drive
 from designer.workers import SpicePool
 
@@ -93,7 +94,7 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     check_choices(modelfile.model, modelfile.circuit, catalog)
     found = find(modelfile.model, modelfile.responses)
     return found, synthesise(
-        modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found)
+        modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found
     )
 
 

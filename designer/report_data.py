@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from designer.bom import bill
+from designer.design import Design
 from designer.modelfile import ModelFile
 from designer.montecarlo import Answer, StudyPlan, Verdict, Yield
 from designer.pipeline import Checked
-from designer.synthesis import Design
 
 if TYPE_CHECKING:
     from designer.api import RunResult

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from designer import orbit_plots, study_plots
 from designer import report_words as words
+from designer.design import Design
 from designer.pipeline import traces
 from designer.plots import EXACT, to_svg
 from designer.report_data import ReportData
-from designer.synthesis import Design
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ import numpy as np
 
 from designer import report_words as words
 from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
+from designer.design import Design
 from designer.gate import shortest_contact
 from designer.montecarlo import Answer, Verdict, Yield
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
 from designer.plots import EXACT
 from designer.report_data import ReportData
-from designer.synthesis import Design
 
 REASONS_SHOWN = 5
 """Kinds of loss that are named; the rest is counted."""

@@ -63,6 +63,15 @@ class Resistors:
             )
 
 
+def effective(values: Mapping[str, float], composites: Mapping[str, Composite]) -> dict[str, float]:
+    """Values by the names of a circuit without composites: NAME instead of NAMEA and NAMEB."""
+    out = dict(values)
+    for name, kind in composites.items():
+        a, b = out.pop(f"{name}A"), out.pop(f"{name}B")
+        out[name] = a + b if kind == "series" else a * b / (a + b)
+    return out
+
+
 def composites_of(circuit: Circuit) -> dict[str, Composite]:
     """The resistors of a circuit that are two parts, and how those are joined."""
     found: dict[str, Composite] = {}

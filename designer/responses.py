@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from designer import harmonics
 from designer.attractor import coexisting, settle, starts, twin
+from designer.design import Design, Peaks
 from designer.errors import InputError
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.modelfile import Response
 from designer.orbit import Orbit, OrbitStatus
-from designer.synthesis import Design, Peaks
 from designer.system import Array, Drive, PiecewiseLinearSystem
 
 SLOWEST, FASTEST = 1e-3, 1e3
@@ -95,7 +96,8 @@ def matches(orbit: Orbit, spec: Response) -> bool:
 
 
 def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
-    """Largest states and deepest penetration over all responses and their starts from rest."""
+    """Largest states, deepest penetration over all responses and their starts from rest, and the
+    highest harmonic of the responses."""
     runs: list[tuple[Dimensionless, float, Orbit]] = [
         (replace(model, b=r.b), r.omega, r.orbit) for r in found
     ]
@@ -103,7 +105,8 @@ def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
         system = model.second_order().piecewise_linear()
         rest = np.zeros(system.size)
         runs = [(model, w, settle(Flow(system, Drive(w)), rest)) for w in SCOUT]
-    states, depth = np.zeros(4), 0.0
+    stopped = {"both": (1, -1), "upper": (1,), "lower": (-1,)}[model.sides]
+    states, depth, excursion, fastest = np.zeros(4), 0.0, 0.0, 0.0
     for variant, omega, orbit in runs:
         system = variant.second_order().piecewise_linear()
         flow = Flow(system, Drive(omega))
@@ -112,11 +115,16 @@ def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
             spans.append(orbit.extremes)
         elif len(orbit.start):
             spans.append(flow.run(orbit.start, 200, measure=True).extremes)
+        fastest = max(fastest, harmonics.fastest(flow, orbit))
         scale = model.b / variant.b  # the generator's amplitude follows b, the threshold stays
         for span in spans:
             states = np.maximum(states, scale * np.abs(span).max(axis=1))
-            depth = max(depth, scale * float(np.abs(span[0]).max() - variant.b))
-    return Peaks(states, depth)
+            for side, reach in ((1, span[0, 1]), (-1, -span[0, 0])):
+                if side in stopped:
+                    depth = max(depth, scale * float(reach - variant.b))
+                else:
+                    excursion = max(excursion, scale * float(reach))
+    return Peaks(states, depth, excursion, fastest)
 
 
 def on_circuit(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Orbit:

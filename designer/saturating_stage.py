@@ -56,7 +56,8 @@ def bias(target: DeadZoneTarget, v: Mapping[str, Array], per_ohm: Array) -> Arra
     shift = steep(v) * target.supply * v["R200"] / v["R211"]
     threshold = (target.saturation - shift) / steep(v)
     left = shift / through(v) - target.supply / v["R212"]
-    return np.asarray(target.mu * left / (per_ohm * threshold))
+    # A shift as large as the range leaves no threshold: such rows are no choice, whatever is left.
+    return np.asarray(target.mu * left / (per_ohm * np.maximum(threshold, 1e-12)))
 
 
 def quiet(v: Mapping[str, Array]) -> Array:

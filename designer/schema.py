@@ -91,6 +91,34 @@ def span(unit: str, expected: str, fine: Callable[[float], bool]) -> Accepts:
     return Accepts(expected, check)
 
 
+def physical(unit: str, *, zero: bool = False) -> Accepts:
+    """A number > 0 (or >= 0) with a unit of ``EXAMPLES``, or text that ends in it."""
+    bound = ">= 0" if zero else "> 0"
+    expected = f"a number {bound} in {unit}, or text such as {EXAMPLES[unit]}"
+    return number(unit, expected, lambda value: value > 0.0 or (zero and value == 0.0))
+
+
+def physical_span(unit: str) -> Accepts:
+    """A range of numbers > 0 with a unit of ``EXAMPLES``."""
+    expected = f"a range [low, high] of numbers > 0 in {unit}, or texts such as {EXAMPLES[unit]}"
+    return span(unit, expected, lambda value: value > 0.0)
+
+
+EXAMPLES = {
+    "kg": '"2.5 kg"',
+    "N s/m": '"55 N s/m"',
+    "N/m": '"12 kN/m"',
+    "m": '"0.5 mm"',
+    "N": '"80 N"',
+    "rad/s": '"240 rad/s"',
+    "V": '"15 V"',
+    "Ω": '"22.1k"',
+    "F": '"100nF"',
+    "Hz": '"1 kHz"',
+}
+"""How a value of each unit may be written."""
+
+
 def choice(*names: str) -> Accepts:
     """One of the named words."""
     listed = ", ".join(f'"{name}"' for name in names[:-1])

@@ -1,28 +1,27 @@
-"""The mixed-integer program that turns ratios into parts: least error, fewest kinds, least price.
+"""The mixed-integer program that chooses among equals: fewest distinct values, least price.
 
-Input is a complete ``RatioTable`` at some level and its completions (``designer.completion``).
-cvxpy and HiGHS choose one completion of each mass that agree, with the four scales as continuous
-variables. The solver's status is never believed: the choice is rebuilt from its rows and its error
-computed afresh.
+The joins leave every choice that reaches the least error, and elementary inequalities those of
+them that can have the fewest distinct values. cvxpy and HiGHS choose one completion of each mass
+that agree, with the four scales as continuous variables. The solver is not believed: its choice
+is rebuilt from the values and its error computed afresh.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import cvxpy as cp
 import numpy as np
 
-from designer.completion import Bounds, Side, groups_of, sides_of
-from designer.linear_block import RatioTable, Targets
+from designer.linear_block import PARTS, slice_from
+from designer.linear_kernel import Rules, Values, gather
 from designer.minimax import minimax
 from designer.system import Array, Index
 
-KEEP_GROUPS, KEEP_ROWS = 40, 20
-"""Where more choices share the least error than the program can hold: how many go in."""
-LARGEST = 3000
-"""Rows that the program holds without leaving any out."""
+ROOM, GROUPS, COMPLETIONS = 1 << 13, 1 << 12, 1 << 14
+"""Completions of one mass that are held for one group; groups and completions in all."""
+LARGEST = 300
+"""Completions that the program holds; of more, those with the fewest values and least price."""
 SOLVER: dict[str, float | int] = {
     "mip_rel_gap": 0.0,
     "mip_abs_gap": 1e-9,
@@ -34,29 +33,19 @@ SOLVER: dict[str, float | int] = {
 """HiGHS options; they stand in the provenance. No time limit: it would make answers differ."""
 PRICE_WEIGHT = 1e-3
 """Of one price class against one distinct value: price only breaks ties."""
+LEAST_UNIT = 1e-9
+"""Errors are counted in units of the limit, and that is at least this."""
 
 
-@dataclass(frozen=True)
-class Selection:
-    """Values by part name, the error reached, whether nothing was left out, the solver's word."""
-
-    values: dict[str, float]
-    error: float
-    complete: bool
-    solver: str
-
-
-class Choice(NamedTuple):
-    """Row of the first and of the second side, and the solver's word for it."""
-
-    first: int
-    second: int
-    status: str
+OWN = [PARTS.index(name) for name in ("R2", "R9", "R3", "R8", "C2", "C4")]
+FIRST = [PARTS.index(name) for name in ("R4", "R10", "R1", "C1")]
+SECOND = [PARTS.index(name) for name in ("R5", "R11", "R7", "C3")]
+"""Places of a row's own parts, and of those that a completion of each mass brings."""
 
 
 @dataclass(frozen=True)
 class Shortfall:
-    """No completion: what leaves none, and whether every one was looked at."""
+    """No choice: what leaves none, and whether every one was looked at."""
 
     what: str
     whole: bool
@@ -64,265 +53,258 @@ class Shortfall:
 
 @dataclass(frozen=True)
 class Pool:
-    """What the program chooses from, each row's values in logarithms.
+    """What the program chooses from: indices of values.
 
-    own : (groups, 6) ln of R2, R3, R8, R9, C2, C4. first, second : completions of the masses.
+    parts1, parts2 : (k, 14), a completion of the first, of the second mass with its group's own
+    parts, -1 elsewhere. group1, group2 : (k,). fewest : distinct values that can be reached.
+    whole : nothing that could have as few is missing.
     """
 
-    groups: RatioTable
-    own: Array
-    first: Side
-    second: Side
+    parts1: Index
+    group1: Index
+    parts2: Index
+    group2: Index
+    fewest: int
+    whole: bool
 
-    @property
-    def rows(self) -> int:
-        return len(self.first) + len(self.second)
 
-    def take(self, first: Index, second: Index) -> Pool:
-        return Pool(self.groups, self.own, self.first.take(first), self.second.take(second))
+@dataclass(frozen=True)
+class Selection:
+    """parts (14,) : indices of the values chosen; the solver's word."""
 
-    def values(self, i: int, j: int) -> dict[str, float]:
-        """ln of every part for row i of the first and row j of the second side."""
-        g = int(self.first.group[i])
-        names = ("R2", "R3", "R8", "R9", "C2", "C4")
-        out = dict(zip(names, (float(v) for v in self.own[g]), strict=True))
-        for side, row, parts in (
-            (self.first, i, ("R4", "R10", "R1", "C1")),
-            (self.second, j, ("R5", "R11", "R7", "C3")),
+    parts: Index
+    solver: str
+
+
+def pool_of(
+    values: Values, rules: Rules, parts: Index, limit: float, prices: Array, patience: int
+) -> tuple[Pool, Index]:
+    """The completions that can belong to a choice of the fewest values, and one such choice.
+
+    parts : (14,) a choice with an error of at most ``limit``. patience : steps to take.
+    """
+    best, fewest = parts.copy(), int(kinds_of(rules, parts[None, :])[0])
+    first, second, label = [_rows_of(best, FIRST)], [_rows_of(best, SECOND)], 1
+    labels1, labels2 = [np.zeros(1, dtype=np.int64)], [np.zeros(1, dtype=np.int64)]
+    start, whole = 0, True
+    while start < len(values.deltas) * len(values.r) and patience > 0:
+        fewer = rules._replace(most=min(rules.most, fewest))
+        piece = slice_from(values, fewer, limit, start, patience)
+        groups = np.zeros((GROUPS, 2), dtype=np.int64)
+        own1 = np.zeros((COMPLETIONS, 5), dtype=np.int64)
+        own2 = np.zeros((COMPLETIONS, 5), dtype=np.int64)
+        now = best.copy()
+        count, n, n1, n2, full, taken = gather(
+            values, fewer, piece.rows, limit, patience, ROOM, fewest, groups, own1, own2, now
+        )
+        if count < fewest:
+            best, fewest = now, count
+        own1, own2, rows = own1[:n1], own2[:n2], piece.rows[groups[:n, 0]]
+        group = np.full((n, 14), -1, dtype=np.int64)
+        group[:, OWN] = np.column_stack(
+            [rows[:, 1:5], values.delta_c2[groups[:n, 1]], values.delta_c4[groups[:n, 1]]]
+        )
+        for own, places, into, labels in (
+            (own1, FIRST, first, labels1),
+            (own2, SECOND, second, labels2),
         ):
-            found = (side.upper, side.lower, side.resistor, side.capacitor)
-            out |= {name: float(v[row]) for name, v in zip(parts, found, strict=True)}
-        return out
+            filled = group[own[:, 0]]
+            filled[:, places] = own[:, 1:]
+            into.append(filled)
+            labels.append(own[:, 0] + label)
+        label, start = label + n, piece.following
+        whole = whole and full and not piece.cut
+        patience -= piece.steps + taken
+    whole = whole and start == len(values.deltas) * len(values.r)
+    pool = Pool(
+        np.concatenate(first),
+        np.concatenate(labels1),
+        np.concatenate(second),
+        np.concatenate(labels2),
+        fewest,
+        whole,
+    )
+    return _largest(rules, pool, prices), best
+
+
+def _rows_of(parts: Index, places: list[int]) -> Index:
+    """(1, 14) the group's own parts and those of one mass."""
+    kept = np.isin(np.arange(14), [*OWN, *places])
+    return np.where(kept, parts, -1)[None, :]
+
+
+def _largest(rules: Rules, pool: Pool, prices: Array) -> Pool:
+    """Without the rows that have too many values by themselves, and no larger than the program
+    can be: groups and rows with the fewest values and the lowest price first, and always the
+    choice that is known."""
+    sides = []
+    for parts, group in ((pool.parts1, pool.group1), (pool.parts2, pool.group2)):
+        kinds = kinds_of(rules, parts)
+        price = np.where(parts[:, 10:] >= 0, prices[np.maximum(parts[:, 10:], 0)], 0.0).sum(axis=1)
+        order = np.lexsort((np.arange(len(parts)), price, kinds))
+        order = order[kinds[order] <= pool.fewest]
+        sides.append((parts[order], group[order], kinds[order]))
+    (parts1, group1, kinds1), (parts2, group2, kinds2) = sides
+    both = np.intersect1d(group1, group2)
+    least = [kinds1[group1 == g].min() + kinds2[group2 == g].min() for g in both]
+    taken1, taken2 = np.zeros(len(parts1), dtype=bool), np.zeros(len(parts2), dtype=bool)
+    room, cut = LARGEST, False
+    for g in [0, *both[np.argsort(least, kind="stable")].tolist()]:
+        for group, taken in ((group1, taken1), (group2, taken2)):
+            own = np.flatnonzero((group == g) & ~taken)
+            share = max(room // 2, 0)
+            taken[own[:share]] = True
+            cut = cut or len(own) > share
+        room = LARGEST - int(taken1.sum() + taken2.sum())
+    return Pool(
+        parts1[taken1],
+        group1[taken1],
+        parts2[taken2],
+        group2[taken2],
+        pool.fewest,
+        pool.whole and not cut,
+    )
 
 
 def select(
-    table: RatioTable,
-    resistors: Array,
-    capacitors: Array,
-    prices: Array,
-    t: Targets,
-    bounds: Bounds,
-    level: float,
-) -> Selection | Shortfall:
-    """The best completion with error at most ``level``, or what leaves none.
+    values: Values, rules: Rules, pool: Pool, parts: Index, limit: float, prices: Array
+) -> Selection:
+    """The choice of the pool with the fewest distinct values, then the lowest price.
 
-    prices : price class of each capacitor (k,); resistors of a grade cost the same.
+    parts : (14,) a choice with an error of at most ``limit`` and ``pool.fewest`` values, which
+    stands where the program has none. prices : price class of each capacitor.
     """
-    r: Array = np.log(resistors)
-    c: Array = np.log(capacitors)
-    groups, c2, c4, all_of_them = groups_of(table, c, bounds)
-    if len(groups) == 0:
-        return Shortfall("frequency", table.complete and all_of_them)
-    first, second = sides_of(groups, c2, c4, r, c, t, bounds, level)
-    both = np.intersect1d(first.group, second.group)
-    whole = table.complete and all_of_them and first.whole and second.whole
-    if len(both) == 0:
-        return Shortfall("displacement integrators", whole)
-    own = np.stack([groups.r2, groups.r3, groups.r8, groups.r9, c2, c4], axis=1)
-    pool = Pool(groups, own, first, second).take(
-        np.flatnonzero(np.isin(first.group, both)), np.flatnonzero(np.isin(second.group, both))
-    )
-    found = _least_error(pool, t, bounds, level)
+    status, found = _solve(values, rules, pool, limit, prices)
     if found is None:
-        return Shortfall("displacement integrators", whole and pool.rows <= LARGEST)
-    complete = whole and found[0] is pool and found[1].status == cp.OPTIMAL
-    pool, chosen = found
-    logs = pool.values(chosen.first, chosen.second)
-    error = _error(logs, t)
-    if error > level * (1.0 + 1e-6) + 1e-9:
-        return Shortfall("coefficients", False)
-    few = _promising(pool)
-    cost = dict(zip(np.round(c, 9).tolist(), prices.tolist(), strict=True))
-    again = _solve(few, t, bounds, error + 1e-9, cost)
-    if again is not None:
-        fewer = few.values(again.first, again.second)
-        logs = fewer if _error(fewer, t) <= error + 2e-9 else logs
-    return Selection(
-        values={name: float(np.exp(v)) for name, v in logs.items()},
-        error=_error(logs, t),
-        complete=complete,
-        solver=f"HiGHS: {chosen.status}",
+        return Selection(parts, f"HiGHS: {status}")
+    kept = (
+        error_of(values, rules, found) <= limit + 2e-9
+        and kinds_of(rules, found[None, :])[0] <= pool.fewest
+        and _price(found, prices) <= _price(parts, prices)
+        and not any(found[i] != found[j] for i, j in np.argwhere(rules.ties))
     )
+    return Selection(found if kept else parts, f"HiGHS: {status}")
 
 
-def _least_error(
-    pool: Pool, t: Targets, bounds: Bounds, level: float
-) -> tuple[Pool, Choice] | None:
-    """The pool that the program was given, and its rows of least error.
+def residuals(values: Values, rules: Rules, parts: Index) -> tuple[Array, Array]:
+    """(k, 10) offsets and (10, 4) scales (alpha, p, q1, q3) of the coefficient errors.
 
-    A pool that is too large is cut to the rows with the fewest kinds; where none of them will do,
-    the cut is made wider.
+    parts : (k, 14) indices.
     """
-    if pool.rows <= LARGEST:
-        chosen = _solve(pool, t, bounds, level, None)
-        return None if chosen is None else (pool, chosen)
-    for wider in (1, 4, 16):
-        few = _fewest_kinds(pool, wider)
-        chosen = _solve(few, t, bounds, level, None)
-        if chosen is not None:
-            return few, chosen
-    return None
+    r, c = values.r[parts[:, :10]], values.c[parts[:, 10:]]
+    r1, r2, r3, r4, r5, r7, r8, r9, r10, r11 = r.T
+    c1, c2, c3, c4 = c.T
+    w2, w3, w4, w5, w8, w9, w10, w11 = rules.w
+    delta = c4 - c2
+    offsets = [
+        -r2 - w2, -delta - r9 - w9, -r3 - w3, -delta - r8 - w8, -r4 - w4,
+        -delta - r10 - w10, -r5 - w5, -delta - r11 - w11, c2 - r1 - c1, c2 - r7 - c3,
+    ]  # fmt: skip
+    scales = [
+        (1, 0, 0, 0), (1, 0, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 1, 0),
+        (1, -1, 1, 0), (1, 1, 0, 1), (1, 0, 0, 1), (1, 0, -1, 0), (1, 0, 0, -1),
+    ]  # fmt: skip
+    return np.stack(offsets, axis=1), np.array(scales, dtype=float)
 
 
-def residual_system(v: dict[str, float], t: Targets) -> tuple[Array, Array]:
-    """(10,) offsets and (10, 4) scales (alpha, p, q1, q3) of the coefficient errors."""
-    delta = v["C4"] - v["C2"]
-    rows = [
-        (-v["R2"] - t.w2, 1, 0, 0, 0),
-        (-delta - v["R9"] - t.w9, 1, 0, 0, 0),
-        (-v["R3"] - t.w3, 1, 1, 0, 0),
-        (-delta - v["R8"] - t.w8, 1, -1, 0, 0),
-        (-v["R4"] - t.w4, 1, 0, 1, 0),
-        (-delta - v["R10"] - t.w10, 1, -1, 1, 0),
-        (-v["R5"] - t.w5, 1, 1, 0, 1),
-        (-delta - v["R11"] - t.w11, 1, 0, 0, 1),
-        (v["C2"] - v["R1"] - v["C1"], 1, 0, -1, 0),
-        (v["C2"] - v["R7"] - v["C3"], 1, 0, 0, -1),
-    ]
-    table = np.array(rows, dtype=float)
-    return table[:, 0], table[:, 1:]
+def error_of(values: Values, rules: Rules, parts: Index) -> float:
+    """The least max error of one choice, by linear programming from its values alone."""
+    h, D = residuals(values, rules, parts[None, :])
+    return float(np.abs(h[0] + D @ minimax(h[0], D)).max())
 
 
-def _error(logs: dict[str, float], t: Targets) -> float:
-    """The least max error of these values, from the values alone."""
-    h, D = residual_system(logs, t)
-    return float(np.abs(h + D @ minimax(h, D)).max())
+def kinds_of(rules: Rules, parts: Index) -> Index:
+    """Distinct values of each row of (k, 14) parts; without the preferred, -1 is no part."""
+    many = len(rules.free_r)
+    code = np.where(parts < 0, -1, parts + np.where(np.arange(14) < 10, 0, many)[None, :])
+    free = np.concatenate([rules.free_r, rules.free_c, [True]])
+    ordered = np.sort(np.where(free[code], -1, code), axis=1)
+    fresh = np.diff(ordered, axis=1, prepend=-1) > 0
+    return np.asarray(fresh.sum(axis=1))
+
+
+def _price(parts: Index, prices: Array) -> float:
+    return float(prices[parts[10:]].sum())
+
+
+def _nominal(values: Values, rules: Rules, parts: Index) -> Array:
+    """(k, 4) scales that make the errors small; q1 of first rows, q3 of second ones."""
+    whole = np.maximum(parts, 0)
+    h, _ = residuals(values, rules, whole)
+    alpha = -h[:, :4].mean(axis=1)
+    p = 0.5 * (h[:, 3] - h[:, 2])
+    return np.stack([alpha, p, -h[:, 4] - alpha, -h[:, 7] - alpha], axis=1)
 
 
 def _solve(
-    pool: Pool, t: Targets, bounds: Bounds, level: float, cost: dict[float, float] | None
-) -> Choice | None:
-    """Rows of least error, or with ``cost`` of fewest kinds and least price; or None."""
-    first, second, own = pool.first, pool.second, pool.own
-    z1 = cp.Variable(len(first), boolean=True)
-    z2 = cp.Variable(len(second), boolean=True)
-    # Bounded, since an infinite bound times a zero coefficient warns inside cvxpy.
-    scales, error = cp.Variable(4, bounds=[-60.0, 60.0]), cp.Variable(nonneg=True)
-    names = np.unique(first.group)
-    member1 = (first.group[None, :] == names[:, None]).astype(float)
-    member2 = (second.group[None, :] == names[:, None]).astype(float)
-    # Every residual is linear in the choice: its offset with each row's values, the other's zero.
-    offsets1 = np.array([_offsets(pool, i, None, t) for i in range(len(first))])
-    offsets2 = np.array([_offsets(pool, None, j, t) for j in range(len(second))])
-    _, D = residual_system(dict.fromkeys(_PARTS, 0.0), t)
-    residuals = offsets1.T @ z1 + offsets2.T @ z2 + D @ scales
-    rules = [
+    values: Values, rules: Rules, pool: Pool, limit: float, prices: Array
+) -> tuple[str, Index | None]:
+    """The solver's status and the parts it chose, if it chose any."""
+    unit = max(limit, LEAST_UNIT)
+    z1 = cp.Variable(len(pool.parts1), boolean=True)
+    z2 = cp.Variable(len(pool.parts2), boolean=True)
+    shift = cp.Variable(4, bounds=[-100.0, 100.0])
+    # Errors relative to each row's nominal scales, in units of the limit: small numbers only.
+    offsets, scales = [], []
+    for parts in (pool.parts1, pool.parts2):
+        h, D = residuals(values, rules, np.maximum(parts, 0))
+        own = _nominal(values, rules, parts)
+        offsets.append((h + own @ D.T) / unit)
+        scales.append(own)
+    second = np.isin(np.arange(10), (6, 7, 9))
+    offsets[0][:, second] = 0.0
+    offsets[1][:, ~second] = 0.0
+    groups = np.unique(pool.group1)
+    member = [(g[None, :] == groups[:, None]).astype(float) for g in (pool.group1, pool.group2)]
+    kinds, rest = _kinds(rules, pool, z1, z2)
+    rest += [
         cp.sum(z1) == 1,
         cp.sum(z2) == 1,
-        member1 @ z1 == member2 @ z2,
-        cp.abs(residuals) <= error,
-        error <= level * (1.0 + 1e-6) + 1e-9,
+        member[0] @ z1 == member[1] @ z2,
+        cp.abs(offsets[0].T @ z1 + offsets[1].T @ z2 + D @ shift) <= 1.0 + 1e-7,
+        kinds == pool.fewest,
     ]
-    if np.isfinite(bounds.share):
-        peaks, share = np.log(bounds.peaks), float(np.log(bounds.share))
-        # ln of x2's peak voltage over x1's: -q1 + p + q3.
-        rules.append(peaks[2] - peaks[0] - scales[2] + scales[1] + scales[3] <= share)
-    objective = error
-    if cost is not None:
-        kinds, used = _kinds(pool, z1, z2)
-        price1 = _price(first.capacitor, cost)
-        for column in own[:, 4:].T:  # C2 and C4
-            price1 = price1 + _price(column[first.group], cost)
-        objective = cp.sum(kinds) + PRICE_WEIGHT * (
-            price1 @ z1 + _price(second.capacitor, cost) @ z2
-        )
-        rules += used
-    problem = cp.Problem(cp.Minimize(objective), rules)
+    if np.isfinite(rules.share):
+        # ln of x2's peak voltage over x1's: p - q1 + q3.
+        first = scales[0][:, 1] - scales[0][:, 2]
+        room = rules.share - rules.peaks[2] + rules.peaks[0] + 1e-9
+        rest.append(first @ z1 + scales[1][:, 3] @ z2 <= room)
+    for i, j in np.argwhere(rules.ties):
+        if i not in SECOND and j in SECOND:
+            rest.append(pool.parts1[:, i] @ z1 == pool.parts2[:, j] @ z2)
+    price1 = prices[pool.parts1[:, [10, 11, 13]]].sum(axis=1)
+    price2 = prices[pool.parts2[:, 12]]
+    objective = kinds + PRICE_WEIGHT * (price1 @ z1 + price2 @ z2)
+    problem = cp.Problem(cp.Minimize(objective), rest)
     problem.solve(solver=cp.HIGHS, **SOLVER)
+    status = str(problem.status)
     for z in (z1, z2):
         if z.value is None or abs(z.value.sum() - 1.0) > 1e-6 or abs(z.value.max() - 1.0) > 1e-6:
-            return None
-    return Choice(int(np.argmax(z1.value)), int(np.argmax(z2.value)), str(problem.status))
+            return status, None
+    parts = pool.parts1[int(np.argmax(z1.value))].copy()
+    parts[SECOND] = pool.parts2[int(np.argmax(z2.value))][SECOND]
+    return status, parts
 
 
-_PARTS = ("R1", "R2", "R3", "R4", "R5", "R7", "R8", "R9", "R10", "R11", "C1", "C2", "C3", "C4")
-
-
-def _offsets(pool: Pool, i: int | None, j: int | None, t: Targets) -> Array:
-    """Offsets of the residuals that one row brings; the first side brings group and targets too."""
-    logs = dict.fromkeys(_PARTS, 0.0)
-    if i is not None:
-        second = ("R5", "R11", "R7", "C3")
-        logs |= {k: v for k, v in pool.values(i, 0).items() if k not in second}
-        return residual_system(logs, t)[0]
-    assert j is not None
-    side = pool.second
-    logs |= {"R5": side.upper[j], "R11": side.lower[j], "R7": side.resistor[j]}
-    logs["C3"] = side.capacitor[j]
-    return residual_system(logs, _NO_TARGETS)[0]
-
-
-_NO_TARGETS = Targets(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def _price(logs: Array, cost: dict[float, float]) -> Array:
-    return np.array([cost.get(round(float(v), 9), 0.0) for v in logs])
-
-
-def _kinds(pool: Pool, z1: cp.Variable, z2: cp.Variable) -> tuple[cp.Variable, list[object]]:
-    """One variable per value, at least as large as the use that any position makes of it."""
-    first, second = pool.first, pool.second
-    uses = [(z1, column[first.group]) for column in pool.own.T]
-    uses += [(z1, v) for v in (first.upper, first.lower, first.resistor, first.capacitor)]
-    uses += [(z2, v) for v in (second.upper, second.lower, second.resistor, second.capacitor)]
-    every = np.unique(np.round(np.concatenate([v for _, v in uses]), 9))
-    kinds = cp.Variable(len(every), nonneg=True)
-    rules: list[object] = []
-    for z, values in uses:
-        own, where = np.unique(np.round(values, 9), return_inverse=True)
-        member = (where[None, :] == np.arange(len(own))[:, None]).astype(float)
-        rules.append(member @ z <= kinds[np.searchsorted(every, own)])
-    return kinds, rules
-
-
-def _side_values(side: Side) -> Array:
-    """(k, 4) ln of a side's own values."""
-    return np.stack([side.upper, side.lower, side.resistor, side.capacitor], axis=1)
-
-
-def _distinct(values: Array) -> Array:
-    """How many distinct values each row has."""
-    ordered = np.sort(np.round(values, 9), axis=-1)
-    return np.asarray(1 + (np.diff(ordered, axis=-1) > 1e-8).sum(axis=-1))
-
-
-def _kinds_of(pool: Pool, side: Side) -> Array:
-    """Distinct values of a row together with its group: no choice with it has fewer."""
-    return _distinct(np.concatenate([pool.own[side.group], _side_values(side)], axis=1))
-
-
-def _fewest_kinds(pool: Pool, wider: int) -> Pool:
-    """The groups and rows with the fewest distinct values; ``wider`` times the usual groups."""
-    kinds = [_kinds_of(pool, side) for side in (pool.first, pool.second)]
-    sides = (pool.first, pool.second)
-    least = np.zeros(len(pool.own))
-    for side, count in zip(sides, kinds, strict=True):
-        best = np.full(len(pool.own), np.inf)
-        np.minimum.at(best, side.group, count.astype(float))
-        least += best
-    chosen = np.argsort(least, kind="stable")[: wider * KEEP_GROUPS]
-    keep = []
-    for side, count in zip(sides, kinds, strict=True):
-        rows: list[int] = []
-        for group in chosen:
-            own = np.flatnonzero(side.group == group)
-            rows += [
-                int(k) for k in own[np.argsort(count[own], kind="stable")[: wider * KEEP_ROWS]]
-            ]
-        keep.append(np.array(rows, dtype=np.intp))
-    return pool.take(keep[0], keep[1])
-
-
-def _promising(pool: Pool) -> Pool:
-    """Without the rows that alone have more kinds than the best pair of rows together."""
-    first, second = _side_values(pool.first), _side_values(pool.second)
-    best = np.inf
-    for group in np.unique(pool.first.group):
-        a = first[pool.first.group == group]
-        b = second[pool.second.group == group]
-        i, j = (k.ravel() for k in np.meshgrid(np.arange(len(a)), np.arange(len(b))))
-        own = np.tile(pool.own[group], (len(i), 1))
-        if len(i):
-            best = min(best, float(_distinct(np.concatenate([own, a[i], b[j]], axis=1)).min()))
-    keep = [np.flatnonzero(_kinds_of(pool, side) <= best) for side in (pool.first, pool.second)]
-    return pool.take(keep[0], keep[1])
+def _kinds(
+    rules: Rules, pool: Pool, z1: cp.Variable, z2: cp.Variable
+) -> tuple[cp.Expression, list[cp.Constraint]]:
+    """The number of distinct values, at least as large as the use that any position makes."""
+    many = len(rules.free_r)
+    free = np.concatenate([rules.free_r, rules.free_c])
+    uses = []
+    for z, parts, places in (
+        (z1, pool.parts1, [k for k in range(14) if k not in SECOND]),
+        (z2, pool.parts2, SECOND),
+    ):
+        uses += [(z, parts[:, k] + (0 if k < 10 else many)) for k in places]
+    every = np.unique(np.concatenate([code for _, code in uses]))
+    every = every[~free[every]]
+    used = cp.Variable(max(len(every), 1), nonneg=True)
+    constraints: list[cp.Constraint] = []
+    for z, code in uses:
+        own = every[np.isin(every, code)]
+        if len(own):
+            member = (code[None, :] == own[:, None]).astype(float)
+            constraints.append(member @ z <= used[np.searchsorted(every, own)])
+    return cp.sum(used), constraints

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from designer.bom import csv_text
+from designer.design import Design
 from designer.modelfile import ModelFile
 from designer.responses import ModelResponse
-from designer.synthesis import Design
 
 COLUMNS = (
     "omega",

@@ -45,8 +45,15 @@ capacitor_grade = 0.01
 resistor_range = ["1k", "1M"]
 capacitor_range = ["1nF", "1µF"]
 frequency = [50, 1000]          # Hz, where omega = 1 may lie
-dead_zone = "saturation"        # the stage that makes the clearance
+dead_zone = "saturation"        # the stage that makes the clearance; or "rectifier"
+# diode = "1N4148"              # of the rectifier
+# reference = "LM4040C50"       # of the rectifier
 objective = "match"
-composites = false              # no resistors in series or parallel
-side_conditions = true          # swing, load, signal levels; false: the match alone
+composites = false              # true or ["R50", …]: resistors of two parts, where that helps
+side_conditions = true          # false: the match alone; or a list of those to keep:
+# side_conditions = ["swing", "level", "load", "noise_gain", "bandwidth", "resistors", "generator"]
+# matched = [["R1", "R7"]]      # groups of parts with equal values
+# preferred = ["10k", "10n"]    # values that do not count as further ones
+# most_values = 12              # at most so many distinct values
+# slack = 1e-4                  # what the error may exceed its least, for fewer distinct values
 """

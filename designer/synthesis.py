@@ -1,111 +1,81 @@
-"""From a model to chosen parts: linear block, dead zone, drive, and what can be said of them.
+"""From a model to chosen parts: search within limits, verify, name what binds.
 
-Lexicographic, as docs/synthesis.md explains: the linear block's error first, proved by the joins
-of ``designer.linear_block``; then the dead zone's slope and null; each with the fewest distinct
-values among its best. The finished circuit is then reduced and its error computed afresh.
+Lexicographic, as docs/synthesis.md explains: the linear block's error first, then the dead zone's;
+each with the fewest distinct values among its best. The finished circuit is reduced and its errors
+and side conditions are computed afresh; where a condition is not kept, its limit is tightened and
+the search repeated.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NoReturn
 
 import numpy as np
 
-from designer import matching, nonlinear_block, topology
-from designer.catalog import Catalog, OpAmp
-from designer.circuit import Circuit
-from designer.coefficients import CoefficientErrors, coefficient_errors
-from designer.completion import Bounds
+from designer import composites, conditions, loads
+from designer.attempt import Attempt, Order, attempt, linear_block, order, zone_of_spec
+from designer.catalog import Catalog
+from designer.circuit import nominal_board
+from designer.circuitspec import SIDE_CONDITIONS, CircuitSpec
+from designer.design import Certificate, Check, Design, Peaks
 from designer.errors import InputError, Unreachable
-from designer.linear_block import FIRST_LEVEL, GROWTH, LAST_LEVEL, Targets, ratio_table
+from designer.freeing import FREES
+from designer.limits import LOAD, SIGNAL, SWING_SHARE, Limits, limits
+from designer.linear_search import PROOF_TOLERANCE
 from designer.model import Dimensionless
-from designer.modelfile import CircuitSpec
-from designer.selection import Selection, select
-from designer.system import Array
+from designer.partnames import check_names, check_preferred, parts_of, wishes_of
+from designer.reduction import Reduction
+from designer.responses import ModelResponse
+from designer.selection import Shortfall
 
-SWING_SHARE = 0.85
-"""Of the op-amp's limit: what the states' peaks may use; the rest is for spread and transients."""
-LEVEL_RATIO = 4.0
-"""Largest ratio between the peaks of the state voltages that belong together."""
-SHARE = 1.6
-"""How much larger than x1's peak voltage another state's may be: the clearance gets the swing."""
-LOAD, SIGNAL = 2e3, (4.7e3, 5e5)
-"""Least load of an output [ohm]; range of the signal resistors [ohm], for load and for noise."""
-BASE = 1e4
-"""Resistors that only set a level (inverters, inputs of the gain stages) [ohm]."""
-GENERATOR_PEAK = 5.0
-"""Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
-MOST_CUT = 4
-"""Levels whose tables had to be cut, one after the other, before the search gives up."""
-LEAST_SIGNAL = 10.0
-"""Peak of x1 over the op-amp's largest offset: below it a circuit shows offsets, not dynamics."""
-PROOF_TOLERANCE = 1e-6
-FREES = {
-    "frequency": "widen circuit.frequency or circuit.capacitor_range",
-    "displacement integrators": "add a series to circuit.capacitors or widen circuit.frequency",
-    "signal resistors": "widen circuit.resistor_range, or set circuit.side_conditions = false",
-    "coefficients": "add a series to circuit.resistors or circuit.capacitors, or widen the ranges",
-    "stop stiffness": "a smaller model.k0 or a wider circuit.resistor_range: R4 is too small",
-}
+__all__ = [
+    "LOAD",
+    "SIGNAL",
+    "SWING_SHARE",
+    "Certificate",
+    "Design",
+    "Peaks",
+    "check_choices",
+    "synthesise",
+]
+
+ROUNDS = 4
+"""How often limits are tightened before the search gives up."""
+WORTH = 1e-6
+"""What a condition must cost in error to be called binding."""
 
 
 @dataclass(frozen=True)
-class Peaks:
-    """What the circuit has to hold: peaks of x1, x1', x2, x2' (4,) over all wanted responses and
-    the starts from rest, and the deepest penetration of a stop, all in model units."""
+class Reached:
+    """A design that keeps the conditions, without its certificate's last word."""
 
-    states: Array
-    penetration: float
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """status : "optimal" or "bound"; lower_bound : no choice from this catalogue has a smaller
-    max_error under the stated conditions; proof : how that is known."""
-
-    status: str
-    lower_bound: float
-    proof: str
+    made: Attempt
+    design: Design
+    limits: Limits
 
 
 @dataclass(frozen=True)
-class Design:
-    """A finished choice of parts.
+class Missed:
+    """Why there is no design, and whether a limit had been tightened by then."""
 
-    errors are of the reduced circuit. conditions : side conditions that were kept, by name, with
-    their values. solver : what the solver said of each stage. seconds : wall time.
-    """
-
-    model: Dimensionless
-    circuit: Circuit
-    errors: CoefficientErrors
-    certificate: Certificate
-    conditions: dict[str, float]
-    solver: dict[str, str]
-    seconds: float
-
-    @property
-    def distinct_values(self) -> int:
-        """How many different values the resistors and capacitors have."""
-        kinds = {(r.value, "R") for r in self.circuit.resistors}
-        return len(kinds | {(c.value, "C") for c in self.circuit.capacitors})
-
-    def amplitude(self, b: float | None = None) -> float:
-        """Generator amplitude [V peak] that makes the clearance ``b`` (default: the model's)."""
-        wanted = np.array([1.0 - self.model.f20, self.model.f20])
-        gain = self.errors.drive_gain
-        driven = gain > 0.0
-        volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
-        return volts * (1.0 if b is None else self.model.b / b)
-
-    def volts(self, b: float | None = None) -> Array:
-        """(4,) volts per unit of each model state at clearance ``b``."""
-        return self.errors.scales.volts * (1.0 if b is None else self.model.b / b)
+    short: Shortfall
+    tightened: bool
 
 
-def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks: Peaks) -> Design:
+def synthesise(
+    model: Dimensionless,
+    spec: CircuitSpec,
+    catalog: Catalog,
+    peaks: Peaks,
+    found: Sequence[ModelResponse] = (),
+) -> Design:
     """Choose the parts.
+
+    found : the wanted responses; the finished circuit is held to the voltages and currents that
+    they need. Without them it is held to ``peaks``.
 
     Raises
     ------
@@ -114,61 +84,16 @@ def synthesise(model: Dimensionless, spec: CircuitSpec, catalog: Catalog, peaks:
     """
     began = time.perf_counter()
     check_choices(model, spec, catalog)
-    opamp = catalog.opamp(spec.opamp)
-    saturation = spec.saturation or opamp.saturation_at(spec.supply)
-    resistors = catalog.values(
-        "resistor", spec.resistors, *spec.resistor_range, spec.resistor_grade
-    )
-    capacitors = catalog.values(
-        "capacitor", spec.capacitors, *spec.capacitor_range, spec.capacitor_grade
-    )
-    base = _nearest(resistors, BASE)
-    swing = SWING_SHARE * saturation
-    bounds = _bounds(model, spec, peaks, resistors)
-    prices = np.array(
-        [catalog.part("capacitor", v, spec.capacitor_grade).price for v in capacitors.tolist()],
-        dtype=float,
-    )
-    chosen, bound, proved = _linear(model, spec, resistors, capacitors, prices, bounds)
-    values = {
-        name: _nearest(resistors if name.startswith("R") else capacitors, value)
-        for name, value in chosen.values.items()
-    }
-    for state in range(4):
-        for name in topology.inverter_resistors(state):
-            values[name] = base
-    solver = {"linear block": chosen.solver}
-    # R6 and R12 do not enter the coefficients; ``_drive`` sizes them afterwards.
-    values |= dict.fromkeys(("R6", "R12"), float(resistors[-1]))
-    if model.k0 > 0.0:
-        room = nonlinear_block.Room(
-            saturation=saturation,
-            swing=swing,
-            supply=spec.supply,
-            peaks=peaks.states,
-            penetration=peaks.penetration,
-            load=max(LOAD, float(resistors.min())) if spec.side_conditions else 0.0,
-            strict=spec.side_conditions,
-        )
-        zone = nonlinear_block.choose(model, values, room, resistors, base)
-        values |= zone.values
-        solver["dead zone"] = zone.solver
-    circuit = _build(model, values, opamp, spec, saturation)
-    errors = _errors(circuit, model, swing, peaks)
-    values |= _drive(model, errors, values, resistors)
-    circuit = _build(model, values, opamp, spec, saturation)
-    errors = _errors(circuit, model, swing, peaks)
-    if spec.side_conditions:
-        _check_signal(errors, peaks, opamp)
-    return Design(
-        model=model,
-        circuit=circuit,
-        errors=errors,
-        certificate=_certificate(errors.max_error, bound, chosen, proved),
-        conditions=_conditions(spec, bounds, swing),
-        solver=solver,
-        seconds=time.perf_counter() - began,
-    )
+    largest = max((model.b / r.b for r in found), default=1.0)
+    wanted = order(model, spec, catalog, peaks, max(largest, 1.0))
+    check_preferred(spec, wanted.resistors, wanted.capacitors)
+    reached = _reach(wanted, spec.kept, found)
+    if isinstance(reached, Shortfall):
+        _refuse(wanted, reached, found)
+    design = replace(reached.design, binding=_binding(wanted, reached, found))
+    if spec.composites:
+        design = _with_composites(wanted, reached, design, found)
+    return replace(design, seconds=time.perf_counter() - began)
 
 
 def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> None:
@@ -176,7 +101,8 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
 
     Raises
     ------
-    InputError : an unknown op-amp, or a choice of the contract that this version does not build.
+    InputError : an unknown part of the catalogue or of the circuit, or a choice of the contract
+        that this version does not build.
     """
     opamp = catalog.opamp(spec.opamp)
     low, high = opamp.supply.min or 0.0, opamp.supply.max or np.inf
@@ -187,201 +113,186 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
     limit = spec.saturation or opamp.saturation_at(spec.supply)
     if not 0.0 < limit <= spec.supply:
         raise InputError(None, "circuit.saturation", limit, f"above 0 and up to {spec.supply:g} V")
-    refusals = {
-        "circuit.dead_zone": (spec.dead_zone != "saturation", spec.dead_zone, '"saturation"'),
-        "circuit.objective": (spec.objective != "match", spec.objective, '"match"'),
-        "circuit.composites": (spec.composites, "true", "false"),
-        "model.sides": (
-            model.k0 > 0.0 and model.sides != "both",
-            model.sides,
-            '"both": the saturating dead zone is two-sided',
-        ),
-    }
-    for name, (wrong, found, expected) in refusals.items():
-        if wrong:
-            raise InputError(None, name, found, f"{expected} (all that this version builds)")
-
-
-def _check_signal(errors: CoefficientErrors, peaks: Peaks, opamp: OpAmp) -> None:
-    """Refuse a circuit whose displacement is as small as an op-amp's offset."""
-    volts = float(errors.scales.volts[0] * peaks.states[0])
-    if volts < LEAST_SIGNAL * opamp.offset_limit:
-        raise Unreachable(
-            None,
-            "model.b",
-            f"a peak of x1 of {volts:.2g} V beside offsets up to {opamp.offset_limit:g} V",
-            "a clearance that is reached, a larger circuit.saturation, or a better op-amp",
+    if spec.objective != "match":
+        raise InputError(
+            None, "circuit.objective", spec.objective, '"match" (all that this version builds)'
         )
+    check_names(parts_of(model, spec, catalog, zone_of_spec(model, spec, catalog)), spec)
 
 
-def _bounds(model: Dimensionless, spec: CircuitSpec, peaks: Peaks, resistors: Array) -> Bounds:
-    low, high = spec.frequency
-    seconds = (1.0 / (2.0 * np.pi * high), 1.0 / (2.0 * np.pi * low))
-    gain = _output_gain(model, peaks)
-    least = max(LOAD, float(resistors.min())) if spec.side_conditions else float(resistors.min())
-    return Bounds(
-        seconds=seconds,
-        level=LEVEL_RATIO if spec.side_conditions else np.inf,
-        share=SHARE if spec.side_conditions else np.inf,
-        stop=least * model.mu / gain,
-        peaks=peaks.states,
-    )
+def _reach(
+    order: Order, kept: frozenset[str], found: Sequence[ModelResponse]
+) -> Reached | Shortfall:
+    """The best design that keeps these conditions, verified on its circuit.
 
-
-def _output_gain(model: Dimensionless, peaks: Peaks) -> float:
-    """Largest fv slope: swing over the deepest penetration in volts, where x1 fills the swing."""
-    return float(peaks.states[0] / max(peaks.penetration, 0.02 * peaks.states[0]))
-
-
-def _linear(
-    model: Dimensionless,
-    spec: CircuitSpec,
-    resistors: Array,
-    capacitors: Array,
-    prices: Array,
-    bounds: Bounds,
-) -> tuple[Selection, float, bool]:
-    """(best linear block, proved lower bound of its error, whether the bound is its error)."""
-    targets = Targets.from_state_matrix(model.second_order().state_matrix())
-    free = _levels(resistors, capacitors, targets)
-    signal = resistors
-    if spec.side_conditions:
-        signal = resistors[(resistors >= SIGNAL[0]) & (resistors <= SIGNAL[1])]
-    binding = "signal resistors"
-    if len(signal) and bounds.stop > signal[-1]:
-        raise Unreachable(
-            None,
-            "circuit",
-            "no choice of parts; what binds: stop stiffness",
-            FREES["stop stiffness"],
-        )
-    level, lowest, cut = FIRST_LEVEL, 0.0, 0
-    while cut < MOST_CUT and level < LAST_LEVEL and len(signal):
-        searched = True
-        table = ratio_table(signal, capacitors, targets, level, bounds.p_range)
-        if len(table):
-            answer = select(table, signal, capacitors, prices, targets, bounds, level)
-            if isinstance(answer, Selection):
-                whole = answer.complete or answer.error <= free + PROOF_TOLERANCE
-                return answer, answer.error if whole else max(free, lowest), whole
-            binding, searched = answer.what, answer.whole
-        elif binding == "signal resistors":
-            binding = "coefficients"
-        if table.complete and searched:
-            lowest = level
-        cut += not (table.complete and searched)
-        level = _next(level)
-    raise Unreachable(
-        None,
-        "circuit",
-        f"no choice of parts; what binds: {binding}",
-        FREES.get(binding, "a wider choice of parts"),
-    )
-
-
-def _levels(resistors: Array, capacitors: Array, targets: Targets) -> float:
-    """Lower bound of the linear error over the whole catalogue, no side condition."""
-    level, previous = FIRST_LEVEL, 0.0
-    while level < LAST_LEVEL:
-        table = ratio_table(resistors, capacitors, targets, level)
-        if len(table):
-            return float(table.error[0]) if table.complete else previous
-        previous, level = level, _next(level)
-    return LAST_LEVEL
-
-
-def _next(level: float) -> float:
-    return level * (1e3 if level < 1e-6 else GROWTH)
-
-
-def _build(
-    model: Dimensionless,
-    values: dict[str, float],
-    opamp: OpAmp,
-    spec: CircuitSpec,
-    saturation: float,
-) -> Circuit:
-    system = model.second_order()
-    return topology.build(
-        matching.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
-        values,
-        opamp,
-        supply=spec.supply,
-        saturation=saturation,
-        clearance="A" if model.k0 > 0.0 else None,
-    )
-
-
-def _errors(
-    circuit: Circuit, model: Dimensionless, swing: float, peaks: Peaks
-) -> CoefficientErrors:
-    """Errors of the circuit; without a clearance the peaks set the amplitude."""
-    return coefficient_errors(
-        circuit, model.second_order(), swing=None if circuit.stops else (swing, peaks.states)
-    )
-
-
-def _drive(
-    model: Dimensionless, errors: CoefficientErrors, values: dict[str, float], resistors: Array
-) -> dict[str, float]:
-    """The drive's resistors: f20 as exact as can be, the amplitude within the generator's reach.
-
-    A driven mass needs V_M = gain · R; among values with V_M in the upper half of what the
-    generator gives, one that the circuit has already is taken first.
+    Bandwidth that is missing is sought in smaller gains first, in a slower time scale then.
     """
-    wanted = np.array([1.0 - model.f20, model.f20])
-    names = np.array(["R6", "R12"])
-    driven = wanted > 0.0
-    placeholder = np.array([values["R6"], values["R12"]])
-    per_ohm = np.where(driven, wanted / np.where(driven, errors.drive_gain * placeholder, 1.0), 0.0)
-    if driven.all():
-        i, j = (
-            a.ravel() for a in np.meshgrid(np.arange(len(resistors)), np.arange(len(resistors)))
-        )
-        volts = per_ohm[0] * resistors[i]
-        off = np.abs(np.log(volts / (per_ohm[1] * resistors[j])))
-        good = (volts <= GENERATOR_PEAK) & (volts >= 0.2 * GENERATOR_PEAK)
-        good = good if good.any() else np.ones(len(off), dtype=bool)
-        best = np.flatnonzero(good)[np.lexsort((-volts[good], np.round(off[good], 9)))[0]]
-        return {"R6": float(resistors[i[best]]), "R12": float(resistors[j[best]])}
-    index = int(np.flatnonzero(driven)[0])
-    volts = per_ohm[index] * resistors
-    reach = volts <= GENERATOR_PEAK
-    if not reach.any():
-        return {str(names[index]): float(resistors[0])}
-    top = float(resistors[reach][-1])
-    known = [v for v in values.values() if v >= 1.0 and 0.5 * top <= v <= top]
-    return {str(names[index]): max(known) if known else top}
+    answer = _rounds(order, kept, found, slower=False)
+    if isinstance(answer, Reached) or "bandwidth" not in kept or not answer.tightened:
+        return answer.short if isinstance(answer, Missed) else answer
+    answer = _rounds(order, kept, found, slower=True)
+    return answer.short if isinstance(answer, Missed) else answer
 
 
-def _nearest(values: Array, wanted: float) -> float:
-    return float(values[int(np.argmin(np.abs(np.log(values / wanted))))])
+def _rounds(
+    order: Order, kept: frozenset[str], found: Sequence[ModelResponse], *, slower: bool
+) -> Reached | Missed:
+    """Search, verify, tighten what is not kept, and again."""
+    within = limits(order.spec, kept, order.opamp, order.saturation, order.peaks.fastest)
+    broken: list[Check] = []
+    for number in range(ROUNDS + 1):
+        made = _counted(order, within)
+        if isinstance(made, Shortfall):
+            return Missed(made, number > 0)
+        design = _verified(order, made, kept, found)
+        broken = [check for check in design.checks if not check.holds]
+        if not broken:
+            return Reached(made, design, within)
+        tighter = within.tightened(broken, design, slower=slower)
+        if tighter == within:
+            break
+        within = tighter
+    return Missed(Shortfall(broken[0].name, False), True)
 
 
-def _certificate(reached: float, bound: float, chosen: Selection, proved: bool) -> Certificate:
-    join = (
-        "empty join of the scale-free combinations of the coefficient errors below the bound, "
-        "every value of the chosen series in the ranges of the conditions considered"
+def _counted(order: Order, within: Limits) -> Attempt | Shortfall:
+    """An attempt that keeps the limit on distinct values, where there is one.
+
+    What is over the limit is taken from the linear block's share, after a round in which whatever
+    only sets a level does with values that the linear block has.
+    """
+    wishes = wishes_of(order.spec)
+    most, share = wishes.most_values, wishes.most_values
+    for number in range(ROUNDS + 1):
+        linear = linear_block(order, within, replace(wishes, most_values=share))
+        if isinstance(linear, Shortfall):
+            return linear
+        made = attempt(order, within, wishes, linear, thrifty=number > 0)
+        if most is None:
+            return made
+        if isinstance(made, Shortfall):
+            # With few values left the dead zone may fail for any reason.
+            if number == 0 and made.what != "distinct values":
+                return made
+            over = 1
+        else:
+            over = made.kinds(wishes.preferred) - most
+            if over <= 0:
+                return made
+        if number > 0:
+            own = len(set(linear.values.values()) - wishes.preferred)
+            share = max(min(own, most) - over, 1)
+    return Shortfall("distinct values", False)
+
+
+def _verified(
+    order: Order,
+    made: Attempt,
+    kept: frozenset[str],
+    found: Sequence[ModelResponse],
+) -> Design:
+    """The design of an attempt, its conditions checked on its circuit."""
+    design = Design(
+        model=order.model,
+        circuit=made.circuit,
+        errors=made.errors,
+        certificate=_certificate(made, order.spec.slack),
+        conditions={},
+        solver=made.solver,
+        seconds=0.0,
     )
-    if proved and reached <= bound + PROOF_TOLERANCE:
-        return Certificate("optimal", bound, f"{join}; completed by {chosen.solver}")
-    return Certificate("bound", min(bound, reached), join)
+    needed = None
+    if found and kept & {"swing", "load"}:
+        board = Reduction(made.circuit, nominal_board(made.circuit))
+        needed = loads.design_loads(design, board, found)
+    amplitudes = [design.amplitude(r.b) for r in found] or [design.amplitude()]
+    checks = conditions.verify(design, kept, order.opamp, order.peaks, amplitudes, needed)
+    low, high = order.spec.frequency
+    numbers = {"frequency_low_hz": low, "frequency_high_hz": high}
+    return replace(
+        design,
+        checks=checks,
+        conditions=numbers | {check.quantity: check.limit for check in checks},
+    )
 
 
-def _conditions(spec: CircuitSpec, bounds: Bounds, swing: float) -> dict[str, float]:
-    kept = {
-        "frequency_low_hz": spec.frequency[0],
-        "frequency_high_hz": spec.frequency[1],
-        "swing_v": swing,
-        "generator_peak_v": GENERATOR_PEAK,
-        "stop_resistor_r4_low_ohm": float(bounds.stop),
-    }
-    if spec.side_conditions:
-        kept |= {
-            "signal_level_ratio": LEVEL_RATIO,
-            "signal_share_ratio": SHARE,
-            "load_ohm": LOAD,
-            "signal_resistor_low_ohm": SIGNAL[0],
-            "signal_resistor_high_ohm": SIGNAL[1],
-        }
-    return kept
+def _certificate(made: Attempt, slack: float) -> Certificate:
+    """Both blocks' proofs: none better of the first, and with its scales none of the second."""
+    linear, zone = made.linear, made.zone
+    reached = made.errors.max_error
+    bound, proved, proof = linear.bound, linear.proved, f"linear block: {linear.proof}"
+    if zone is not None:
+        bound, proved = max(bound, zone.bound), proved and zone.proved
+        proof += f"; dead zone, for the scales of this linear block: {zone.proof}"
+    if proved and reached <= bound + slack + PROOF_TOLERANCE:
+        return Certificate("optimal", min(bound, reached), proof)
+    return Certificate("bound", min(linear.bound, reached), proof)
+
+
+def _with_composites(
+    order: Order, reached: Reached, design: Design, found: Sequence[ModelResponse]
+) -> Design:
+    """The design with resistors of two parts where that lowers its error; or as it was."""
+    better = composites.improve(order, reached.made)
+    if better is None:
+        return design
+    improved = _verified(order, better, order.spec.kept, found)
+    if not all(check.holds for check in improved.checks):
+        return design
+    exact = improved.errors.max_error <= PROOF_TOLERANCE
+    certificate = Certificate(
+        "optimal" if exact else "bound",
+        0.0,
+        "no error is below 0, and one up to 1e-6 counts as none"
+        if exact
+        else "composites near the best single parts; no lower bound but 0",
+    )
+    return replace(improved, certificate=certificate, binding=design.binding)
+
+
+def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> dict[str, float]:
+    """max_error without each condition that costs some; nothing where the error is none."""
+    error, kept = reached.design.errors.max_error, order.spec.kept
+    if error <= WORTH:
+        return {}
+
+    def without(names: frozenset[str]) -> float:
+        other = _reach(order, kept - names, found)
+        return float("inf") if isinstance(other, Shortfall) else other.design.errors.max_error
+
+    active = [n for n in SIDE_CONDITIONS if n in kept and _acts(order, reached, n)]
+    least = error - WORTH - order.spec.slack  # inside the slack an error may lie anywhere
+    if len(active) > 1 and without(kept) > least:
+        return {}
+    costs = {name: without(frozenset({name})) for name in active}
+    return {name: cost for name, cost in costs.items() if cost < least}
+
+
+def _acts(order: Order, reached: Reached, name: str) -> bool:
+    """Whether the search could notice that this condition is left out."""
+    kept = order.spec.kept
+    first, without = (
+        limits(order.spec, names, order.opamp, order.saturation, order.peaks.fastest)
+        for names in (kept, kept - {name})
+    )
+    if reached.limits != first:  # some limit had to be tightened
+        return True
+    return name == "swing" or first != replace(without, kept=kept)
+
+
+def _refuse(order: Order, short: Shortfall, found: Sequence[ModelResponse]) -> NoReturn:
+    """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees it."""
+    kept, what = order.spec.kept, short.what
+    guilty: list[str] = []
+    if kept and isinstance(_reach(order, frozenset(), found), Reached):
+        guilty = [
+            name
+            for name in SIDE_CONDITIONS
+            if name in kept and isinstance(_reach(order, kept - {name}, found), Reached)
+        ]
+        names = ", ".join(guilty) or "several together"
+        what += f"; side condition: {names}" if names != what else ""
+    free = FREES.get(short.what, "a wider choice of parts")
+    if guilty:
+        free += "; or circuit.side_conditions without " + " or ".join(guilty)
+    raise Unreachable(None, "circuit", f"no choice of parts; what binds: {what}", free)

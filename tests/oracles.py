@@ -337,25 +337,6 @@ def minimax(h: Array, D: Array) -> float:
     return float(found.fun)
 
 
-def eight_term_error(logs: Mapping[str, float], wanted: Mapping[str, float]) -> float:
-    """Least worst error of R2, R3, R4, R5, R8, R9, R10, R11 and delta = ln C4/C2 over alpha, p,
-    q1, q3; the displacement integrators left out."""
-    d = logs["delta"]
-    system = {
-        # name: (delta counts, coefficients of alpha, p, q1, q3)
-        "R2": (0, (1, 0, 0, 0)),
-        "R3": (0, (1, 1, 0, 0)),
-        "R4": (0, (1, 0, 1, 0)),
-        "R5": (0, (1, 1, 0, 1)),
-        "R8": (1, (1, -1, 0, 0)),
-        "R9": (1, (1, 0, 0, 0)),
-        "R10": (1, (1, -1, 1, 0)),
-        "R11": (1, (1, 0, 0, 1)),
-    }
-    h = np.array([-logs[n] - wanted[n] - (d if has else 0.0) for n, (has, _) in system.items()])
-    return minimax(h, np.array([row for _, row in system.values()], dtype=float))
-
-
 def elementary_vectors(D: Array) -> Array:
     """(k, m) vectors y of least support with y D = 0, each of unit 1-norm."""
     m, n = D.shape
@@ -393,38 +374,3 @@ _SCALES = np.array(
     ],
     dtype=float,
 )
-
-
-def best_linear(
-    resistors: Sequence[float], capacitors: Sequence[float], wanted: Mapping[str, float]
-) -> float:
-    """Least coefficient error of the linear block over every choice of parts, no side condition.
-
-    wanted : |coefficient| by resistor of LINEAR_NAMES (1 for R1 and R7). Branch and bound over
-    full enumeration: nothing is left out, only what cannot beat the best so far.
-    """
-    r, c = np.log(np.asarray(resistors)), np.log(np.asarray(capacitors))
-    w = np.log(np.array([wanted[name] for name in LINEAR_NAMES]))
-    inner = [0, 1, 4, 5]
-    y_inner = elementary_vectors(_SCALES[inner][:, :2])
-    y_all = elementary_vectors(_SCALES)
-    groups = []
-    for c2, c4 in itertools.product(c, repeat=2):
-        for r2, r3, r8, r9 in itertools.product(r, repeat=4):
-            h = -np.array([r2, r3, r8 + c4 - c2, r9 + c4 - c2]) - w[inner]
-            groups.append((float(np.abs(y_inner @ h).max()), c2, c4, r2, r3, r8, r9))
-    groups.sort()
-    own = np.array(list(itertools.product(r, r, sorted({a + b for a in r for b in c}))))
-    i, j = (a.ravel() for a in np.meshgrid(np.arange(len(own)), np.arange(len(own))))
-    best = math.inf
-    for bound, c2, c4, r2, r3, r8, r9 in groups:
-        if bound >= best:
-            break
-        d = c4 - c2
-        h = np.empty((10, len(i)))
-        h[0], h[1], h[4], h[5] = -r2, -r3, -r8 - d, -r9 - d
-        h[2], h[6], h[8] = -own[i, 0], -own[i, 1] - d, c2 - own[i, 2]
-        h[3], h[7], h[9] = -own[j, 0], -own[j, 1] - d, c2 - own[j, 2]
-        h -= w[:, None]
-        best = min(best, float(np.abs(y_all @ h).max(axis=0).min()))
-    return best

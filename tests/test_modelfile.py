@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from designer.circuitspec import SIDE_CONDITIONS
 from designer.errors import InputError
 from designer.model import Dimensionless
 from designer.modelfile import (
@@ -26,6 +27,7 @@ from designer.modelfile import (
     parse_model_file,
     read_model_file,
 )
+from designer.starter import TEXT
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 PAPER = (EXAMPLES / "paper.toml").read_text(encoding="utf-8")
@@ -95,7 +97,9 @@ def test_paper_is_written_for_editing_by_line() -> None:
     tables = tomllib.loads(PAPER)
     assert set(tables) == {"format", "title", "model", "response", "circuit"}
     assert set(tables["model"]) == {each.name for each in fields(Dimensionless)}
-    assert set(tables["circuit"]) == {each.name for each in fields(CircuitSpec)}
+    # Choices are stated; wishes, of which the paper has none, are left out.
+    wishes = {"diode", "reference", "matched", "preferred", "most_values", "slack"}
+    assert set(tables["circuit"]) == {each.name for each in fields(CircuitSpec)} - wishes
     assert all({"omega", "expect"} <= set(table) for table in tables["response"])
 
 
@@ -176,6 +180,31 @@ def test_later_choices_of_the_contract_are_valid() -> None:
     circuit = parse_model_file(text).circuit
     assert (circuit.objective, circuit.composites) == ("yield", True)
     assert (circuit.dead_zone, circuit.side_conditions) == ("rectifier", False)
+
+
+def test_wishes_and_side_conditions() -> None:
+    text = SMALL + (
+        '[circuit]\ndiode = "BAT54"\nreference = "LM4040C41"\nslack = 1e-4\nmost_values = 9\n'
+        'matched = [["R1", "R7"], ["C2", "C4"], ["R7", "R3", "R7"]]\n'
+        'preferred = ["10k", "10nF", 4700, "4k7", "4R7", 1e-8, "22 kΩ"]\n'
+        'composites = ["R50", "R203", "R50"]\nside_conditions = ["load", "swing"]\n'
+    )
+    circuit = parse_model_file(text).circuit
+    assert (circuit.diode, circuit.reference) == ("BAT54", "LM4040C41")
+    assert (circuit.slack, circuit.most_values) == (1e-4, 9)
+    # R7 joins two groups into one.
+    assert circuit.matched == (("C2", "C4"), ("R1", "R7", "R3"))
+    assert circuit.preferred == (1e-8, 4.7, 4.7e3, 1e4, 2.2e4)
+    assert circuit.composites == ("R50", "R203")
+    assert circuit.kept == {"load", "swing"}
+    assert hash(circuit) == hash(parse_model_file(text).circuit)
+
+
+def test_side_conditions_are_all_or_none_or_those_named() -> None:
+    assert CircuitSpec().kept == set(SIDE_CONDITIONS)
+    assert CircuitSpec(side_conditions=False).kept == set()
+    assert CircuitSpec(side_conditions=()).kept == set()
+    assert CircuitSpec(side_conditions=("swing",)).kept == {"swing"}
 
 
 def test_omega_may_be_dimensionless_under_mechanical() -> None:
@@ -313,7 +342,29 @@ WRONG = [
     ("[50, 1000]", '["50 Hz", true]', "circuit.frequency", "['50 Hz', True]", "in Hz"),
     ('"saturation"', '"rectifer"', "circuit.dead_zone", '"rectifer"', 'mean "rectifier"?'),
     ('"match"', '"yeild"', "circuit.objective", '"yeild"', 'did you mean "yield"?'),
-    ("composites = false", "composites = 0", "circuit.composites", "0", "true or false"),
+    ("composites = false", "composites = 0", "circuit.composites", "0", "true, false or"),
+    ("composites = false", 'composites = ["C1"]', "circuit.composites", "['C1']", "resistors"),
+    ("composites = false", "composites = [7]", "circuit.composites", "[7]", "resistors"),
+    ("side_conditions = true", "side_conditions = 1", "circuit.side_conditions", "1", "noise_gain"),
+    ("side_conditions = true", 'side_conditions = ["swings"]', "circuit.side_conditions",
+     "['swings']", 'did you mean "swing"?'),
+    ("side_conditions = true", "matched = [3]", "circuit.matched", "[3]", '["R1", "R7"]'),
+    ("side_conditions = true", 'matched = [["R1", "C1"]]', "circuit.matched", "[['R1', 'C1']]",
+     "no value in common"),
+    ("side_conditions = true", 'matched = [["R1", "R1"]]', "circuit.matched", "[['R1', 'R1']]",
+     "two parts or more"),
+    ("side_conditions = true", 'matched = [["R1", "U1A"]]', "circuit.matched", "[['R1', 'U1A']]",
+     '["R1", "R7"]'),
+    ("side_conditions = true", 'preferred = ["10 V"]', "circuit.preferred", "['10 V']", "Ω or F"),
+    ("side_conditions = true", "preferred = [0]", "circuit.preferred", "[0]", "Ω or F"),
+    ("side_conditions = true", "preferred = 10", "circuit.preferred", "10", "a list"),
+    ("side_conditions = true", "most_values = 0", "circuit.most_values", "0", ">= 1"),
+    ("side_conditions = true", "most_values = 9.0", "circuit.most_values", "9.0", ">= 1"),
+    ("side_conditions = true", "most_values = true", "circuit.most_values", "true", ">= 1"),
+    ("side_conditions = true", "slack = -1e-9", "circuit.slack", "-1e-09", ">= 0"),
+    ("side_conditions = true", "slack = inf", "circuit.slack", "inf", ">= 0"),
+    ("side_conditions = true", "diode = 4148", "circuit.diode", "4148", "diode"),
+    ("side_conditions = true", 'reference = ""', "circuit.reference", '""', "reference"),
     ("side_conditions = true", "sideconditions = true", "circuit.sideconditions", "unknown",
      'did you mean "side_conditions"?'),
     # TOML
@@ -491,3 +542,13 @@ def test_any_unknown_key_is_named(key: str) -> None:
     assert error.field.startswith("model.")
     assert "unknown key" in str(error)
     assert str(error).isprintable()
+
+
+def test_what_the_starter_shows_in_comments_is_valid() -> None:
+    """Every key of [circuit] stands in it; a comment's mark taken away leaves a valid line."""
+    assert parse_model_file(TEXT).circuit == CircuitSpec(saturation=13.0)
+    table = TEXT[TEXT.index("[circuit]") :]
+    shown = [line.removeprefix("# ").partition("  #")[0] for line in table.splitlines()[1:]]
+    assert {line.partition(" =")[0] for line in shown} == {f.name for f in fields(CircuitSpec)}
+    for line in shown:
+        parse_model_file(SMALL + "[circuit]\n" + line)
