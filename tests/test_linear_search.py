@@ -256,4 +256,5 @@ def test_what_leaves_no_choice_is_named() -> None:
     far = targets_of(Dimensionless(0.11, 0.93, 0.0, 0.87, 0.017, 0.0, 0.25))
     answer = best(far, resistors[:2], capacitors, np.ones(2), OPEN)
     assert isinstance(answer, Shortfall)
+    assert answer.whole
     assert answer.what in ("coefficients", "displacement integrators")
