@@ -396,6 +396,7 @@ def plot(m: Measured) -> Figure:
     size.plot(np.arange(1, len(m.memory) + 1), m.memory, color="#2ca02c", lw=1.2)
     size.set(title="resident memory of a worker", xlabel="runs", ylabel="MB")
     size.set_ylim(0.0, 1.3 * max(m.memory))
+    rms.set_xticks([c.p for c in m.cases])
     for ax in (rms, speed, size):
         _grid(ax)
     return figure
@@ -404,6 +405,7 @@ def plot(m: Measured) -> Figure:
 def _grid(ax: Axes) -> None:
     ax.grid(visible=True, which="major", lw=0.4, alpha=0.6)
     ax.set_axisbelow(True)
+    ax.title.set_fontsize(10)
 
 
 def write(m: Measured, folder: Path) -> str:
