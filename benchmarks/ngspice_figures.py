@@ -40,11 +40,16 @@ def peak_of(subject: Subject) -> Array:
     return np.asarray(np.abs(subject.orbit.extremes).max(axis=1))
 
 
+LAST = 50
+"""Laps whose median is the settled strobe."""
+
+
 @dataclass(frozen=True)
 class WarmStart:
     """A run of `SETTLED` periods from the exact circuit's orbit.
 
-    gaps : (SETTLED + 1,) distance of each strobe from the last, of the peak. needed : the first
+    gaps : (SETTLED + 1,) distance of each strobe from the settled one (the median of the last
+    `LAST`, since each has ngspice's noise), of the peak. needed : the first
     strobe from which all later ones are within the strobe tolerance. predicted : what
     ``warm_start`` says of the first periods. exact : what the exact circuit's multiplier alone
     says. response : n-p-q at the end. seconds : wall time.
@@ -69,7 +74,8 @@ def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
     """What a `warm_job` shows."""
     n, peak = max(subject.orbit.n, 1), peak_of(subject)
     strobes = result.strobes
-    gaps = (np.abs(strobes - strobes[-1]) / peak).max(axis=1)
+    settled = np.median(strobes[: -LAST * n - 1 : -n], axis=0)
+    gaps = (np.abs(strobes - settled) / peak).max(axis=1)
     far = np.flatnonzero(gaps > STROBE_TOLERANCE)
     short = strobes[: warm_start.PROBE * n + 1]
     predicted, _ = warm_start.periods(short, n, subject.orbit.radius, peak)

@@ -73,7 +73,7 @@ def pool() -> Iterator[SpicePool]:
 @pytest.mark.slow
 @pytest.mark.parametrize("p", range(1, 9))
 def test_ideal_from_the_third_period_on(pool: SpicePool, p: int) -> None:
-    """The strobe, against 400 periods later."""
+    """The strobe, against the same run settled for 400 periods."""
     who = subject(p)
     assert who.orbit.radius < 0.9
     (passed,) = gate.check(pool, [who])
