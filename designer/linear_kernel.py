@@ -2,7 +2,8 @@
 
 Everything is in logarithms and all loops are exhaustive: what they leave out cannot reach the
 level or breaks a condition. The mathematics stands in ``designer.linear_block``, the conditions in
-``designer.completion``. Parts are numbered as in ``designer.linear_block.PARTS``.
+``designer.completion``. Parts are numbered as in ``designer.linear_block.PARTS``. All loops stand
+in this one file: a callee in another would leave compiled code stale (``designer.compiled``).
 """
 
 from __future__ import annotations

@@ -108,7 +108,7 @@ def best(
     values = catalogue(signal, capacitors)
     rules = rules_of(values, targets, bounds, wishes)
     found = _levels(values, rules, MOST_STEPS)
-    if not np.isfinite(found.error):
+    if not np.isfinite(found.error) and not found.whole:
         found = _thinned(found, targets, signal, capacitors, bounds, wishes)
     if not np.isfinite(found.error):
         return _why(found, targets, signal, resistors, capacitors, bounds, wishes)
@@ -146,7 +146,8 @@ def _levels(values: Values, rules: Rules, patience: int, level: float = FIRST_LE
     """Search level by level until something is found, the levels or the steps end."""
     found = Found(np.inf, np.full(len(PARTS), -1), 0.0, False, -1, 0, 0)
     while True:
-        at = _level(values, rules, min(level, LAST_LEVEL), patience - found.steps)
+        level = min(level, LAST_LEVEL)
+        at = _level(values, rules, level, patience - found.steps)
         found = replace(
             at,
             empty=level if at.whole and not np.isfinite(at.error) else found.empty,

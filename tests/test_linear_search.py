@@ -174,7 +174,7 @@ def test_the_cheapest_of_equals_is_taken(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("steps", [10, 30, 100, 300, 1000])
+@pytest.mark.parametrize("steps", [10, 300, 1000, 2000])
 def test_a_lower_bound_is_one_where_the_work_runs_out(
     seed: int, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -256,4 +256,5 @@ def test_what_leaves_no_choice_is_named() -> None:
     far = targets_of(Dimensionless(0.11, 0.93, 0.0, 0.87, 0.017, 0.0, 0.25))
     answer = best(far, resistors[:2], capacitors, np.ones(2), OPEN)
     assert isinstance(answer, Shortfall)
+    assert answer.whole
     assert answer.what in ("coefficients", "displacement integrators")
