@@ -83,13 +83,14 @@ def size(
             every[name] = every[name][np.isclose(every[name], given, rtol=1e-9)]
     lists = Lists(names, every, tie)
     best: tuple[float, Limits] | None = None
-    binding, looked_at, bound = "matched parts" if value else "stop slope", 0, 0.0
+    binding, looked_at, bound = "", 0, 0.0
     for limits, last in _limits(target):
         pairs, why = _pairs(target, lists, limits)
         looked_at += len(pairs)
         least = _least(target, lists, pairs)
         if least > LAST_LEVEL:
-            binding = why
+            # The first ranges are those that a design should have.
+            binding = binding or why
             continue
         # A wider range only where it is of use: the narrow one has the better threshold.
         if best is None or least < best[0] - EXACT:

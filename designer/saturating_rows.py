@@ -19,8 +19,9 @@ from designer.value_tables import (
 
 KEYS, ROWS, TRIES = 40, 20, 200
 """Values of u, rows of each table for each, that go into the program; values of u looked at."""
-EXPANDED = 400_000
-"""Rows of a join that are ranked by their new values before the rest is left out."""
+EXPANDED, NULLS = 400_000, 20_000
+"""Rows of a join, of the slope's tables and of the others for one u, that are ranked by their new
+values before the rest is left out."""
 GROWTH = 3.0
 """Of the level, where no row keeps the rules that tie two tables."""
 
@@ -85,14 +86,14 @@ def _slope_rows(t: Tables, level: float, sure: float, free: frozenset[float]) ->
 
 def _null_rows(t: Tables, key: int, level: float, free: frozenset[float]) -> Rows:
     """The rows for one u, at most ``ROWS`` and the one of least error."""
-    rows, _ = null_rows(t, key, level, free)
+    rows, _ = null_rows(t, key, level, free, NULLS)
     if len(rows) == 0:
         return rows
     return rows.take(np.union1d(fewest(rows, free, ROWS), [int(np.argmin(rows.error))]))
 
 
 def null_rows(
-    t: Tables, key: int, level: float, free: frozenset[float] = frozenset()
+    t: Tables, key: int, level: float, free: frozenset[float] = frozenset(), most: int = EXPANDED
 ) -> tuple[Rows, bool]:
     """Every row of R200 … R205, R208 (and R211, R212) for one u with errors inside ``level``, and
     whether some with many new values had to be left out."""
@@ -107,11 +108,11 @@ def null_rows(
         rank = np.flatnonzero(np.isin(t.first["R200"][i], near["R200"]))
     count = how_many_between(d, wanted[rank] - wide, wanted[rank] + wide)
     rank, count = rank[count > 0], count[count > 0]
-    cut = bool(count.sum() > EXPANDED)
+    cut = bool(count.sum() > most)
     if cut:
         kinds = new_values(np.hstack([t.first.values[i[rank]], t.second.values[j[rank]]]), free)
         order = np.argsort(kinds, kind="stable")
-        rank = rank[order[: max(1, int(np.searchsorted(np.cumsum(count[order]), EXPANDED)))]]
+        rank = rank[order[: max(1, int(np.searchsorted(np.cumsum(count[order]), most)))]]
     row, hit = between(d, wanted[rank] - wide, wanted[rank] + wide)
     a = rank[row]
     table = t.first.take(i[a]).beside(t.second.take(j[a])).beside(t.divider.take(hit))
@@ -129,11 +130,14 @@ def _with_shift(
     own = near.take(order)
     row, hit = between(own["R200"], table["R200"] - 1e-6, table["R200"] + 1e-6)
     both = table.take(row).beside(ValueTable(("R211", "R212"), own.take(hit).values[:, 1:]))
-    values = both.columns
-    shift = steep(values) * t.target.supply * values["R200"] / values["R211"]
-    worst = np.maximum(error[row], np.abs(bias(t.target, values, np.exp(u))))
-    good = inside(shift / t.target.saturation, t.box.shift) & (worst <= level)
-    return both.take(np.flatnonzero(good)), worst[good]
+    error = error[row]
+    shift = steep(both.columns) * t.target.supply * both["R200"] / both["R211"]
+    # Only what lies in the range of c has a threshold at all.
+    good = np.flatnonzero(inside(shift / t.target.saturation, t.box.shift))
+    both, error = both.take(good), error[good]
+    worst = np.maximum(error, np.abs(bias(t.target, both.columns, np.exp(u))))
+    good = np.flatnonzero(worst <= level)
+    return both.take(good), worst[good]
 
 
 def noise_rules(t: Tables, slopes: Rows, nulls: Rows) -> list[Rule]:

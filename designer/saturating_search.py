@@ -14,6 +14,7 @@ import numpy as np
 from designer import saturating_rows, saturating_stage
 from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget, parts_of
 from designer.saturating_tables import (
+    MOST_SHIFT,
     Box,
     Tables,
     box,
@@ -57,12 +58,14 @@ class Stage:
     """One stage of the search: the values of each part and the ranges.
 
     slope, whole : whether the slope's tables, or all, hold every value that the conditions leave.
+    rescue : the stage is for where the ones before have no answer.
     """
 
     lists: Mapping[str, Array]
     box: Box
     slope: bool = False
     whole: bool = False
+    rescue: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,8 +86,12 @@ class Search:
 def size(
     target: DeadZoneTarget, resistors: Array, base: float, ranking: Ranking, ties: Ties
 ) -> DeadZone | str:
+    if target.shift[0] >= MOST_SHIFT:
+        return "dead-zone bias"
     found = Search(None, 0.0, 0, "stop slope")
     for stage in _stages(target, resistors, base, ranking.free, ties):
+        if stage.rescue and found.best is not None:
+            break
         found = _search(target, stage, ties, ranking.free | {base}, found)
         if found.best is not None and found.error <= max(found.bound, 0.0) + EXACT:
             break
@@ -97,7 +104,8 @@ def size(
     if picked is None:
         without = replace(ranking, most=None)
         free = saturating_rows.pick(t, least.error, least.u, without, LAST_LEVEL)
-        return "noise gain" if free is None else "distinct values"
+        rule = "noise gain" if np.isfinite(target.noise_gain) else "dead-zone bias"
+        return rule if free is None else "distinct values"
     values, word = picked
     values = {name: values[name] for name in parts_of(target.kind, target.sides)}
     return _answer(target, values, found, word)
@@ -197,7 +205,8 @@ def _stages(
     else:
         last = free_box(target)
         yield Stage(slopes, replace(last, steep=far.steep), slope=True)
-    yield Stage(every if fits else slopes, last, slope=True, whole=fits)
+    lists = every if fits else slopes
+    yield Stage(lists, last, slope=True, whole=fits, rescue=target.strict)
 
 
 def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:

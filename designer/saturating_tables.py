@@ -32,6 +32,8 @@ from designer.value_tables import (
     new_values,
 )
 
+MOST_SHIFT = 0.9
+"""Largest c/Esat: beyond it the threshold is a small difference of two large voltages."""
 LEAST_STEEP = 1.25
 """Least A+: below it the clearance lies beyond what the op-amps reach."""
 LEAST_FIRST = 1.0
@@ -55,7 +57,7 @@ class Box:
 
 def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) -> Box:
     """The ranges where threshold, A- and fv slope are within these factors of their largest."""
-    kappa = target.shift
+    kappa = target.shift[0], min(target.shift[1], MOST_SHIFT)
     top = target.saturation * (1.0 - kappa[0]) / target.threshold
     wanted = target.slope[1]
     return Box(
@@ -71,7 +73,12 @@ def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) 
 def free_box(target: DeadZoneTarget) -> Box:
     """No limits but those without which the stage is no dead zone."""
     return Box(
-        (LEAST_STEEP, np.inf), (0.0, np.inf), (0.0, np.inf), (target.shift[0], 0.9), 0.0, np.inf
+        (LEAST_STEEP, np.inf),
+        (0.0, np.inf),
+        (0.0, np.inf),
+        (target.shift[0], MOST_SHIFT),
+        0.0,
+        np.inf,
     )
 
 

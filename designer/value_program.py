@@ -6,7 +6,7 @@ the program is small; cvxpy states it and HiGHS solves it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,10 +79,21 @@ def choose(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> P
     if any(len(t) == 0 for t in tables):
         return None
     rules = [_of_rows(rule, kept) for rule in rules]
-    first = _solve(tables, rules, ranking, None)
+    # With a limit on the values, only rows that stand in a choice inside it.
+    near = [np.arange(len(t)) for t in tables]
+    if ranking.most is not None:
+        near = _few_enough(tables, rules, ranking)
+        if any(len(k) == 0 for k in near):
+            return None
+    first = _solve(
+        [t.take(k) for t, k in zip(tables, near, strict=True)],
+        [_of_rows(rule, near) for rule in rules],
+        ranking,
+        None,
+    )
     if first is None:
         return None
-    rows, word = first
+    rows, word = tuple(int(k[i]) for k, i in zip(near, first[0], strict=True)), first[1]
     reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
     limit = (max(reached, ranking.tolerance) + ranking.slack) * (1.0 + 1e-9) + 1e-12
     useful = _promising(tables, rules, ranking, limit)
@@ -111,8 +122,38 @@ def _promising(
     inside = [np.flatnonzero(t.error <= limit) for t in tables]
     best = sum(t.table.values.shape[1] for t in tables)
     kept: list[list[Index]] = []
+    for grid, count in _counted(tables, rules, ranking, inside):
+        least = int(count.min(initial=best + 1))
+        if least < best:
+            best, kept = least, []
+        if least == best:
+            kept.append([np.unique(g[count == best]) for g in grid])
+    return _joined(kept, inside)
+
+
+def _few_enough(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> list[Index]:
+    """Places of the rows that stand in a choice of least error among those with at most
+    ``ranking.most`` new values; none where there is no such choice."""
+    every = [np.arange(len(t)) for t in tables]
+    best, kept = np.inf, list[list[Index]]()
+    for grid, count in _counted(tables, rules, ranking, every):
+        few = count <= (len(count) if ranking.most is None else ranking.most)
+        grid = [g[few] for g in grid]
+        error = np.max([t.error[g] for t, g in zip(tables, grid, strict=True)], axis=0)
+        least = float(error.min(initial=np.inf))
+        if least < best:
+            best, kept = least, []
+        if len(error) and least == best:
+            kept.append([np.unique(g[error == best]) for g in grid])
+    return _joined(kept, [np.zeros(0, dtype=np.intp)] * len(tables))
+
+
+def _counted(
+    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, places: Sequence[Index]
+) -> Iterator[tuple[list[Index], Index]]:
+    """For each key the choices that keep the rules, and how many new values each has."""
     for key in np.unique(tables[0].key):
-        own = [k[t.key[k] == key] for t, k in zip(tables, inside, strict=True)]
+        own = [k[t.key[k] == key] for t, k in zip(tables, places, strict=True)]
         grid = [a.ravel() for a in np.meshgrid(*own, indexing="ij")]
         good = np.ones(len(grid[0]), dtype=bool)
         for rule in rules:
@@ -120,15 +161,14 @@ def _promising(
             good &= (total >= rule.low) & (total <= rule.high)
         grid = [g[good] for g in grid]
         values = np.hstack([t.table.values[g] for t, g in zip(tables, grid, strict=True)])
-        count = new_values(values, ranking.free)
-        least = int(count.min(initial=best + 1))
-        if least < best:
-            best, kept = least, []
-        if least == best:
-            kept.append([np.unique(g[count == best]) for g in grid])
+        yield grid, new_values(values, ranking.free)
+
+
+def _joined(kept: Sequence[Sequence[Index]], without: list[Index]) -> list[Index]:
+    """The places of all keys together."""
     if not kept:
-        return inside
-    return [np.sort(np.concatenate(places)) for places in zip(*kept, strict=True)]
+        return without
+    return [np.unique(np.concatenate(places)) for places in zip(*kept, strict=True)]
 
 
 def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:

@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from designer.dead_zone import DeadZoneTarget
 from designer.system import Array
 
 MAX = 2_000_000
@@ -101,3 +102,27 @@ def least_saturating(
     """The least error of all choices; infinite where the ranges leave none."""
     blocks = choices(names, values, tied)
     return float(min(saturating_errors(v, mu, slope, ranges=ranges).min() for v in blocks))
+
+
+def rectifier_errors(v: dict[str, Array], wanted: DeadZoneTarget, *, narrow: bool) -> Array:
+    """The slope's error of each choice of one half, infinite where a condition is not kept.
+
+    narrow : threshold within 1.2 and fv slope within 2.5 of their largest.
+    """
+    gain = v["R202"] / v["R200"]
+    slope = gain / v["R50"]
+    error = np.maximum(np.log(slope / wanted.slope[1]), np.log(wanted.slope[0] / slope))
+    threshold = wanted.reference * v["R200"] / v["R201"]
+    noise = 1.0 + v["R202"] / v["R200"] + v["R202"] / v["R201"]
+    current = (wanted.supply - wanted.reference) / v["R206"] - wanted.reference / v["R201"]
+    one = 1 + 1e-9
+    good = (threshold <= wanted.threshold * one) & (gain <= wanted.output_gain * one)
+    if narrow:
+        good &= threshold * one >= wanted.threshold / 1.2
+        good &= gain * one >= wanted.output_gain / 2.5
+    good &= noise <= wanted.noise_gain * one
+    least, most = wanted.reference_current
+    good &= (current >= least / one) & (current <= most * one)
+    for name in ("R200", "R201", "R202", "R50"):
+        good &= v[name] >= wanted.load
+    return np.where(good, np.maximum(error, 0.0), np.inf)
