@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from designer.compare_table import EXACT
-from designer.plots import GRID, INK, new_figure, styled
+from designer.plots import GRID, INK, new_figure, say, styled
 
 MARKS = (
     ("#d55e00", "s"),
@@ -34,7 +34,7 @@ def comparison(columns: Sequence[Mapping[str, Any]]) -> Figure:
     """
     names = list(dict.fromkeys(n for c in columns for n in c["errors"] or ()))
     sections = list(dict.fromkeys(n for c in columns for n in c["peaks"]))
-    rows = max(len(names), len(sections) + 5)
+    rows = max(len(names), len(sections) + 5, 10)
     figure = new_figure(9.6, 0.27 * rows + 1.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(max(len(sections), 4), 3.2))
     marks = [MARKS[len(MARKS) - len(columns) + i] for i in range(len(columns))]
@@ -55,6 +55,9 @@ def _errors(
     marks: Sequence[tuple[str, str]],
 ) -> None:
     axes.set_title("Error of each coefficient: equation, state", loc="left")
+    if not names:
+        say(axes, "no coefficient could be compared")
+        return
     sizes = [[100.0 * abs((c["errors"] or {}).get(n, np.nan)) for n in names] for c in columns]
     real = [v for row in sizes for v in row if np.isfinite(v) and v >= 100.0 * EXACT]
     high = 10.0 ** np.ceil(np.log10(max(real)) + 0.05) if real else 1.0
@@ -81,6 +84,9 @@ def _peaks(
     marks: Sequence[tuple[str, str]],
 ) -> None:
     axes.set_title("Peak output of each op-amp, all wanted responses", loc="left")
+    if not names:
+        say(axes, "no response is wanted")
+        return
     _rows(axes, names)
     limits = sorted({float(c["saturation"]) for c in columns})
     for limit in limits:
@@ -102,6 +108,9 @@ def _offsets(
     axes: Axes, columns: Sequence[Mapping[str, Any]], marks: Sequence[tuple[str, str]]
 ) -> None:
     axes.set_title("Shift by the op-amps' offsets over the clearance", loc="left")
+    if not any(c["offset"] for c in columns):
+        say(axes, "no clearance")
+        return
     _rows(axes, list(OFFSETS.values()))
     axes.axvline(1.0, color=INK, lw=0.9, ls=(0, (4, 2)))
     values = []

@@ -204,6 +204,17 @@ def test_what_cannot_be_computed_leaves_the_rest(monkeypatch: pytest.MonkeyPatch
     assert "<svg" in plots.to_svg(compare_plots.comparison([answer]))
 
 
+def test_the_picture_of_next_to_nothing() -> None:
+    """One column without errors, peaks or offsets: said in each panel, and no warning."""
+    candidate = paper_design.candidates(PAPER, SPEC, CATALOG)[1]
+    answer = comparison_json([compare.column(candidate, PAPER, [], SPEC, CATALOG)])["columns"][0]
+    empty = answer | {"errors": None, "peaks": {}, "offset": None}
+    figure = compare_plots.comparison([empty])
+    said = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert said == ["no coefficient could be compared", "no response is wanted", "no clearance"]
+    assert "<svg" in plots.to_svg(figure)
+
+
 def test_a_circuit_that_is_driven_too_hard_says_so() -> None:
     candidate = paper_design.candidates(PAPER, SPEC, CATALOG)[1]
     loud = replace(candidate, amplitude=250.0 * candidate.amplitude)
