@@ -32,7 +32,7 @@ MOST_PAIRS = 48
 """Pairs in each table."""
 ROUNDING = 1e-12
 """Of a logarithm: pairs as near as this to one part are no composites."""
-NODES = 500
+NODES = 3000
 """Branch-and-bound nodes of a program: a limit by count, so that answers do not depend on time."""
 FEW = (1, 2, 3)
 """Numbers of composites that are tried before any number is allowed."""

@@ -61,9 +61,10 @@ def _both(volts: Array, lists: Mapping[str, Array], aim: float, equal: bool) -> 
     r6, r12 = (a.ravel() for a in np.meshgrid(lists["R6"], lists["R12"]))
     if equal and (r6 == r12).any():
         r6, r12 = r6[r6 == r12], r12[r6 == r12]
-    first = volts[0] * r6
-    off = np.abs(np.log(first / (volts[1] * r12)))
-    good = (first <= aim) & (first >= LEAST_SHARE * aim)
+    first, second = volts[0] * r6, volts[1] * r12
+    off = np.abs(np.log(first / second))
+    amplitude = np.sqrt(first * second)  # as ``Design.amplitude`` sets it
+    good = (amplitude <= aim) & (amplitude >= LEAST_SHARE * aim)
     good = good if good.any() else np.ones(len(off), dtype=bool)
-    best = np.flatnonzero(good)[np.lexsort((-first[good], np.round(off[good], 9)))[0]]
+    best = np.flatnonzero(good)[np.lexsort((-amplitude[good], np.round(off[good], 9)))[0]]
     return {"R6": float(r6[best]), "R12": float(r12[best])}

@@ -200,6 +200,68 @@ def test_what_cannot_be_built_is_refused_by_name(changes: dict[str, object], fie
     assert caught.value.field == field
 
 
+# Wishes.
+
+E12 = CircuitSpec(resistors=("E12",))
+
+
+def test_matched_parts_are_equal() -> None:
+    groups = (("R1", "R7", "R100"), ("C1", "C2"), ("R208", "R209"), ("R2", "R207"))
+    values = synthesise(PAPER, replace(E12, matched=groups), CATALOG, PEAKS).circuit.values
+    for group in groups:
+        assert len({values[name] for name in group}) == 1, group
+    # The inverter stays one: its two resistors are equal.
+    assert values["R100"] == values["R101"]
+
+
+def test_a_matched_drive() -> None:
+    spec = replace(E12, matched=(("R6", "R12"),))
+    values = synthesise(replace(PAPER, f20=0.5), spec, CATALOG, PEAKS).circuit.values
+    assert values["R6"] == values["R12"]
+
+
+def kinds(design: Design, preferred: tuple[float, ...] = ()) -> int:
+    return len(set(design.circuit.values.values()) - set(preferred))
+
+
+def test_a_limit_on_distinct_values_is_kept_or_refused_by_name() -> None:
+    most = kinds(synthesise(PAPER, E12, CATALOG, PEAKS)) - 2
+    assert kinds(synthesise(PAPER, replace(E12, most_values=most), CATALOG, PEAKS)) <= most
+    with pytest.raises(Unreachable, match="distinct values"):
+        synthesise(PAPER, replace(E12, most_values=3), CATALOG, PEAKS)
+
+
+def test_preferred_values_are_used_more() -> None:
+    preferred = (1e4, 2.2e4, 1e-8)
+    plain = synthesise(PAPER, E12, CATALOG, PEAKS)
+    wished = synthesise(PAPER, replace(E12, preferred=preferred), CATALOG, PEAKS)
+    assert kinds(wished, preferred) <= kinds(plain, preferred)
+    assert wished.errors.max_error == pytest.approx(plain.errors.max_error, abs=1e-6)
+
+
+def test_slack_buys_fewer_distinct_values() -> None:
+    plain = synthesise(PAPER, E12, CATALOG, PEAKS)
+    loose = synthesise(PAPER, replace(E12, slack=2e-2), CATALOG, PEAKS)
+    assert kinds(loose) < kinds(plain)
+    assert loose.errors.max_error <= plain.errors.max_error + 2e-2 + 1e-6
+
+
+@pytest.mark.parametrize("sides", ["upper", "lower"])
+def test_one_sided_stops(sides: str) -> None:
+    model = replace(PAPER, sides=sides)  # type: ignore[arg-type]
+    held = Peaks(np.array([3.44, 2.65, 1.82, 1.87]), 0.61, 3.44, 25.0)
+    design = synthesise(model, CircuitSpec(), CATALOG, held)
+    assert design.errors.max_error < 1e-6
+    assert {"R211", "R212"} <= set(design.circuit.values)
+
+
+def test_the_rectifier() -> None:
+    design = synthesise(PAPER, CircuitSpec(dead_zone="rectifier"), CATALOG, PAPER_PEAKS)
+    assert abs(design.errors.errors["dead-zone null"]) < 1e-9
+    assert design.errors.max_error < 1e-4
+    assert len(design.circuit.diodes) == 4
+
+
 # Cases that were once refused although parts exist.
 
 FALSE_10 = Dimensionless(
