@@ -144,16 +144,28 @@ def zone_of_spec(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> Z
     return topology.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference)
 
 
-def linear_block(order: Order, limits: Limits, wishes: Wishes) -> LinearBlock | Shortfall:
-    """The linear block within these limits, or what leaves none."""
+def linear_block(
+    order: Order,
+    limits: Limits,
+    wishes: Wishes,
+    *,
+    between: tuple[float, float] = (0.0, np.inf),
+    level: float = linear_search.FIRST_LEVEL,
+) -> LinearBlock | Shortfall:
+    """The linear block within these limits, or what leaves none.
+
+    between : range of R4 [ohm]. level : of error, below which nothing is known to exist.
+    """
     mu = order.model.mu if order.model.k0 > 0.0 else 0.0
+    bounds = limits.bounds(mu, order.peaks, order.resistors)
     return linear_search.best(
         Targets.from_state_matrix(order.model.second_order().state_matrix()),
         order.resistors,
         order.capacitors,
         order.prices,
-        limits.bounds(mu, order.peaks, order.resistors),
+        replace(bounds, stop=max(bounds.stop, between[0]), stop_most=between[1]),
         wishes,
+        level,
     )
 
 

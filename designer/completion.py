@@ -28,8 +28,8 @@ class Bounds:
     seconds : range of the time scale. level : largest ratio between the peaks of the state
     voltages of one mass, and between the two velocities. share : how much larger than x1's the
     peak voltage of another state may be. stop : least R4 [ohm] that leaves room
-    for the stop's resistor. peaks : (4,) peaks of x1, x1', x2, x2' in model units. signal :
-    range of the linear block's resistors [ohm].
+    for the stop's resistor; stop_most : largest R4 that is looked at [ohm]. peaks : (4,) peaks of
+    x1, x1', x2, x2' in model units. signal : range of the linear block's resistors [ohm].
     """
 
     seconds: tuple[float, float]
@@ -38,6 +38,7 @@ class Bounds:
     stop: float
     peaks: Array
     signal: tuple[float, float] = (0.0, np.inf)
+    stop_most: float = np.inf
 
 
 def rules_of(values: Values, t: Targets, bounds: Bounds, wishes: Wishes) -> Rules:
@@ -51,7 +52,7 @@ def rules_of(values: Values, t: Targets, bounds: Bounds, wishes: Wishes) -> Rule
         seconds=np.log(np.maximum(bounds.seconds, 1e-300)),
         level=float(np.log(bounds.level)),
         share=float(np.log(bounds.share)),
-        stop=float(np.log(max(bounds.stop, 1e-300))),
+        stop=np.log(np.array([max(bounds.stop, 1e-300), bounds.stop_most])),
         peaks=np.log(bounds.peaks),
         ties=ties_of(wishes),
         free_r=_among(values.r, preferred),

@@ -50,18 +50,18 @@ class Rules(NamedTuple):
     """What a choice must keep, beside the level of error.
 
     w (8,) : ln |wanted| of R2, R3, R4, R5, R8, R9, R10, R11. seconds (2,) : range of ln(time
-    scale). level, share, stop : ln of those of ``completion.Bounds``. peaks (4,) : ln. ties
-    (14, 14) : true where two parts must be equal. free_r (n,), free_c (m,) : true for values that
-    do not count as distinct. most : limit on distinct values. six, one, two, both : elementary
-    vectors, (k, 3) places and (k, 3) entries: of the six, and those that hold values of the
-    first mass, the second, and both.
+    scale). level, share : ln of those of ``completion.Bounds``. stop (2,) : range of ln R4. peaks
+    (4,) : ln. ties (14, 14) : true where two parts must be equal. free_r (n,), free_c (m,) : true
+    for values that do not count as distinct. most : limit on distinct values. six, one, two, both :
+    elementary vectors, (k, 3) places and (k, 3) entries: of the six, and those that hold values of
+    the first mass, the second, and both.
     """
 
     w: Array
     seconds: Array
     level: float
     share: float
-    stop: float
+    stop: Array
     peaks: Array
     ties: Mask
     free_r: Mask
@@ -149,10 +149,11 @@ def _ranges(
     ratio4, ratio5 = delta + p + w[6] - w[2], delta + p + w[7] - w[3]
     # R4: its own range, R10's, the stop, the levels of x1' and x2', R1 C1.
     centre = peaks[1] - peaks[0] + a - w[2]
-    low4 = max(low, low + ratio4 - slack, rules.stop - slack)
+    low4 = max(low, low + ratio4 - slack, rules.stop[0] - slack)
     low4 = max(low4, centre - min(rules.level, rules.share))
     low4 = max(low4, centre + peaks[3] - peaks[1] + p - rules.share, c_low + 2 * a - w[2] - s_high)
     high4 = min(high, high + ratio4 + slack, centre + rules.level, c_high + 2 * a - w[2] - s_low)
+    high4 = min(high4, rules.stop[1] + slack)
     out[0, 0], out[0, 1] = low4 - 4 * slack, high4 + 4 * slack
     if out[0, 0] > out[0, 1]:
         return False
@@ -418,7 +419,8 @@ def _side(
         else:
             q = r[up] + w_up - alpha
             velocity = peaks[1] - peaks[0] - q
-            good = abs(velocity) <= rules.level + TINY and r[up] >= rules.stop - TINY
+            good = abs(velocity) <= rules.level + TINY
+            good = good and rules.stop[0] - TINY <= r[up] <= rules.stop[1] + TINY
             good = good and max(velocity, velocity + peaks[3] - peaks[1] + p) <= rules.share + TINY
         if not good:
             continue

@@ -87,11 +87,13 @@ def best(
     prices: Array,
     bounds: Bounds,
     wishes: Wishes = NO_WISHES,
+    level: float = FIRST_LEVEL,
 ) -> LinearBlock | Shortfall:
     """The choice of least error, among those the fewest distinct values and the lowest price.
 
     resistors, capacitors : what can be bought [ohm], [F]. prices : (len(capacitors),) price class
-    of each; resistors of a grade cost the same. A ``Shortfall`` names what leaves no choice:
+    of each; resistors of a grade cost the same. level : of error, at which the search begins; what
+    lies below is known to be empty. A ``Shortfall`` names what leaves no choice:
     "distinct values", "matched parts", "frequency", "signal level", "stop stiffness", "signal
     resistors" or "side conditions" (together) if there is one without it, else "coefficients" or,
     where ratios can be met but no level of them, "displacement integrators".
@@ -107,7 +109,7 @@ def best(
     capacitors, prices = capacitors[order], prices[order]
     values = catalogue(signal, capacitors)
     rules = rules_of(values, targets, bounds, wishes)
-    found = _levels(values, rules, MOST_STEPS)
+    found = _levels(values, rules, MOST_STEPS, level)
     if not np.isfinite(found.error) and not found.whole:
         found = _thinned(found, targets, signal, capacitors, bounds, wishes)
     if not np.isfinite(found.error):
@@ -247,11 +249,12 @@ def _proof(found: Found, resistors: int, capacitors: int) -> str:
     empty = (
         f"the joins over {scope} leave no choice with a linear error of {found.empty:.3g} or less"
         if found.empty > 0.0
-        else f"no level below the answer could be searched over {scope}"
+        else f"over {scope} the first level of error that was searched has an answer"
     )
+    after = "next level" if found.empty > 0.0 else "first level"
     if found.whole:
         return (
-            f"{empty}; at the next level every joined choice with an error below {found.error:.6g} "
+            f"{empty}; at the {after} every joined choice with an error below {found.error:.6g} "
             f"was completed and none is better ({found.rows} joined in all)"
         )
     return f"{empty}; the next level was not searched to its end ({found.steps:.3g} steps)"

@@ -16,6 +16,7 @@ from typing import NoReturn
 import numpy as np
 
 from designer import composites, conditions, loads
+from designer.alternatives import best_beside
 from designer.attempt import Attempt, Order, attempt, linear_block, order, zone_of_spec
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
@@ -169,7 +170,7 @@ def _counted(order: Order, within: Limits) -> Attempt | Shortfall:
             return linear
         made = attempt(order, within, wishes, linear, thrifty=number > 0)
         if most is None:
-            return made
+            return best_beside(order, within, wishes, linear, made)
         if isinstance(made, Shortfall):
             # With few values left the dead zone may fail for any reason.
             if number == 0 and made.what != "distinct values":
@@ -217,16 +218,15 @@ def _verified(
 
 
 def _certificate(made: Attempt, slack: float) -> Certificate:
-    """Both blocks' proofs: none better of the first, and with its scales none of the second."""
+    """No circuit has a smaller error than the linear block's bound; the dead zone's own bound is
+    for the scales of one linear block, so it is told but proves nothing about the others."""
     linear, zone = made.linear, made.zone
-    reached = made.errors.max_error
-    bound, proved, proof = linear.bound, linear.proved, f"linear block: {linear.proof}"
+    reached, bound = made.errors.max_error, min(made.linear.bound, made.errors.max_error)
+    proof = f"linear block: {linear.proof}"
     if zone is not None:
-        bound, proved = max(bound, zone.bound), proved and zone.proved
         proof += f"; dead zone, for the scales of this linear block: {zone.proof}"
-    if proved and reached <= bound + slack + PROOF_TOLERANCE:
-        return Certificate("optimal", min(bound, reached), proof)
-    return Certificate("bound", min(linear.bound, reached), proof)
+    proved = linear.proved and reached <= linear.bound + slack + PROOF_TOLERANCE
+    return Certificate("optimal" if proved else "bound", bound, proof)
 
 
 def _with_composites(
