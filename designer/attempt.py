@@ -150,11 +150,11 @@ def linear_block(
     wishes: Wishes,
     *,
     between: tuple[float, float] = (0.0, np.inf),
-    level: float = linear_search.FIRST_LEVEL,
+    level: float | None = None,
 ) -> LinearBlock | Shortfall:
     """The linear block within these limits, or what leaves none.
 
-    between : range of R4 [ohm]. level : of error, below which nothing is known to exist.
+    between : range of R4 [ohm]. level : the one level of error to search, if not all.
     """
     mu = order.model.mu if order.model.k0 > 0.0 else 0.0
     bounds = limits.bounds(mu, order.peaks, order.resistors)

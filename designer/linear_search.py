@@ -87,13 +87,13 @@ def best(
     prices: Array,
     bounds: Bounds,
     wishes: Wishes = NO_WISHES,
-    level: float = FIRST_LEVEL,
+    level: float | None = None,
 ) -> LinearBlock | Shortfall:
     """The choice of least error, among those the fewest distinct values and the lowest price.
 
     resistors, capacitors : what can be bought [ohm], [F]. prices : (len(capacitors),) price class
-    of each; resistors of a grade cost the same. level : of error, at which the search begins; what
-    lies below is known to be empty. A ``Shortfall`` names what leaves no choice:
+    of each; resistors of a grade cost the same. level : the one level of error that is searched;
+    without it they grow until something is found. A ``Shortfall`` names what leaves no choice:
     "distinct values", "matched parts", "frequency", "signal level", "stop stiffness", "signal
     resistors" or "side conditions" (together) if there is one without it, else "coefficients" or,
     where ratios can be met but no level of them, "displacement integrators".
@@ -109,7 +109,12 @@ def best(
     capacitors, prices = capacitors[order], prices[order]
     values = catalogue(signal, capacitors)
     rules = rules_of(values, targets, bounds, wishes)
-    found = _levels(values, rules, MOST_STEPS, level)
+    if level is None:
+        found = _levels(values, rules, MOST_STEPS)
+    else:
+        found = _level(values, rules, level, MOST_STEPS)
+        if not np.isfinite(found.error):
+            return Shortfall("coefficients", found.whole)
     if not np.isfinite(found.error) and not found.whole:
         found = _thinned(found, targets, signal, capacitors, bounds, wishes)
     if not np.isfinite(found.error):

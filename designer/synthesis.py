@@ -169,6 +169,8 @@ def _counted(order: Order, within: Limits) -> Attempt | Shortfall:
         if isinstance(linear, Shortfall):
             return linear
         made = attempt(order, within, wishes, linear, thrifty=number > 0)
+        if most is None and order.spec.composites:
+            return made  # two parts cure the dead zone's error where it stands
         if most is None:
             return best_beside(order, within, wishes, linear, made)
         if isinstance(made, Shortfall):
