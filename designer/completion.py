@@ -57,7 +57,7 @@ def rules_of(values: Values, t: Targets, bounds: Bounds, wishes: Wishes) -> Rule
         ties=ties_of(wishes),
         free_r=_among(values.r, preferred),
         free_c=_among(values.c, preferred),
-        most=ANY_NUMBER if wishes.most_values is None else wishes.most_values,
+        most=ANY_NUMBER if wishes.most_values is None else min(wishes.most_values, ANY_NUMBER),
         six=_vectors(~one & ~two),
         one=_vectors(one & ~two),
         two=_vectors(two & ~one),

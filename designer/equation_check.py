@@ -144,7 +144,9 @@ def explained(model: SecondOrderSystem, omega: Array, contact: int) -> Array:
     """(k,) largest |dH/H| for a relative change of 1 in every coefficient of the equations.
 
     Each term of the impedance Z counts with |L_i Z_ij R_j/H|, where H = R_1, R = Z⁻¹ force and L
-    is the first row of Z⁻¹; K1 twice, since the dead zone's leftover slope is measured in it.
+    is the first row of Z⁻¹; K1 twice, since the dead zone's leftover slope is measured in it, and
+    damping twice, since a displacement's integrator has an error of its own: with v = x'/κ the
+    equation is x''/κ + d v + … = force.
     """
     out = np.zeros(len(omega))
     for k, w in enumerate(omega):
@@ -152,7 +154,20 @@ def explained(model: SecondOrderSystem, omega: Array, contact: int) -> Array:
         left = np.linalg.inv(sum(terms))[0]
         size = sum(float((np.abs(left)[:, None] * np.abs(t) * np.abs(right)).sum()) for t in terms)
         size += abs(left[0] * model.stiffness[0, 1] * right[0])
+        size += float((np.abs(left)[:, None] * np.abs(terms[1]) * np.abs(right)).sum())
         out[k] = size / abs(right[0])
+    return out
+
+
+def _misdriven(design: Design, model: SecondOrderSystem, omega: Array, contact: int) -> Array:
+    """(k,) |dH/H| that the drive explains: R6 and R12 share the force in a ratio of their own,
+    which is no coefficient of the equations and not in their error."""
+    wanted = model.force
+    error = np.abs(np.where(wanted, design.errors.drive_gain * design.amplitude() - wanted, 0.0))
+    out = np.zeros(len(omega))
+    for k, w in enumerate(omega):
+        terms, right = _impedance(model, w, contact)
+        out[k] = float(np.abs(np.linalg.inv(sum(terms))[0]) @ error) / abs(right[0])
     return out
 
 
@@ -300,7 +315,8 @@ def _transfer(
     unit = -scales.volts[0] / design.amplitude()
     wanted = unit * transfer(model, omega, resting.contact)
     deviation = np.abs(heard.signals[design.circuit.state_nets[0]] / wanted - 1.0)
-    bounds = np.expm1(design.errors.max_error * explained(model, omega, resting.contact)) + FLOOR
+    known = design.errors.max_error * explained(model, omega, resting.contact)
+    bounds = np.expm1(known + _misdriven(design, model, omega, resting.contact)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return Finding(name, float(deviation[worst]), float(bounds[worst]))
 

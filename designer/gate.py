@@ -1,7 +1,7 @@
 """The numerics gate: which ngspice settings may decide on a response.
 
-Before ngspice's verdict counts, two step sizes and two integration methods must agree with each
-other, and with the exact circuit, on n-p-q and on every strobe within a stated bound; with ideal
+Before ngspice's verdict counts, two step sizes and two integration methods must agree with the
+exact circuit on n-p-q, and with each other on every strobe within a stated bound; with ideal
 op-amps the wave itself must be the exact circuit's, within another. The largest step is
 min(T/200, shortest contact/N): it follows the contact, for T/200 miscounts the eight-impact
 response. Both bounds are halved together until the settings pass, which finds N.

@@ -25,7 +25,7 @@ from designer.design import Certificate, Check, Design, Peaks
 from designer.errors import InputError, Unreachable
 from designer.freeing import FREES
 from designer.limits import LOAD, SIGNAL, SWING_SHARE, Limits, limits
-from designer.linear_search import PROOF_TOLERANCE
+from designer.linear_search import PROOF_TOLERANCE, LinearBlock
 from designer.model import Dimensionless
 from designer.partnames import check_names, check_preferred, parts_of, wishes_of
 from designer.reduction import Reduction
@@ -141,11 +141,18 @@ def _rounds(
     """Search, verify, tighten what is not kept, and again."""
     within = limits(order.spec, kept, order.opamp, order.saturation, order.peaks.fastest)
     broken: list[Check] = []
+    # Under the conditions as they are stated: later rounds search less than they allow.
+    widest = linear_block(order, within, wishes_of(order.spec))
+    if isinstance(widest, Shortfall):
+        return Missed(widest, False)
     for number in range(ROUNDS + 1):
-        made = _counted(order, within)
+        made = _counted(order, within, widest if number == 0 else None)
         if isinstance(made, Shortfall):
             return Missed(made, number > 0)
-        design = _verified(order, made, kept, found)
+        design = replace(
+            _verified(order, made, kept, found),
+            certificate=_certificate(made, widest),
+        )
         broken = [check for check in design.checks if not check.holds]
         if not broken:
             return Reached(made, design, within)
@@ -156,16 +163,18 @@ def _rounds(
     return Missed(Shortfall(broken[0].name, False), True)
 
 
-def _counted(order: Order, within: Limits) -> Attempt | Shortfall:
+def _counted(order: Order, within: Limits, first: LinearBlock | None) -> Attempt | Shortfall:
     """An attempt that keeps the limit on distinct values, where there is one.
 
-    What is over the limit is taken from the linear block's share, after a round in which whatever
-    only sets a level does with values that the linear block has.
+    first : the linear block within these limits, where it is known. What is over the limit is
+    taken from the linear block's share, after a round in which whatever only sets a level does
+    with values that the linear block has.
     """
     wishes = wishes_of(order.spec)
     most, share = wishes.most_values, wishes.most_values
     for number in range(ROUNDS + 1):
-        linear = linear_block(order, within, replace(wishes, most_values=share))
+        known = first if number == 0 else None
+        linear = known or linear_block(order, within, replace(wishes, most_values=share))
         if isinstance(linear, Shortfall):
             return linear
         made = attempt(order, within, wishes, linear, thrifty=number > 0)
@@ -199,7 +208,7 @@ def _verified(
         model=order.model,
         circuit=made.circuit,
         errors=made.errors,
-        certificate=_certificate(made, order.spec.slack),
+        certificate=Certificate("bound", 0.0, "not yet proved"),
         conditions={},
         solver=made.solver,
         seconds=0.0,
@@ -219,16 +228,20 @@ def _verified(
     )
 
 
-def _certificate(made: Attempt, slack: float) -> Certificate:
-    """No circuit has a smaller error than the linear block's bound; the dead zone's own bound is
-    for the scales of one linear block, so it is told but proves nothing about the others."""
-    linear, zone = made.linear, made.zone
-    reached, bound = made.errors.max_error, min(made.linear.bound, made.errors.max_error)
-    proof = f"linear block: {linear.proof}"
+def _certificate(made: Attempt, widest: LinearBlock) -> Certificate:
+    """No circuit has a smaller error than the linear block's bound under the stated conditions.
+
+    widest : the linear block that they allow; the circuit may have another. The dead zone's own
+    bound is for the scales of one linear block, so it is told but proves nothing about others.
+    """
+    reached, zone = made.errors.max_error, made.zone
+    proof = f"linear block: {widest.proof}"
+    if made.linear is not widest:
+        proof += "; the circuit has another linear block, for the dead zone or the conditions"
     if zone is not None:
-        proof += f"; dead zone, for the scales of this linear block: {zone.proof}"
-    proved = linear.proved and reached <= linear.bound + slack + PROOF_TOLERANCE
-    return Certificate("optimal" if proved else "bound", bound, proof)
+        proof += f"; dead zone, for the scales of the circuit's linear block: {zone.proof}"
+    proved = widest.proved and reached <= widest.bound + PROOF_TOLERANCE
+    return Certificate("optimal" if proved else "bound", min(widest.bound, reached), proof)
 
 
 def _with_composites(
@@ -236,7 +249,8 @@ def _with_composites(
 ) -> Design:
     """The design with resistors of two parts where that lowers its error; or as it was."""
     better = composites.improve(order, reached.made)
-    if better is None:
+    most, free = order.spec.most_values, wishes_of(order.spec).preferred
+    if better is None or (most is not None and better.kinds(free) > most):
         return design
     improved = _verified(order, better, order.spec.kept, found)
     if not all(check.holds for check in improved.checks):
@@ -249,7 +263,9 @@ def _with_composites(
         if exact
         else "composites near the best single parts; no lower bound but 0",
     )
-    return replace(improved, certificate=certificate, binding=design.binding)
+    least = improved.errors.max_error - WORTH
+    binding = {name: cost for name, cost in design.binding.items() if cost < least}
+    return replace(improved, certificate=certificate, binding=binding)
 
 
 def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> dict[str, float]:

@@ -26,7 +26,8 @@ ELEMENTS = "BCDEFGHIJKLMQRSVWX"
 """No code models, digital or compiled devices: those read files or run programs."""
 CARDS = (".subckt", ".ends", ".model", ".param", ".func")
 PREFIX = "vendor_"
-MOST_BYTES, MOST_STATEMENTS = 256_000, 5_000
+MOST_BYTES, MOST_STATEMENTS, LONGEST = 256_000, 5_000, 4_000
+"""Of a file, in a file, and characters of a statement with its continuations."""
 
 _FILE = re.compile(r"\bfile\w*\s*[=(\"']|\bpwl\w*\s*\(?\s*file|\bd?pwlfile\b", re.IGNORECASE)
 _FUNCTION = re.compile(r"\.func\s+([A-Za-z_]\w*)\s*\([^()]*\)\s*=?", re.IGNORECASE)
@@ -154,6 +155,14 @@ def _statements(text: str, path: Path) -> list[_Statement]:
     if len(found) > MOST_STATEMENTS:
         raise InputError(path, "the file", f"{len(found)} statements", f"up to {MOST_STATEMENTS}")
     for statement in found:
+        if len(statement.text) > LONGEST:
+            raise InputError(
+                path,
+                f"line {statement.line}",
+                f"{len(statement.text)} characters",
+                f"a statement of up to {LONGEST} characters",
+            )
+    for statement in found:
         _check(statement, path)
     _check_functions(found, path)
     return found
@@ -222,10 +231,14 @@ def _headed(head: _Statement, inside: tuple[_Statement, ...], path: Path) -> _Bl
 
 
 def _called(s: _Statement) -> tuple[str, int, int]:
-    """Name of the subcircuit that an X line calls, and where it stands in the text."""
+    """Name of the subcircuit that an X line calls, and where it stands in the text.
+
+    A line without one names itself, which no subcircuit is called.
+    """
     match = _PARAMETER.search(s.text)
     nodes = s.text[: match.start()] if match else s.text
-    last = nodes.split()[-1]
+    last = (nodes.split() or [s.text])[-1]
+    nodes = nodes if nodes.split() else s.text
     start = nodes.rindex(last)
     return last, start, start + len(last)
 
@@ -256,20 +269,24 @@ def _check_calls(blocks: Mapping[str, _Block], path: Path) -> None:
 
 def _check_functions(statements: Sequence[_Statement], path: Path) -> None:
     """No function leads back to itself: ngspice would expand it for ever."""
-    heads = {}
+    heads: dict[str, _Statement] = {}
+    bodies: dict[str, str] = {}
     for s in statements:
         if s.word == ".func":
             match = _FUNCTION.match(s.text)
             if match is None:
                 raise _refused(path, s.line, s.text, "a function without a name and arguments")
-            heads[match[1].lower()] = (s, s.text[match.end() :])
+            name = match[1].lower()
+            # Two subcircuits may each have one of this name: all that any of them uses counts.
+            heads.setdefault(name, s)
+            bodies[name] = f"{bodies.get(name, '')} {s.text[match.end() :].lower()}"
     uses = {
-        name: {word for word in re.findall(r"[a-z_]\w*", body.lower()) if word in heads}
-        for name, (_, body) in heads.items()
+        name: {word for word in re.findall(r"[a-z_]\w*", body) if word in heads}
+        for name, body in bodies.items()
     }
     circle = _circle(uses)
     if circle is not None:
-        s = heads[circle][0]
+        s = heads[circle]
         raise _refused(path, s.line, s.text, "a function that calls itself")
 
 
