@@ -14,7 +14,7 @@ from designer import dead_zone, drive, linear_search, nonlinear_block, topology
 from designer.catalog import Catalog, OpAmp
 from designer.circuit import Circuit
 from designer.circuitspec import CircuitSpec
-from designer.coefficients import CoefficientErrors, coefficient_errors
+from designer.coefficients import CoefficientErrors, CutShort, coefficient_errors
 from designer.dead_zone import DeadZone
 from designer.design import Peaks
 from designer.diode_model import diode_model
@@ -42,8 +42,8 @@ class Order:
     """What is to be built, and from what.
 
     resistors, capacitors : values that can be bought [ohm], [F], ascending; prices : price class of
-    each capacitor. terms : of the model; parts : its circuit with every value 1. largest : of the
-    generator's amplitudes, over that at the model's clearance.
+    each capacitor; resistor_prices : by value. terms : of the model; parts : its circuit with every
+    value 1. largest : of the generator's amplitudes, over that at the model's clearance.
     """
 
     model: Dimensionless
@@ -55,6 +55,7 @@ class Order:
     resistors: Array
     capacitors: Array
     prices: Array
+    resistor_prices: Mapping[float, float]
     terms: tuple[Term, ...]
     parts: Circuit
     largest: float
@@ -117,6 +118,9 @@ def order(
     """
     opamp = catalog.opamp(spec.opamp)
     zone = zone_of_spec(model, spec, catalog)
+    resistors = catalog.values(
+        "resistor", spec.resistors, *spec.resistor_range, spec.resistor_grade
+    )
     capacitors = catalog.values(
         "capacitor", spec.capacitors, *spec.capacitor_range, spec.capacitor_grade
     )
@@ -128,11 +132,13 @@ def order(
         saturation=spec.saturation or opamp.saturation_at(spec.supply),
         zone=zone,
         peaks=peaks,
-        resistors=catalog.values(
-            "resistor", spec.resistors, *spec.resistor_range, spec.resistor_grade
-        ),
+        resistors=resistors,
         capacitors=capacitors,
         prices=np.array(prices, dtype=float),
+        resistor_prices={
+            v: float(catalog.part("resistor", v, spec.resistor_grade).price)
+            for v in resistors.tolist()
+        },
         terms=terms_of(model),
         parts=parts_of(model, spec, catalog, zone),
         largest=largest,
@@ -194,7 +200,7 @@ def attempt(
         values |= zone.values
     try:
         return _driven(order, limits, values, linear, zone, thrifty=thrifty)
-    except ArithmeticError:  # an output that is meant to be linear is not, within the clearance
+    except CutShort:  # an output that is meant to be linear is not, within the clearance
         return Shortfall("swing", False)
 
 
@@ -239,6 +245,7 @@ def _dead_zone(
         frozenset(values.values()),
         wishes,
         values,
+        order.resistor_prices,
     )
 
 

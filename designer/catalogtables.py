@@ -26,9 +26,9 @@ from designer.vendor_model import PINS
 # What the fields of a file accept.
 
 
-def _figure(unit: str) -> Accepts:
-    """A table of min, typ, max, source and assumed."""
-    measured = f" in {unit}" if unit else ""
+def _figure(unit: str, *, signed: bool = False) -> Accepts:
+    """A table of min, typ, max, source and assumed; numbers above 0 unless ``signed``."""
+    measured = ("" if signed else " > 0") + (f" in {unit}" if unit else "")
     expected = f"a table of min, typ, max (numbers{measured}), source and assumed"
 
     def check(value: object) -> Figure:
@@ -46,6 +46,8 @@ def _figure(unit: str) -> Accepts:
         given = list(numbers.values())
         if not given or given != sorted(given):
             raise ValueError("at least one number, and min <= typ <= max")
+        if not signed and given[0] <= 0.0:
+            raise ValueError("numbers > 0")
         source, assumed = value.get("source"), value.get("assumed", False)
         if not isinstance(source, str) or not source.strip():
             raise ValueError("source says where the figure stands")
@@ -206,14 +208,14 @@ class OpAmpTable(BaseModel):
     supply: Annotated[Figure, _figure("V")]
     swing: Annotated[Figure, _figure("V")]
     saturation: Annotated[Figure, _figure("V")]
-    offset: Annotated[Figure, _figure("V")]
-    bias: Annotated[Figure, _figure("A")]
+    offset: Annotated[Figure, _figure("V", signed=True)]
+    bias: Annotated[Figure, _figure("A", signed=True)]
     gain: Annotated[Figure, _figure("V/V")]
     gbw: Annotated[Figure, _figure("Hz")]
     slew: Annotated[Figure, _figure("V/s")]
     output_current: Annotated[Figure, _figure("A")]
     output_resistance: Annotated[Figure, _figure("Ω")]
-    common_mode: Annotated[Figure, _figure("V")]
+    common_mode: Annotated[Figure, _figure("V", signed=True)]
     supply_current: Annotated[Figure, _figure("A")]
     noise: Annotated[Figure, _figure("V/√Hz")]
     offset_sigma: Annotated[float, _positive("V")]

@@ -172,6 +172,10 @@ def _preferred() -> Accepts:
     return Accepts('a list of values in Ω or F such as ["10k", "10n"]', check)
 
 
+def _slack() -> Accepts:
+    return number("", "a number from 0 to 0.1", lambda value: 0.0 <= value <= 0.1)
+
+
 def _count() -> Accepts:
     def check(value: object) -> int:
         if type(value) is not int or value < 1:
@@ -206,8 +210,8 @@ class CircuitTable(BaseModel):
     matched: Annotated[tuple[tuple[str, ...], ...], _matched()] = CircuitSpec.matched
     preferred: Annotated[tuple[float, ...], _preferred()] = CircuitSpec.preferred
     most_values: Annotated[int | None, _count()] = CircuitSpec.most_values
-    slack: Annotated[float, number("", "a number >= 0", lambda value: value >= 0.0)] = (
-        CircuitSpec.slack
-    )
+    slack: Annotated[
+        float, number("", "a number from 0 to 0.1", lambda value: 0.0 <= value <= 0.1)
+    ] = CircuitSpec.slack
     composites: Annotated[Names, _composites()] = CircuitSpec.composites
     side_conditions: Annotated[Names, _conditions()] = CircuitSpec.side_conditions

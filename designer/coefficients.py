@@ -49,6 +49,10 @@ class Scales:
         return float(omega / (2.0 * np.pi * self.seconds))
 
 
+class CutShort(ArithmeticError):
+    """An op-amp that is meant to be linear inside the clearance is not."""
+
+
 @dataclass(frozen=True)
 class CoefficientErrors:
     """errors : ln(realised/wanted) by coefficient, at the best scales; max_error : the largest.
@@ -198,7 +202,7 @@ def _stays_linear(reduction: Reduction, state: int, end: float, ends: str) -> No
         switch = next(name for name, here, there in pairs if here != there)
         reach = abs(float(guard.C[state]) * end) + abs(guard.e)
         if switch != ends and float(guard.C[state]) * end + guard.e > 1e-9 * reach:
-            raise ArithmeticError(f"{switch} changes inside the clearance, before v1 = {end:.4g} V")
+            raise CutShort(f"{switch} changes inside the clearance, before v1 = {end:.4g} V")
 
 
 def _state(j: int) -> str:

@@ -17,6 +17,8 @@ from designer.errors import InputError
 
 TEST_CURRENT = 10e-3
 """Current [A] at which the catalogue's forward voltage is meant."""
+MOST_JUNCTION = 5.0
+"""Forward voltage [V] past which a part is no single diode."""
 TEST_LOOP = 100.0
 """Resistance [ohm] of the loop in which sheets measure the recovery, down to a tenth."""
 WORKING_CURRENT = 1e-3
@@ -82,7 +84,7 @@ def diode_model(diode: Diode) -> DiodeModel:
     junction = volts - TEST_CURRENT * RESISTANCE
     most = LEAKAGE_SHARE * diode.reverse_current.nominal
     emission = EMISSION
-    if not (junction > 0.0 and 0.0 < most < TEST_CURRENT):
+    if not (0.0 < junction < MOST_JUNCTION and 0.0 < most < TEST_CURRENT):
         raise _no_diode(diode, volts, most)
     current = TEST_CURRENT / math.expm1(junction / (emission * THERMAL))
     if current > most:

@@ -11,6 +11,15 @@ FREES = {
     "stop stiffness": "a smaller model.k0 or a wider circuit.resistor_range: R4 is too small",
     "dead-zone null": "a finer series, or a larger model.b: the threshold may be too small a part "
     "of the swing for the gain of the saturating path",
+    "dead-zone bias": "a finer series or a wider circuit.resistor_range (R211 and R212)",
+    "threshold": "a finer series or a wider circuit.resistor_range (R200 and R201), or a larger "
+    "model.b: the reference has to be divided down to the threshold",
+    "reference current": "a wider circuit.resistor_range (R201 and R206) or a larger "
+    "circuit.supply",
+    "noise gain": "a larger model.b, or a larger circuit.resistor_range",
+    "signal level": "leave level out of circuit.side_conditions, or take a wider "
+    "circuit.resistor_range and circuit.capacitor_range",
+    "side conditions": "fewer names in circuit.side_conditions, or wider ranges in circuit",
     "matched parts": "drop a group of circuit.matched or add a series",
     "distinct values": "raise circuit.most_values, or add circuit.preferred or circuit.slack",
     "swing": "a larger circuit.saturation or circuit.supply",

@@ -48,8 +48,7 @@ class Limits:
     seconds : range of the time scale [s per unit of model time]. swing : what the peaks of the
     outputs are aimed at [V], whether or not it is a condition. level, share : ratios of peaks of
     the state voltages. load : least resistance that a part may put on an output [ohm]. signal :
-    range of the signal resistors [ohm]. noise_gain : of a ratio stage. generator : largest
-    amplitude [V].
+    range of the signal resistors [ohm]. noise_gain : of a ratio stage.
     """
 
     kept: frozenset[str]
@@ -60,7 +59,6 @@ class Limits:
     load: float
     signal: tuple[float, float]
     noise_gain: float
-    generator: float
 
     def bounds(self, mu: float, peaks: Peaks, resistors: Array) -> Bounds:
         """What the linear block has to keep. mu : stop stiffness over K1; 0 without a stop."""
@@ -133,7 +131,6 @@ def limits(spec: CircuitSpec, kept: frozenset[str], opamp: OpAmp, saturation: fl
         load=LOAD if "load" in kept else 0.0,
         signal=SIGNAL if "resistors" in kept else (0.0, inf),
         noise_gain=NOISE_GAIN if "noise_gain" in kept else inf,
-        generator=GENERATOR_PEAK if "generator" in kept else inf,
     )
 
 

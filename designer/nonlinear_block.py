@@ -13,33 +13,16 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import linprog
 
-from designer import dead_zone
-from designer.dead_zone import DeadZone, DeadZoneTarget
-from designer.errors import Unreachable
+from designer.dead_zone_target import DeadZoneTarget
 from designer.linear_block import Targets
 from designer.minimax import minimax
 from designer.model import Dimensionless
 from designer.system import Array
-from designer.wishes import NO_WISHES, Wishes
 
 LEAST_GAIN = 1.25
 """Of the saturating path, so that it does saturate where the clearance is never closed."""
 LEAST_PENETRATION = 0.02
 """Of the peak of x1: what counts as the deepest penetration where there is less."""
-DRIVE = ("R6", "R12")
-"""Parts that are chosen after the stage: their values are not yet known."""
-FREES = {
-    "stop slope": "widen circuit.resistor_range (R50 is the stop) or take a finer series",
-    "dead-zone null": "a finer series, or a larger model.b: the threshold may be too small a part "
-    "of the swing for the gain of the saturating path",
-    "dead-zone bias": "a finer series or a wider circuit.resistor_range (R211 and R212)",
-    "threshold": "a finer series or a wider circuit.resistor_range (R200 and R201), or a larger "
-    "model.b: the reference has to be divided down to the threshold",
-    "reference current": "a wider circuit.resistor_range (R201 and R206) or a larger supply",
-    "noise gain": "a larger model.b, or leave noise_gain out of circuit.side_conditions",
-    "distinct values": "a larger circuit.most_values, or more values in circuit.preferred",
-    "matched parts": "fewer parts in a group of circuit.matched",
-}
 
 
 @dataclass(frozen=True)
@@ -66,39 +49,6 @@ class Room:
     drop: float = 0.0
     reference: float = 5.0
     reference_current: tuple[float, float] = (0.0, float("inf"))
-
-
-def choose(
-    model: Dimensionless,
-    values: Mapping[str, float],
-    room: Room,
-    resistors: Array,
-    base: float,
-    wishes: Wishes = NO_WISHES,
-    price: Mapping[float, float] | None = None,
-) -> DeadZone:
-    """The stage for the linear block with these ``values`` [ohm, F].
-
-    resistors : what can be bought [ohm], ascending; base : the first value tried where a resistor
-    only sets a level; price : price class by value.
-
-    Raises
-    ------
-    Unreachable : no stage; names the condition that binds and what would free it.
-    """
-    known = {name: value for name, value in values.items() if name not in DRIVE}
-    found = dead_zone.size(
-        target_of(model, known, room),
-        resistors,
-        base,
-        frozenset(known.values()),
-        wishes,
-        known,
-        price,
-    )
-    if isinstance(found, str):
-        raise Unreachable(None, "circuit", f"no dead zone; what binds: {found}", FREES[found])
-    return found
 
 
 def target_of(model: Dimensionless, values: Mapping[str, float], room: Room) -> DeadZoneTarget:

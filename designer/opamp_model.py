@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from designer.catalogentry import OpAmp
+from designer.errors import InputError
 from designer.vendor_model import VendorModel
 
 Rung = Literal["ideal", "dynamic", "full"]
@@ -126,7 +127,14 @@ def saturation_resistance(opamp: OpAmp) -> float:
     """
     light = opamp.saturation.nominal
     if opamp.swing_2k is not None:
-        heavy = opamp.swing_2k.nominal
+        heavy = min(opamp.swing_2k.nominal, light)
+        if heavy / HEAVY_LOAD <= light / RATED_LOAD:
+            raise InputError(
+                None,
+                f"opamp {opamp.name}.swing_2k",
+                opamp.swing_2k.nominal,
+                f"a swing into 2 kΩ with more current than {light:g} V into 10 kΩ",
+            )
         return max((light - heavy) / (heavy / HEAVY_LOAD - light / RATED_LOAD), 1e-3)
     headroom = max(opamp.rated_supply - light, 1e-6)
     return min(headroom * RATED_LOAD / light, opamp.output_resistance.nominal)

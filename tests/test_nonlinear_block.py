@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from dataclasses import replace
+from types import ModuleType
 from typing import Literal
 
 import numpy as np
 import pytest
 
-from designer.errors import Unreachable
+from designer import dead_zone, linear_search, rectifier_stage, saturating_search
+from designer.dead_zone import size
 from designer.eseries import series_values
+from designer.freeing import FREES
 from designer.linear_block import Targets
 from designer.model import Dimensionless
-from designer.nonlinear_block import Room, choose, slope_interval
+from designer.nonlinear_block import Room, slope_interval, target_of
 from tests.oracles import Plain, coefficient_error
 
 MODEL = Dimensionless(m=0.45, k=0.55, k0=0.95, c=0.4, zeta=0.1, f20=0.0, b=0.25)
@@ -64,7 +69,9 @@ def test_the_stage_fits_its_linear_block(kind: Literal["saturation", "rectifier"
     values = linear_block(1e-4, 1)
     room = replace(ROOM, kind=kind, drop=0.7, reference_current=(2e-4, 1e-2))
     resistors = series_values(["E24", "E96"], 1e3, 1e6)
-    found = choose(MODEL, values | {"R6": 1e6}, room, resistors, 10e3)
+    used = frozenset(values.values())
+    found = size(target_of(MODEL, values, room), resistors, 10e3, used)
+    assert not isinstance(found, str)
     assert found.error <= 1e-5
     if kind == "saturation":
         error = coefficient_error(values | found.values, PLAIN)
@@ -73,8 +80,17 @@ def test_the_stage_fits_its_linear_block(kind: Literal["saturation", "rectifier"
     assert found.threshold <= 0.25 * 11.0 / 0.65 * (1 + 1e-3)
 
 
-def test_what_binds_and_what_frees_it() -> None:
+def test_what_binds_is_named_and_has_a_cure() -> None:
     values = linear_block(1e-4, 1)
-    with pytest.raises(Unreachable, match="stop slope") as caught:
-        choose(MODEL, values, ROOM, series_values(["E24"], 1e5, 1e6), 1e5)
-    assert "resistor_range" in str(caught.value)
+    target = target_of(MODEL, values, ROOM)
+    found = size(target, series_values(["E24"], 1e5, 1e6), 1e5, frozenset(values.values()))
+    assert found == "stop slope"
+    assert "resistor_range" in FREES[found]
+
+
+@pytest.mark.parametrize("module", [linear_search, dead_zone, rectifier_stage, saturating_search])
+def test_whatever_a_search_names_has_a_cure(module: ModuleType) -> None:
+    said = re.compile(r'(?:Shortfall\(|return |binding = |rule = )"([a-z][a-z -]+)"')
+    named = set(said.findall(inspect.getsource(module)))
+    assert named <= set(FREES), named - set(FREES)
+    assert named or module is dead_zone

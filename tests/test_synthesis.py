@@ -103,6 +103,7 @@ def test_the_paper_s_case(series: tuple[str, ...]) -> None:
     assert design.amplitude() <= 5.0
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_parts() -> None:
     spec = CircuitSpec(resistors=("E24",))
     a, b = (synthesise(PAPER, spec, CATALOG, PEAKS) for _ in range(2))
@@ -141,7 +142,10 @@ def random_case(seed: int) -> tuple[Dimensionless, CircuitSpec, Peaks]:
     return model, spec, peaks(model, found)
 
 
-@pytest.mark.parametrize("seed", range(8))
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(k, marks=SLOW) for k in range(3, 8))])
 def test_random_targets(seed: int) -> None:
     model, spec, held = random_case(seed)
     check(synthesise(model, spec, CATALOG, held), spec, held)
@@ -285,6 +289,7 @@ def test_parts_for_the_case_of_the_next_test_exist() -> None:
     assert coefficient_error(values, plain(replace(FALSE_10, k0=0.0))) < 5e-3
 
 
+@pytest.mark.slow
 def test_e96_reaches_what_its_own_values_reach() -> None:
     design = synthesise(FALSE_10, CircuitSpec(resistors=("E96",)), CATALOG, PEAKS_10)
     assert design.errors.max_error < 5e-3
@@ -330,6 +335,7 @@ def test_a_stop_that_no_resistor_makes_is_refused_at_once() -> None:
         synthesise(stiff, CircuitSpec(), CATALOG, PAPER_PEAKS)
 
 
+@pytest.mark.slow
 def test_a_signal_as_small_as_the_offset_is_refused() -> None:
     wide = replace(PAPER, b=1e6)
     with pytest.raises(Unreachable, match=r"model\.b"):
