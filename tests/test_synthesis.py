@@ -154,7 +154,7 @@ def test_random_targets(seed: int) -> None:
 @pytest.mark.slow
 def test_many_random_targets() -> None:
     refused = []
-    for seed in range(8, 68):
+    for seed in range(8, 20):
         model, spec, held = random_case(seed)
         try:
             design = synthesise(model, spec, CATALOG, held)
@@ -162,7 +162,7 @@ def test_many_random_targets() -> None:
             refused.append(f"{seed}: {error}")
             continue
         check(design, spec, held)
-    assert len(refused) <= 6, refused
+    assert len(refused) <= 2, refused
 
 
 # Refusals.
