@@ -81,8 +81,8 @@ def test_the_paper_s_board(
     """The same n-p-q, and strobes near those of the exact circuit.
 
     Within 3 % of the peak on ``dynamic``, whose limits are those of the exact circuit; within 10 %
-    on ``full``, where U3C's limit follows its load and takes the clearance along: there 1-8-8, whose
-    window is 3 % wide, is lost.
+    on ``full``, where U3C's limit follows its load and takes the clearance along: there 1-8-8,
+    whose window is 3 % wide, is lost.
     """
     subject = paper()[omega]
     read = run(subject, rung, steps, periods)
