@@ -243,10 +243,12 @@ def _agreement(answers: Sequence[Answer]) -> dict[str, Any]:
         "asked": len(asked),
         "agreed": sum(a.agrees is True for a in asked),
         "failed": sum(a.ngspice == "failed" for a in asked),
+        "undecided": sum(a.ngspice == "undecided" for a in asked),
         "nominal_start": {
             "asked": len(nominal),
             "agreed": sum(a.agrees_from_nominal is True for a in nominal),
             "failed": sum(a.ngspice_nominal == "failed" for a in nominal),
+            "undecided": sum(a.ngspice_nominal == "undecided" for a in nominal),
             "too_long": sum(
                 bool(a.ngspice_nominal_reason) and not a.ngspice_nominal for a in answers
             ),
