@@ -279,7 +279,7 @@ def _check_calls(
         block, called = blocks[key], [sizes[name] for name in calls[key]]
         count = len(block.inside) + sum(n for n, _ in called)
         length = sum(_length(s.text, functions)[0] for s in block.inside if s.word != ".func")
-        length += sum(n for _, n in called)
+        length += _length(block.rest, functions)[0] + sum(n for _, n in called)
         if count > MOST_EXPANDED or length > MOST_CHARACTERS:
             most = f"{MOST_EXPANDED} statements or {MOST_CHARACTERS} characters"
             raise _refused(path, block.line, block.name, f"more than {most}, written out")
