@@ -134,7 +134,13 @@ def column(
     spec: CircuitSpec,
     catalog: Catalog,
 ) -> Column:
-    """One design's figures; never raises for what the circuit itself cannot do."""
+    """One design's figures. Coefficients of the wrong sign and responses without an answer are
+    part of them.
+
+    Raises
+    ------
+    FloatingCircuit : the nodal equations of the circuit have no unique answer in some mode.
+    """
     circuit = candidate.circuit
     errors, reason = None, ""
     try:

@@ -13,7 +13,7 @@ from designer.compare import compare
 from designer.compare_json import comparison_json, file_json, in_answer
 from designer.design_files import design_provenance
 from designer.folder import COMPARISON, COMPARISON_PICTURES, Folder
-from designer.jsonout import dumps
+from designer.jsonout import cost_of, dumps
 from designer.progress import Progress
 
 NAMES = (COMPARISON, *COMPARISON_PICTURES)
@@ -48,8 +48,11 @@ def write(folder: Folder, compared: Compared) -> None:
 
 
 def beside(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any]:
-    """What ``synthesise --compare`` prints: the design's object, and the comparison in it."""
-    cost = {**design["cost"], "comparison_seconds": file["cost"]["seconds"]}
+    """What ``synthesise --compare`` prints: the design's object, and the comparison in it.
+
+    The time is None where the file has none: no hash guards the object ``cost``.
+    """
+    cost = {**cost_of(design), "comparison_seconds": cost_of(file).get("seconds")}
     return {**design, "comparison": in_answer(file), "cost": cost}
 
 

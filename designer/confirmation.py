@@ -40,6 +40,8 @@ MOST_PERIODS = 400
 out by name: the run would take minutes."""
 OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
 """How often the step is halved where ngspice disagrees, until two step sizes say the same."""
+UNDECIDED = "undecided"
+"""What is heard where the last two step sizes still say different things."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Query:
 
 @dataclass(frozen=True)
 class Heard:
-    """What ngspice said: n-p-q or status, with the reason and the remedies of the last run."""
+    """What ngspice said: n-p-q, status or `UNDECIDED`, with the reason and the remedies of the last
+    run. An undecided one's reason has both answers."""
 
     response: str
     reason: str = ""
@@ -99,25 +102,37 @@ def confirm(
 ) -> list[Heard]:
     """ngspice's answers, in order.
 
-    Where it disagrees the step is halved, at most ``refinements`` times, until two step sizes say
-    the same. ``progress`` is called once a query.
+    A first answer that is the expected one stands: its settings have passed the gate at two step
+    sizes. Where it is another the step is halved, at most ``refinements`` times, until two step
+    sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A failed
+    run is no answer: it is neither the same as another nor different. ``progress`` is called once
+    a query.
     """
     heard: list[Heard | None] = [None] * len(queries)
+    answered: list[str | None] = [None] * len(queries)
     asked = [(k, q.settings) for k, q in enumerate(queries)]
     for level in range(refinements + 1):
         tasks = [gate.task(queries[k].subject, settings) for k, settings in asked]
         again = []
         for i, outcome in remedies.run(pool, tasks):
             k, settings = asked[i]
-            before, said = heard[k], _heard(outcome)
-            heard[k] = said
-            twice = before is not None and before.response == said.response
-            if twice or said.response == queries[k].expected or level == refinements:
+            before, said = answered[k], _heard(outcome)
+            failed = said.response == OrbitStatus.FAILED
+            settled = not failed and said.response == (before or queries[k].expected)
+            if settled or level == refinements:
+                heard[k] = said if settled or failed else _undecided(before, said)
                 progress()
             else:
                 again.append((k, replace(settings, max_step=settings.max_step / 2.0)))
+            answered[k] = before if failed else said.response
         asked = sorted(again, key=lambda item: item[0])
     return [h for h in heard if h is not None]
+
+
+def _undecided(before: str | None, said: Heard) -> Heard:
+    only = f"only one run had an answer: {said.response}"
+    both = f"{before}, at a smaller step {said.response}"
+    return Heard(UNDECIDED, only if before is None else both, said.remedies)
 
 
 def _heard(outcome: remedies.Outcome[Read]) -> Heard:

@@ -120,9 +120,15 @@ def study_json(
     }
 
 
+def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
+    """The object ``cost`` of a file; empty where somebody took it out: its hash leaves it out."""
+    cost = file.get("cost")
+    return dict(cost) if isinstance(cost, Mapping) else {}
+
+
 def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, Any]:
     """What ``run`` prints, from the objects of the two files."""
-    cost = {"design": design["cost"], "study": study["cost"]}
+    cost = {"design": cost_of(design), "study": cost_of(study)}
     return {
         **design,
         "samples": study["samples"],
@@ -243,10 +249,12 @@ def _agreement(answers: Sequence[Answer]) -> dict[str, Any]:
         "asked": len(asked),
         "agreed": sum(a.agrees is True for a in asked),
         "failed": sum(a.ngspice == "failed" for a in asked),
+        "undecided": sum(a.ngspice == "undecided" for a in asked),
         "nominal_start": {
             "asked": len(nominal),
             "agreed": sum(a.agrees_from_nominal is True for a in nominal),
             "failed": sum(a.ngspice_nominal == "failed" for a in nominal),
+            "undecided": sum(a.ngspice_nominal == "undecided" for a in nominal),
             "too_long": sum(
                 bool(a.ngspice_nominal_reason) and not a.ngspice_nominal for a in answers
             ),

@@ -21,6 +21,7 @@ from designer.confirmation import (
     NOMINAL_REFINEMENTS,
     OWN_REFINEMENTS,
     OWN_SAMPLES,
+    UNDECIDED,
     Heard,
     Query,
     confirm,
@@ -70,10 +71,10 @@ class Answer:
     """One sample of one response.
 
     response : n-p-q or status on the exact circuit; the margins are its. ngspice : n-p-q or
-    status there from this sample's own orbit, "" where ngspice was not asked. ngspice_nominal :
-    likewise from the nominal orbit, after ngspice_nominal_periods drive periods; where the
-    reason alone is given, the way was too long to be asked. The remedies are those that a run
-    needed to converge, in order.
+    status there from this sample's own orbit, "undecided" where two step sizes differ to the
+    last, "" where ngspice was not asked. ngspice_nominal : likewise from the nominal
+    orbit, after ngspice_nominal_periods drive periods; where the reason alone is given, the way
+    was too long to be asked. The remedies are those that a run needed to converge, in order.
     """
 
     sample: int
@@ -96,7 +97,7 @@ class Answer:
 
     @property
     def agrees(self) -> bool | None:
-        """None where ngspice was not asked or failed."""
+        """None where ngspice was not asked, failed or is undecided."""
         return self._says_so(self.ngspice)
 
     @property
@@ -105,7 +106,7 @@ class Answer:
         return self._says_so(self.ngspice_nominal)
 
     def _says_so(self, heard: str) -> bool | None:
-        return None if heard in ("", OrbitStatus.FAILED) else heard == self.response
+        return None if heard in ("", OrbitStatus.FAILED, UNDECIDED) else heard == self.response
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from designer import report_words as words
 from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
+from designer.confirmation import UNDECIDED
 from designer.design import Design
 from designer.gate import shortest_contact
 from designer.montecarlo import Answer, Verdict, Yield
@@ -190,24 +191,29 @@ def ngspice_table(data: ReportData) -> Table | None:
             asked = [h for h in heard if h[1]]
             if not asked:
                 continue
+            open_ = Counter(why for _, said, why, _ in asked if said == UNDECIDED)
             failed = Counter(
-                why or "no reason given" for _, _, why, agrees in asked if agrees is None
+                why or "no reason given"
+                for _, said, why, agrees in asked
+                if agrees is None and said != UNDECIDED
             )
             differ = Counter(f"{a.response} but {said}" for a, said, _, ok in asked if ok is False)
             agreed = sum(agrees is True for _, _, _, agrees in asked)
-            notes = [f"{t} ({n})" for t, n in sorted([*differ.items(), *failed.items()])]
-            counts = (len(asked), agreed, sum(differ.values()), sum(failed.values()))
+            notes = [
+                f"{t} ({n})" for t, n in sorted([*differ.items(), *open_.items(), *failed.items()])
+            ]
+            counts = (agreed, *(sum(counted.values()) for counted in (differ, open_, failed)))
             said_ = ", ".join(notes[:REASONS_SHOWN])
-            rows.append((words.name(c), start, *map(str, counts), said_))
+            rows.append((words.name(c), start, *map(str, (len(asked), *counts)), said_))
     if not rows:
         return None
     return Table(
         (
-            "response", "started on", "boards", "agreed", "differed", "failed",
+            "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
             "circuit but ngspice; reasons",
         ),
         tuple(rows),
-        (2, 3, 4, 5),
+        (2, 3, 4, 5, 6),
     )  # fmt: skip
 
 

@@ -14,8 +14,9 @@ else is in a deck.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from designer.errors import InputError
@@ -28,9 +29,13 @@ CARDS = (".subckt", ".ends", ".model", ".param", ".func")
 PREFIX = "vendor_"
 MOST_BYTES, MOST_STATEMENTS, LONGEST = 256_000, 5_000, 4_000
 """Of a file, in a file, and characters of a statement with its continuations."""
+MOST_EXPANDED, MOST_CHARACTERS = 10_000, 1_000_000
+"""Statements of one op-amp, and their characters, with calls and functions written out: both can
+double with every line of a file."""
 
 _FILE = re.compile(r"\bfile\w*\s*[=(\"']|\bpwl\w*\s*\(?\s*file|\bd?pwlfile\b", re.IGNORECASE)
-_FUNCTION = re.compile(r"\.func\s+([A-Za-z_]\w*)\s*\([^()]*\)\s*=?", re.IGNORECASE)
+_FUNCTION = re.compile(r"\.func\s+([A-Za-z_]\w*)\s*\(([^()]*)\)\s*=?", re.IGNORECASE)
+_TOKEN = re.compile(r"[a-z_]\w*|\S")
 _NAME = re.compile(r"[A-Za-z0-9_.+-]+")
 _PARAMETER = re.compile(r"\S+\s*=\s*(\{[^}]*\}|'[^']*'|\S+)|\bparams:", re.IGNORECASE)
 
@@ -83,7 +88,9 @@ def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path)
     if sorted(pins) != sorted(PINS):
         raise InputError(path, "pins", ", ".join(pins), "each once: " + ", ".join(PINS))
     # Bytes outside ASCII are common in comments, and refused elsewhere.
-    blocks = _blocks(_statements(content.decode("latin-1"), path), path)
+    statements = _statements(content.decode("latin-1"), path)
+    functions = _functions(statements, path)
+    blocks = _blocks(statements, path)
     wanted = blocks.get(subckt.lower())
     if wanted is None:
         raise InputError(path, "subckt", subckt, "one of " + ", ".join(sorted(blocks)))
@@ -91,7 +98,7 @@ def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path)
         raise InputError(
             path, f"line {wanted.line}", f"{len(wanted.nodes)} pins", f"{len(PINS)} pins"
         )
-    _check_calls(blocks, path)
+    _check_calls(blocks, functions, path)
     lines = [text for block in blocks.values() for text in block.text(blocks)]
     return VendorModel(str(path), _prefixed(subckt), tuple(pins), tuple(lines), content)
 
@@ -164,7 +171,6 @@ def _statements(text: str, path: Path) -> list[_Statement]:
             )
     for statement in found:
         _check(statement, path)
-    _check_functions(found, path)
     return found
 
 
@@ -250,9 +256,12 @@ def _renamed(s: _Statement, blocks: Mapping[str, _Block]) -> str:
     return s.text[:start] + _prefixed(blocks[name.lower()].name) + s.text[stop:]
 
 
-def _check_calls(blocks: Mapping[str, _Block], path: Path) -> None:
-    """Every call is of a subcircuit of this file, and none leads back to itself."""
-    calls: dict[str, set[str]] = {}
+def _check_calls(
+    blocks: Mapping[str, _Block], functions: Mapping[str, tuple[int, int]], path: Path
+) -> None:
+    """Every call is of a subcircuit of this file, none leads back to itself, and all that a
+    subcircuit stands for can be written out."""
+    calls: dict[str, list[str]] = {key: [] for key in blocks}
     for key, block in blocks.items():
         for s in block.inside:
             if s.word[0] != "x":
@@ -260,45 +269,85 @@ def _check_calls(blocks: Mapping[str, _Block], path: Path) -> None:
             name = _called(s)[0].lower()
             if name not in blocks:
                 raise _refused(path, s.line, s.text, "a subcircuit that is not in this file")
-            calls.setdefault(key, set()).add(name)
-    circle = _circle(calls)
+            calls[key].append(name)
+    order, circle = _ordered(calls)
     if circle is not None:
         block = blocks[circle]
         raise _refused(path, block.line, block.name, "a subcircuit that calls itself")
+    sizes: dict[str, tuple[int, int]] = {}
+    for key in order:
+        block, called = blocks[key], [sizes[name] for name in calls[key]]
+        count = len(block.inside) + sum(n for n, _ in called)
+        length = sum(_length(s.text, functions)[0] for s in block.inside if s.word != ".func")
+        length += _length(block.rest, functions)[0] + sum(n for _, n in called)
+        if count > MOST_EXPANDED or length > MOST_CHARACTERS:
+            most = f"{MOST_EXPANDED} statements or {MOST_CHARACTERS} characters"
+            raise _refused(path, block.line, block.name, f"more than {most}, written out")
+        sizes[key] = (count, length)
 
 
-def _check_functions(statements: Sequence[_Statement], path: Path) -> None:
-    """No function leads back to itself: ngspice would expand it for ever."""
+def _functions(statements: Sequence[_Statement], path: Path) -> dict[str, tuple[int, int]]:
+    """How long calls of each function become: characters of its own, and how often it repeats its
+    arguments. No function leads back to itself: ngspice would expand it for ever."""
     heads: dict[str, _Statement] = {}
-    bodies: dict[str, str] = {}
+    # Two subcircuits may each have one of this name: all that any of them uses counts.
+    bodies: dict[str, list[tuple[str, set[str]]]] = {}
     for s in statements:
         if s.word == ".func":
             match = _FUNCTION.match(s.text)
             if match is None:
                 raise _refused(path, s.line, s.text, "a function without a name and arguments")
             name = match[1].lower()
-            # Two subcircuits may each have one of this name: all that any of them uses counts.
             heads.setdefault(name, s)
-            bodies[name] = f"{bodies.get(name, '')} {s.text[match.end() :].lower()}"
+            arguments = {word.strip() for word in match[2].lower().split(",")}
+            bodies.setdefault(name, []).append((s.text[match.end() :], arguments))
     uses = {
-        name: {word for word in re.findall(r"[a-z_]\w*", body) if word in heads}
-        for name, body in bodies.items()
+        name: [w for text, _ in found for w in _TOKEN.findall(text.lower()) if w in heads]
+        for name, found in bodies.items()
     }
-    circle = _circle(uses)
+    order, circle = _ordered(uses)
     if circle is not None:
         s = heads[circle]
         raise _refused(path, s.line, s.text, "a function that calls itself")
+    sizes: dict[str, tuple[int, int]] = {}
+    for name in order:
+        own, repeats = zip(
+            *(_length(text, sizes, names) for text, names in bodies[name]), strict=True
+        )
+        sizes[name] = (max(own), max(1, *repeats))
+    return sizes
 
 
-def _circle(uses: Mapping[str, set[str]]) -> str | None:
-    """A name that leads back to itself, or None."""
-    left = {name: set(used) for name, used in uses.items()}
-    while left:
-        free = {name for name, used in left.items() if not used & left.keys()}
-        if not free:
-            return next(iter(left))
-        left = {name: used for name, used in left.items() if name not in free}
-    return None
+def _length(
+    text: str, functions: Mapping[str, tuple[int, int]], arguments: Collection[str] = ()
+) -> tuple[int, int]:
+    """At most so many characters with all functions written out, and how often any of the
+    arguments stands in it. Both stop a little above `MOST_CHARACTERS`."""
+    most = MOST_CHARACTERS + 1
+    open_: list[tuple[tuple[int, int], int, int]] = []
+    call, own, repeats, last = (0, 1), 0, 0, ""
+    for token in [*_TOKEN.findall(text.lower()), *")" * text.count("(")]:
+        if token == "(":
+            open_.append((call, own, repeats))
+            call, own, repeats = functions.get(last, (0, 1)), 0, 0
+        elif token == ")" and open_:
+            inner = (call[0] + call[1] * own, call[1] * repeats)
+            call, own, repeats = open_.pop()
+            own, repeats = min(own + inner[0], most), min(repeats + inner[1], most)
+        elif token in arguments:
+            repeats += 1
+        else:
+            own += len(token)
+        last = token
+    return own, repeats
+
+
+def _ordered(uses: Mapping[str, Collection[str]]) -> tuple[list[str], str | None]:
+    """Names after all that they use, and a name that leads back to itself, or None."""
+    try:
+        return list(TopologicalSorter(uses).static_order()), None
+    except CycleError as error:
+        return [], str(error.args[1][0])
 
 
 def _prefixed(name: str) -> str:

@@ -19,6 +19,7 @@ from designer.confirmation import (
     NOMINAL_SAMPLES,
     OWN_SAMPLES,
     REMAINDER,
+    UNDECIDED,
     Query,
     confirm,
     periods_to_settle,
@@ -33,6 +34,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import draw
 from designer.system import Drive
+from designer.waveform_orbit import Read
 from designer.workers import SpiceJob, SpicePool
 from tests.paper_cases import flow_of, subject
 from tests.test_montecarlo import plan
@@ -145,6 +147,55 @@ def test_a_disagreement_is_asked_again_until_two_steps_say_the_same(
     assert heard.response == "1-1-1"
     assert heard.remedies == ""
     assert counting.jobs == runs
+    assert calls == [1]
+
+
+class Saying:
+    """A pool whose runs end as they are told to: a number of impacts, or a reason to fail."""
+
+    def __init__(self, *ends: int | str) -> None:
+        self.ends, self.steps = list(ends), 0
+
+    def map(self, jobs: Iterable[SpiceJob[Any]]) -> Iterator[tuple[int, Any]]:
+        for i, _ in enumerate(jobs):
+            end = self.ends[self.steps]
+            self.steps += 1
+            if isinstance(end, str):
+                yield i, SimulationFailed(end)
+            else:
+                orbit = Orbit(OrbitStatus.PERIODIC, n=1, p=end, q=end)
+                yield i, Read(orbit, np.zeros((9, 4)), None)
+
+
+@pytest.mark.parametrize(
+    ("ends", "refinements", "response", "reason"),
+    [
+        ((1,), 2, "1-1-1", ""),
+        ((2, 2), 2, "1-2-2", ""),
+        ((2, 1, 1), 2, "1-1-1", ""),
+        ((2, 3, 3), 2, "1-3-3", ""),
+        # The last two differ, whatever the last says.
+        ((2, 1), 1, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
+        ((2, 3), 1, UNDECIDED, "1-2-2, at a smaller step 1-3-3"),
+        ((2, 1, 2), 2, UNDECIDED, "1-1-1, at a smaller step 1-2-2"),
+        # A failure is no answer: not the same as another, and not what a later one differs from.
+        (("died", 1), 2, "1-1-1", ""),
+        (("died", "died", 1), 2, "1-1-1", ""),
+        (("died", "stuck", "died"), 2, "failed", "died"),
+        (("died", 2), 1, UNDECIDED, "only one run had an answer: 1-2-2"),
+        ((2, "died", 2), 2, "1-2-2", ""),
+        ((2, "died", 1), 2, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
+        ((2, "died"), 1, "failed", "died"),
+    ],
+)
+def test_only_two_answers_that_are_the_same_count(
+    ends: tuple[int | str, ...], refinements: int, response: str, reason: str
+) -> None:
+    who, pool, calls = subject(1), Saying(*ends), []
+    query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1")
+    (heard,) = confirm(pool, [query], refinements, lambda: calls.append(1))  # type: ignore[arg-type]
+    assert (heard.response, heard.reason) == (response, reason)
+    assert pool.steps == len(ends)
     assert calls == [1]
 
 

@@ -10,13 +10,17 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from designer import gate
-from designer.deck import SolverSettings
+from designer.attractor import settle
+from designer.deck import Excitation, SolverSettings
+from designer.flow import Flow
 from designer.gate import BOUND, LEVELS, STEPS_PER_CONTACT, GateResult, Subject
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
+from designer.remedies import Outcome
+from designer.system import Drive
 from designer.waveform_orbit import Read
 from designer.workers import SpicePool
-from tests.paper_cases import flow_of, subject
+from tests.paper_cases import MODEL, flow_of, subject
 
 P = (1, 3, 8)
 
@@ -60,6 +64,50 @@ def shortest_contact(who: Subject) -> float:
     return shortest / 20_000
 
 
+def test_contacts_are_counted_round_the_lap() -> None:
+    def lengths(lap: str) -> list[int]:
+        return list(gate.contact_lengths(np.array([c == "#" for c in lap])))
+
+    assert lengths("..##..#.") == [2, 1]
+    assert sorted(lengths("##..#..#")) == [1, 3]  # the last goes on with the first
+    assert lengths("#..") == lengths("..#") == [1]
+    assert lengths("....") == lengths("####") == []
+
+
+def test_a_contact_across_the_ends_of_the_lap() -> None:
+    """Against a count in the middle of three laps, which it does not interrupt there."""
+    system = replace(MODEL, sides="upper").second_order().piecewise_linear()
+    excitation = Excitation(1.0 / (2.0 * np.pi), 1.0)
+    flow = Flow(system, Drive(1.0, -1.0))
+    orbit = settle(flow, np.full(4, 0.3))
+    upper, _ = gate.contact_rows(system)
+    assert orbit.response == "1-1-0"
+    assert upper is not None
+    assert orbit.start @ upper[:-2] + upper[-1] > 0.0
+    trace = flow.run(orbit.start, 3, points=5000).strobes
+    u = -np.sin(2.0 * np.pi * np.arange(len(trace)) / 5000)
+    touching = (trace @ upper[:-2] + upper[-2] * u + upper[-1] > 0.0).astype(int)
+    entry = np.flatnonzero(np.diff(touching) > 0)[0]
+    exits = np.flatnonzero(np.diff(touching) < 0)
+    length = (exits[exits > entry][0] - entry) / 5000
+    found = gate.shortest_contact(orbit, system, excitation) * excitation.frequency
+    assert found == pytest.approx(length, abs=3e-4)
+    assert found < 0.9
+
+
+@pytest.mark.parametrize("p", P)
+def test_a_contact_that_no_point_shows_is_shorter_than_their_distance(
+    p: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    who, true = subject(p), shortest_contact(subject(p)) * subject(p).period
+    for points in (3, 5, 8, 20_000):
+        monkeypatch.setattr(gate, "WAVE_POINTS", points)
+        found = gate.shortest_contact(who.orbit, who.system, who.excitation)
+        apart = who.period / points
+        assert found == pytest.approx(true, abs=apart)
+        assert found <= max(true + apart, apart)
+
+
 @pytest.mark.parametrize("p", P)
 def test_what_passes(passed: dict[int, GateResult], p: int) -> None:
     result, who = passed[p], subject(p)
@@ -77,6 +125,8 @@ def test_what_passes(passed: dict[int, GateResult], p: int) -> None:
     )
     said = result.as_dict()
     assert (said["method"], said["passed"], said["bound"]) == ("trap", True, BOUND)
+    # Tighter where the orbit is slow: 1e-2 (1 - ρ).
+    assert said["rms_bound"] == pytest.approx(min(2e-3, 1e-2 * (1.0 - who.orbit.radius)))
     assert said["steps_a_period"] == pytest.approx(who.period / result.settings.max_step)
 
 
@@ -155,6 +205,21 @@ def test_two_hundred_steps_a_period_miscount_eight_impacts(
 
 # ---------------------------------------------------------------------------------------------
 # No
+
+
+def test_a_response_without_a_period_is_compared_by_name_alone(
+    pool: SpicePool,
+) -> None:
+    """An orbit that only the exact side calls aperiodic does not pass; one that both do, does."""
+    who = subject(1)
+    nameless = replace(who, orbit=Orbit(OrbitStatus.APERIODIC, start=who.orbit.start))
+    ((_, ran),) = pool.map([gate.job(who, SolverSettings("trap", who.period / 400.0))])
+    assert isinstance(ran, Read)
+    for own, passes in ((ran.orbit, False), (Orbit(OrbitStatus.APERIODIC), True)):
+        outcome = Outcome(replace(ran, orbit=own), SolverSettings("trap", who.period / 400.0))
+        result = gate._judge(nameless, [outcome] * 3, (400,), who.period)
+        assert result.passed is passes
+        assert np.isnan([result.difference, result.wave, result.wave_bound]).all()
 
 
 def test_engines_that_disagree_do_not_pass(pool: SpicePool) -> None:

@@ -134,6 +134,7 @@ def test_agreement_with_ngspice() -> None:
     blank = Answer(0, 0, Verdict.OK, "1-1-1", "", 0.0, 0.0, 0.0, 0.0, 0)
     assert blank.agrees is None
     assert replace(blank, ngspice="failed").agrees is None
+    assert replace(blank, ngspice="undecided").agrees is None
     assert replace(blank, ngspice="1-1-1").agrees is True
     assert replace(blank, ngspice="1-2-2").agrees is False
 

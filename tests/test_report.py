@@ -18,12 +18,13 @@ from designer.bom import bill
 from designer.catalog import Catalog, load_catalog
 from designer.errors import InputError
 from designer.modelfile import Expect, parse_model_file, read_model_file
-from designer.montecarlo import Verdict, run_block
+from designer.montecarlo import Answer, Verdict, run_block
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus, failed
 from designer.provenance import provenance
 from designer.report import render_html, render_markdown, write_report
 from designer.report_data import ReportData
+from designer.report_tables import ngspice_table
 from designer.study import Study
 from designer.workers import SpicePool
 
@@ -301,6 +302,20 @@ def test_without_ngspice(whole: ReportData) -> None:
     text = Page(render_html(replace(whole, checked=checked, answers=answers))).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text
+
+
+def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportData) -> None:
+    def said(a: Answer) -> Answer:
+        word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(a.sample, a.response)
+        return replace(a, ngspice=word, ngspice_reason=f"why {word}", ngspice_nominal="")
+
+    data = replace(whole, answers=tuple(map(said, whole.answers)))
+    table = ngspice_table(data)
+    assert table is not None
+    for row in table.rows:
+        boards, agreed, *others = map(int, row[2:7])
+        assert (agreed, others) == (boards - 3, [1, 1, 1])
+        assert "but 9-9-9 (1), why failed (1), why undecided (1)" in row[7]
 
 
 def test_without_responses(whole: ReportData) -> None:

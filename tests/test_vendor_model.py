@@ -203,6 +203,31 @@ def test_a_model_that_is_too_large(tmp_path: Path) -> None:
         read_vendor_model("part.lib", "part", ORDER, tmp_path)
 
 
+def doubling(kind: str, levels: int) -> str:
+    """A model whose size doubles with each of its levels."""
+    if kind == "calls":
+        blocks = "".join(
+            f".subckt b{k + 1} a b\nX1 a c b{k}\nX2 c b b{k}\n.ends\n" for k in range(levels)
+        )
+        inner = ".subckt b0 a b\nR1 a b 1\n.ends\n"
+        return f"{MODEL.replace('Xbuf x 5', f'X9 x 0 b{levels}{chr(10)}Xbuf x 5')}{inner}{blocks}"
+    if kind == "functions":
+        heads = "".join(f".func f{k + 1}(x) {{f{k}(x)+f{k}(x)}}\n" for k in range(levels))
+        return f".func f0(x) {{x*1}}\n{heads}" + MODEL.replace("1e-3*V", f"f{levels}(1)*V")
+    nested = "twice(" * levels + "half" + ")" * levels
+    return MODEL.replace("{x*2}", "{x+x}").replace("twice(half)", nested)
+
+
+@pytest.mark.parametrize("kind", ["calls", "functions", "arguments"])
+def test_models_that_grow(tmp_path: Path, kind: str) -> None:
+    """Few lines that stand for more than any machine holds; a few levels are no harm."""
+    read_vendor_model("part.lib", "part", ORDER, save(tmp_path, doubling(kind, 8)))
+    for levels in (24, 200):
+        save(tmp_path, doubling(kind, levels))
+        with pytest.raises(InputError, match="written out"):
+            read_vendor_model("part.lib", "part", ORDER, tmp_path)
+
+
 def test_pins_are_those_of_our_subcircuit() -> None:
     from designer import opamp_model
 
