@@ -276,10 +276,10 @@ def _exact(
                     verdict=verdict,
                     response=orbit.response,
                     reason=reason,
-                    radius=orbit.radius,
-                    penetration=orbit.penetration,
-                    miss=orbit.miss,
-                    asymmetry=orbit.asymmetry,
+                    radius=_kept(orbit.radius),
+                    penetration=_kept(orbit.penetration),
+                    miss=_kept(orbit.miss),
+                    asymmetry=_kept(orbit.asymmetry),
                     periods=orbit.periods,
                 ),
                 subject,
@@ -287,3 +287,9 @@ def _exact(
         )
         progress()
     return out
+
+
+def _kept(value: float) -> float:
+    """A margin to nine digits: its last few depend on how a process lies in memory (which loops of
+    the numerical libraries run), and equal studies are equal files."""
+    return float(f"{value:.9g}")
