@@ -48,7 +48,7 @@ def rules_of(values: Values, t: Targets, bounds: Bounds, wishes: Wishes) -> Rule
     one, two = uses_one.any(axis=1), uses_two.any(axis=1)
     preferred = np.log(np.array(sorted(v for v in wishes.preferred if v > 0.0), dtype=float))
     return Rules(
-        w=np.array([t.w2, t.w3, t.w4, t.w5, t.w8, t.w9, t.w10, t.w11]),
+        w=t.logs,
         seconds=np.log(np.maximum(bounds.seconds, 1e-300)),
         level=float(np.log(bounds.level)),
         share=float(np.log(bounds.share)),

@@ -66,6 +66,32 @@ class Targets:
         w = np.log(np.abs(np.where(A == 0.0, 1.0, A)))
         return cls(w[1, 1], w[1, 3], w[1, 0], w[1, 2], w[3, 1], w[3, 3], w[3, 0], w[3, 2])
 
+    @property
+    def logs(self) -> Array:
+        """(8,) in the order of the resistors' numbers."""
+        own = (self.w2, self.w3, self.w4, self.w5, self.w8, self.w9, self.w10, self.w11)
+        return np.array(own, dtype=float)
+
+
+def residuals_of(r: Array, c: Array, w: Array) -> tuple[Array, Array]:
+    """(k, 10) offsets and (10, 4) scales (alpha, p, q1, q3) of the coefficient errors.
+
+    r (k, 10), c (k, 4) : ln of the parts in the order of ``PARTS``. w (8,) : ``Targets.logs``.
+    """
+    r1, r2, r3, r4, r5, r7, r8, r9, r10, r11 = r.T
+    c1, c2, c3, c4 = c.T
+    w2, w3, w4, w5, w8, w9, w10, w11 = w
+    delta = c4 - c2
+    offsets = [
+        -r2 - w2, -delta - r9 - w9, -r3 - w3, -delta - r8 - w8, -r4 - w4,
+        -delta - r10 - w10, -r5 - w5, -delta - r11 - w11, c2 - r1 - c1, c2 - r7 - c3,
+    ]  # fmt: skip
+    scales = [
+        (1, 0, 0, 0), (1, 0, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 1, 0),
+        (1, -1, 1, 0), (1, 1, 0, 1), (1, 0, 0, 1), (1, 0, -1, 0), (1, 0, 0, -1),
+    ]  # fmt: skip
+    return np.stack(offsets, axis=1), np.array(scales, dtype=float)
+
 
 def elementary(D: Array) -> tuple[Index, Array]:
     """Elementary vectors y of D (m, 2), y D = 0: (k, 3) places and entries, each of unit 1-norm.

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from designer.dead_zone_target import DeadZoneTarget
-from designer.linear_block import Targets
+from designer.linear_block import PARTS, Targets, residuals_of
 from designer.minimax import minimax
 from designer.model import Dimensionless
 from designer.system import Array
@@ -115,19 +115,6 @@ def slope_interval(values: Mapping[str, float], targets: Targets, mu: float) -> 
 
 def _residuals(values: Mapping[str, float], t: Targets) -> tuple[Array, Array]:
     """(10,) offsets and (10, 4) scales (alpha, p, q1, q3) of the linear block's errors."""
-    v = {name: float(np.log(value)) for name, value in values.items()}
-    delta = v["C4"] - v["C2"]
-    rows = [
-        (-v["R2"] - t.w2, 1, 0, 0, 0),
-        (-delta - v["R9"] - t.w9, 1, 0, 0, 0),
-        (-v["R3"] - t.w3, 1, 1, 0, 0),
-        (-delta - v["R8"] - t.w8, 1, -1, 0, 0),
-        (-v["R4"] - t.w4, 1, 0, 1, 0),
-        (-delta - v["R10"] - t.w10, 1, -1, 1, 0),
-        (-v["R5"] - t.w5, 1, 1, 0, 1),
-        (-delta - v["R11"] - t.w11, 1, 0, 0, 1),
-        (v["C2"] - v["R1"] - v["C1"], 1, 0, -1, 0),
-        (v["C2"] - v["R7"] - v["C3"], 1, 0, 0, -1),
-    ]
-    table = np.array(rows, dtype=float)
-    return table[:, 0], table[:, 1:]
+    logs = np.log([values[name] for name in PARTS])
+    h, D = residuals_of(logs[None, :10], logs[None, 10:], t.logs)
+    return h[0], D

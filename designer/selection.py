@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import cvxpy as cp
 import numpy as np
 
-from designer.linear_block import PARTS, slice_from
+from designer.linear_block import PARTS, residuals_of, slice_from
 from designer.linear_kernel import Rules, Values, gather
 from designer.minimax import minimax
 from designer.system import Array, Index
@@ -191,20 +191,7 @@ def residuals(values: Values, rules: Rules, parts: Index) -> tuple[Array, Array]
 
     parts : (k, 14) indices.
     """
-    r, c = values.r[parts[:, :10]], values.c[parts[:, 10:]]
-    r1, r2, r3, r4, r5, r7, r8, r9, r10, r11 = r.T
-    c1, c2, c3, c4 = c.T
-    w2, w3, w4, w5, w8, w9, w10, w11 = rules.w
-    delta = c4 - c2
-    offsets = [
-        -r2 - w2, -delta - r9 - w9, -r3 - w3, -delta - r8 - w8, -r4 - w4,
-        -delta - r10 - w10, -r5 - w5, -delta - r11 - w11, c2 - r1 - c1, c2 - r7 - c3,
-    ]  # fmt: skip
-    scales = [
-        (1, 0, 0, 0), (1, 0, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 1, 0),
-        (1, -1, 1, 0), (1, 1, 0, 1), (1, 0, 0, 1), (1, 0, -1, 0), (1, 0, 0, -1),
-    ]  # fmt: skip
-    return np.stack(offsets, axis=1), np.array(scales, dtype=float)
+    return residuals_of(values.r[parts[:, :10]], values.c[parts[:, 10:]], rules.w)
 
 
 def error_of(values: Values, rules: Rules, parts: Index) -> float:
