@@ -267,22 +267,26 @@ class Board:
 
     values : ohm or farad by part name. offset : input offset [V] by section; rails : (low, high)
     output limits [V] by section. inverse_gain : 1/open-loop gain, 0 for ideal op-amps. bias :
-    current into each input [A]. reference : volts by name of the reference; drop : forward voltage
-    [V] by name of the diode, while it conducts.
+    current into each input [A] by section. reference : volts by name of the reference; drop :
+    forward voltage [V] by name of the diode, while it conducts. supply : volts of the rails by
+    name; gain_bandwidth : [Hz] by section, which ngspice's models with a bandwidth use. What is
+    missing has no offset and no bias, and the circuit's own supply and bandwidth.
     """
 
     values: Mapping[str, float]
     offset: Mapping[str, float] = field(default_factory=dict)
     rails: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inverse_gain: float = 0.0
-    bias: float = 0.0
+    bias: Mapping[str, float] = field(default_factory=dict)
     reference: Mapping[str, float] = field(default_factory=dict)
     drop: Mapping[str, float] = field(default_factory=dict)
+    supply: Mapping[str, float] = field(default_factory=dict)
+    gain_bandwidth: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def mirror_symmetric(self) -> bool:
         """No offset, no bias and equal rails: x → -x is a symmetry of a stage that is even."""
-        level = all(v == 0.0 for v in self.offset.values()) and self.bias == 0.0
+        level = not any(self.offset.values()) and not any(self.bias.values())
         return level and all(low == -high for low, high in self.rails.values())
 
 
@@ -297,7 +301,7 @@ def nominal_board(circuit: Circuit, *, ideal: bool = False) -> Board:
         offset={s.name: 0.0 for s in circuit.sections},
         rails={s.name: (-limit, limit) for s in circuit.sections},
         inverse_gain=0.0 if ideal else 1.0 / circuit.gain,
-        bias=0.0 if ideal else circuit.bias,
+        bias={} if ideal else {s.name: circuit.bias for s in circuit.sections},
         reference={r.name: r.volts for r in circuit.references},
         drop={d.name: d.model.drop for d in circuit.diodes},
     )

@@ -107,7 +107,7 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
             (s.noninverting, s.inverting, s.output),
             rung=rung,
             vos=board.offset.get(s.name, 0.0),
-            ib=board.bias,
+            ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],
             start=outputs.get(s.name, 0.0),
         )
@@ -150,7 +150,7 @@ def _sources(circuit: Circuit, board: Board, rung: Rung) -> list[str]:
     A reference is a source on ``ideal``; above, it needs its current and has its resistance.
     """
     supplies = circuit.supplies if rung == "ideal" else circuit.rails
-    lines = [f"{s.name} {s.net} 0 {_n(s.volts)}" for s in supplies]
+    lines = [f"{s.name} {s.net} 0 {_n(board.supply.get(s.name, s.volts))}" for s in supplies]
     shunts = False
     for r in circuit.references:
         volts = board.reference[r.name]

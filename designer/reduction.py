@@ -129,7 +129,7 @@ class Reduction:
             current(s.output, i, 1.0)
             for net in (s.inverting, s.noninverting):
                 if net != GROUND:
-                    right[self._nets[net], n + 1] -= board.bias
+                    right[self._nets[net], n + 1] -= board.bias.get(s.name, 0.0)
         for i, d in enumerate(c.diodes, first["diodes"]):
             current(d.anode, i, 1.0)
             current(d.cathode, i, -1.0)
@@ -138,7 +138,7 @@ class Reduction:
             right[i, n + 1] = board.reference[ref.name]
         for i, rail in enumerate(c.supplies, first["supplies"]):
             source(i, rail.net, GROUND)
-            right[i, n + 1] = rail.volts
+            right[i, n + 1] = board.supply.get(rail.name, rail.volts)
         source(first["generator"], c.generator.net, GROUND)
         right[first["generator"], n] = 1.0
         return G, right

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import truncnorm
 
+from designer.boards import Boards
 from designer.catalog import OpAmp
 from designer.circuit import Board, Circuit
 
@@ -71,7 +72,12 @@ def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
         offset=dict(zip(names, (float(v) for v in offsets), strict=True)),
         rails={n: (-float(low), float(high)) for n, (low, high) in zip(names, limits, strict=True)},
         inverse_gain=1.0 / circuit.gain,
-        bias=circuit.bias,
+        bias=dict.fromkeys(names, circuit.bias),
         reference=references,
         drop={d.name: d.model.drop for d in circuit.diodes},
     )
+
+
+def draw_many(circuit: Circuit, spread: Spread, seed: int, indices: range) -> Boards:
+    """The boards of these numbers of the study with this seed."""
+    return Boards.of(circuit, [draw(circuit, spread, seed, index) for index in indices])

@@ -146,7 +146,7 @@ def test_offset_s_sign_in_ngspice_is_the_reduction_s() -> None:
         board = replace(
             nominal_board(CIRCUIT),
             offset={s.name: sign * 5e-3 for s in CIRCUIT.sections},
-            bias=0.0,
+            bias={},
         )
         flow = Flow(Reduction(CIRCUIT, board).system(), Drive(2 * np.pi * 400.0, 0.0))
         want = flow.run(np.zeros(4), 1).strobes[-1]

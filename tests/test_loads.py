@@ -70,7 +70,7 @@ def uneven(values: Mapping[str, float] = EXACT) -> Board:
             for s in circuit.sections
         },
         1e-5,
-        65e-12,
+        {s.name: 65e-12 for s in circuit.sections},
     )
 
 

@@ -75,7 +75,7 @@ def test_one_stop_follows_the_model(sides: Sides, omega: float) -> None:
     found = coefficient_errors(circuit, wanted.second_order())
     on_model = settle(Flow(wanted.second_order().piecewise_linear(), Drive(omega)), np.zeros(4))
     drive = Drive(2 * np.pi * found.scales.frequency(omega), -1.0 / found.drive_gain[0])
-    board = replace(nominal_board(circuit), inverse_gain=1e-9, bias=0.0)
+    board = replace(nominal_board(circuit), inverse_gain=1e-9, bias={})
     orbit = settle(
         Flow(Reduction(circuit, board).system(), drive), on_model.start * found.scales.volts
     )
@@ -93,7 +93,7 @@ def test_one_stop_follows_the_model(sides: Sides, omega: float) -> None:
 def test_penetration_of_contacts_so_deep_that_the_path_before_saturates_too() -> None:
     """Peak less threshold, at any depth: U3C's own overdrive stops growing with U3B's output."""
     circuit = circuit_of(EXACT)
-    system = Reduction(circuit, replace(nominal_board(circuit), bias=0.0)).system()
+    system = Reduction(circuit, replace(nominal_board(circuit), bias={})).system()
     threshold = SATURATION / dead_zone_gains(EXACT)[0]
     seen = []
     for amplitude in (1.0, 8.0):

@@ -43,7 +43,7 @@ def fv_by_hand(v: float, board: Board) -> float:
 
     The half that asks for more than the dead zone's leftover drives fv; there is never both.
     """
-    R, os, ib = board.values, board.offset, board.bias
+    R, os, ib = board.values, board.offset, board.bias.get("U1A", 0.0)
     v1 = v + os["U1A"]
     inverse = os["U2A"] + R["R101"] * ((os["U2A"] - v1) / R["R100"] + ib)
 
@@ -61,7 +61,9 @@ def fv_by_hand(v: float, board: Board) -> float:
 @given(seed=st.integers(0, 10**6), v=st.floats(-5.5, 5.5))
 def test_output_is_kirchhoff_s(seed: int, v: float) -> None:
     """Slope, threshold and leftover of both halves, with offsets, bias and spread."""
-    board = replace(spread(BOTH, seed), inverse_gain=1e-10, bias=1e-7)
+    board = replace(
+        spread(BOTH, seed), inverse_gain=1e-10, bias={s.name: 1e-7 for s in BOTH.sections}
+    )
     want = fv_by_hand(v, board)
     assume(abs(want) < 9.0)
     reduction = Reduction(BOTH, board)
@@ -220,7 +222,7 @@ def test_exact_values_follow_the_model(omega: float) -> None:
     found = coefficient_errors(BOTH, PAPER.second_order())
     on_model = settle(Flow(PAPER.second_order().piecewise_linear(), Drive(omega)), np.zeros(4))
     drive = Drive(2 * np.pi * found.scales.frequency(omega), -1.0 / found.drive_gain[0])
-    board = replace(nominal_board(BOTH), inverse_gain=1e-9, bias=0.0)
+    board = replace(nominal_board(BOTH), inverse_gain=1e-9, bias={})
     on_circuit = settle(
         Flow(Reduction(BOTH, board).system(), drive), on_model.start * found.scales.volts
     )
@@ -246,7 +248,7 @@ def test_one_stop_follows_the_model(sides: Sides, omega: float) -> None:
     found = coefficient_errors(circuit, wanted.second_order())
     on_model = settle(Flow(wanted.second_order().piecewise_linear(), Drive(omega)), np.zeros(4))
     drive = Drive(2 * np.pi * found.scales.frequency(omega), -1.0 / found.drive_gain[0])
-    board = replace(nominal_board(circuit), inverse_gain=1e-9, bias=0.0)
+    board = replace(nominal_board(circuit), inverse_gain=1e-9, bias={})
     reduction = Reduction(circuit, board)
     orbit = settle(Flow(reduction.system(), drive), on_model.start * found.scales.volts)
     assert on_model.status is OrbitStatus.PERIODIC
@@ -312,7 +314,7 @@ def test_vector_field_is_continuous_across_every_boundary() -> None:
 
 
 def test_the_halves_change_places_under_the_mirror() -> None:
-    board = replace(nominal_board(BOTH), bias=0.0)
+    board = replace(nominal_board(BOTH), bias={})
     system = Reduction(BOTH, board).system()
     assert system.mirror is not None
     errors = coefficient_errors(BOTH, PAPER.second_order())
@@ -336,7 +338,7 @@ def test_the_halves_change_places_under_the_mirror() -> None:
 
 @pytest.mark.parametrize("part", ["R200", "R204", "R205", "VR2", "D203", "offset"])
 def test_no_mirror_where_the_halves_differ(part: str) -> None:
-    board = replace(nominal_board(BOTH), bias=0.0)
+    board = replace(nominal_board(BOTH), bias={})
 
     def moved(name: str, values: Mapping[str, float]) -> dict[str, float]:
         return {**values, **({name: values[name] * 1.001} if name in values else {})}

@@ -177,7 +177,7 @@ def test_inverter_with_finite_gain(r1: float, r2: float, gain: float) -> None:
 def test_inverter_s_offset_and_bias(r1: float, r2: float, offset: float, bias: float) -> None:
     """Vos (1 + R2/R1) and, a current into the input, + I R2."""
     circuit = inverter(r1, r2)
-    board = Board(circuit.values, offset={"U1A": offset}, bias=bias)
+    board = Board(circuit.values, offset={"U1A": offset}, bias={"U1A": bias})
     row = Reduction(circuit, board).solution((0,)).voltage["out"]
     want = offset * (1.0 + r2 / r1) + bias * r2
     assert row[1] == pytest.approx(want, rel=1e-9, abs=1e-12 * (1 + r2 / r1))
@@ -354,7 +354,7 @@ def test_mirror_only_for_symmetric_boards() -> None:
     assert Reduction(circuit, even).system().mirror is not None
     for other in (
         replace(even, offset={**even.offset, "U3A": 1e-3}),
-        replace(even, bias=1e-12),
+        replace(even, bias={"U1A": 1e-12}),
         replace(even, rails={**even.rails, "U1A": (-13.0, 13.5)}),
     ):
         assert Reduction(circuit, other).system().mirror is None
@@ -372,7 +372,7 @@ def test_boards_with_everything_agree_with_ngspice() -> None:
             for s in circuit.sections
         },
         inverse_gain=1e-3,  # far below any part's, so that its effect is seen
-        bias=1e-7,
+        bias={s.name: 1e-7 for s in circuit.sections},
     )
     system = Reduction(circuit, board).system()
     frequency, amplitude = 400.0, 1.2
