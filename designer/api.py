@@ -14,12 +14,12 @@ from designer.catalog import Catalog, load_catalog
 from designer.design import Design
 from designer.equation_check import EquationCheck
 from designer.modelfile import ModelFile
-from designer.montecarlo import Answer, StudyPlan, Yield
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.responses import ModelResponse
 from designer.study import SAMPLES, SEED, Study, tolerance
+from designer.verdict import Answer, StudyPlan, Yield
 from designer.workers import SpicePool
 
 

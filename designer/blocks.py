@@ -21,12 +21,7 @@ import pyarrow.parquet as pq
 
 from designer import __version__, confirmation
 from designer.errors import InputError
-from designer.montecarlo import (
-    BLOCK,
-    Answer,
-    StudyPlan,
-    Verdict,
-)
+from designer.verdict import BLOCK, Answer, StudyPlan, Verdict
 
 FORMAT = 1
 FOLDER = "samples.parquet"
@@ -44,6 +39,7 @@ _SCHEMA = pa.schema(
         ("miss", pa.float64()),
         ("asymmetry", pa.float64()),
         ("periods", pa.int64()),
+        ("waveform", pa.float64()),
         ("ngspice", pa.string()),
         ("ngspice_reason", pa.string()),
         ("ngspice_remedies", pa.string()),

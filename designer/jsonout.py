@@ -17,12 +17,12 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.design import Design
     from designer.equation_check import EquationCheck
     from designer.modelfile import ModelFile
-    from designer.montecarlo import Answer
     from designer.orbit import Orbit
     from designer.pipeline import Checked
     from designer.responses import ModelResponse
     from designer.simulation import Simulated
     from designer.study import Study
+    from designer.verdict import Answer
 
 FORMAT = 1
 

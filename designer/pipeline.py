@@ -19,7 +19,6 @@ from designer.design import Design
 from designer.flow import Flow
 from designer.gate import GateResult
 from designer.modelfile import ModelFile
-from designer.montecarlo import Answer, Question, StudyPlan, Yield, count
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
@@ -27,6 +26,7 @@ from designer.responses import ModelResponse, circuit_flow, find, on_circuit, pe
 from designer.spread import Spread
 from designer.synthesis import check_choices, synthesise
 from designer.system import Array, Drive
+from designer.verdict import Answer, Question, StudyPlan, Yield, count
 from designer.workers import SpicePool
 
 TRACE_POINTS = 1024

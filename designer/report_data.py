@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from designer.bom import bill
 from designer.design import Design
 from designer.modelfile import ModelFile
-from designer.montecarlo import Answer, StudyPlan, Verdict, Yield
 from designer.pipeline import Checked
+from designer.verdict import Answer, StudyPlan, Verdict, Yield
 
 if TYPE_CHECKING:
     from designer.api import RunResult

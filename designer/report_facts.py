@@ -8,9 +8,9 @@ from typing import Any
 from designer import report_tables as tables
 from designer import report_words as words
 from designer.design import Design
-from designer.montecarlo import Yield
 from designer.plots import EXACT
 from designer.report_data import ReportData
+from designer.verdict import Yield
 
 FORMAT = 1
 

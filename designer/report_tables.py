@@ -16,11 +16,11 @@ from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
 from designer.confirmation import UNDECIDED
 from designer.design import Design
 from designer.gate import shortest_contact
-from designer.montecarlo import Answer, Verdict, Yield
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
 from designer.plots import EXACT
 from designer.report_data import ReportData
+from designer.verdict import Answer, Verdict, Yield
 
 REASONS_SHOWN = 5
 """Kinds of loss that are named; the rest is counted."""

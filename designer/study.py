@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from designer import confirmation, montecarlo, pipeline
 from designer.blocks import BlockStore
-from designer.montecarlo import Answer, StudyPlan, Yield
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, need_responses
 from designer.progress import Progress
+from designer.verdict import Answer, StudyPlan, Yield, count
 from designer.workers import SpicePool
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ class Study:
     def yields(self) -> tuple[Yield | None, ...]:
         """For each response; None where it was left out."""
         return tuple(
-            montecarlo.count(self.answers_to(i)) if i in self.asked else None
-            for i in range(len(self.checked))
+            count(self.answers_to(i)) if i in self.asked else None for i in range(len(self.checked))
         )
 
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from designer.montecarlo import Answer, Verdict, Yield
 from designer.plots import EXACT, GRID, INK, MUTED, new_figure, styled
+from designer.verdict import Answer, Verdict, Yield
 
 VERDICTS = {
     Verdict.OK: "#0072b2",

@@ -13,9 +13,9 @@ from designer.blocks import BlockStore, block_name, block_names, study_hash
 from designer.circuit import Capacitor, Circuit, Generator, Resistor, Section
 from designer.deck import Excitation, SolverSettings
 from designer.modelfile import Expect, Response
-from designer.montecarlo import BLOCK, Answer, Question, StudyPlan, Verdict
 from designer.orbit import Orbit, OrbitStatus
 from designer.spread import Spread
+from designer.verdict import BLOCK, Answer, Question, StudyPlan, Verdict
 
 
 @pytest.fixture

@@ -28,12 +28,13 @@ from designer.confirmation import (
 from designer.deck import SolverSettings
 from designer.flow import Flow
 from designer.gate import Subject
-from designer.montecarlo import Answer, StudyPlan, run_block
+from designer.montecarlo import run_block
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import draw
 from designer.system import Drive
+from designer.verdict import Answer, StudyPlan
 from designer.waveform_orbit import Read
 from designer.workers import SpiceJob, SpicePool
 from tests.paper_cases import flow_of, subject

@@ -18,21 +18,12 @@ from designer.deck import Excitation
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.modelfile import Expect, Response
-from designer.montecarlo import (
-    BLOCK,
-    Answer,
-    Question,
-    StudyPlan,
-    Verdict,
-    Yield,
-    count,
-    judge,
-    run_block,
-)
+from designer.montecarlo import run_block
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import Spread, draw
 from designer.system import Drive
+from designer.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield, count, judge
 from tests.test_coefficients import exact_for_paper
 from tests.test_reduction import circuit_of
 

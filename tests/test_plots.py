@@ -17,11 +17,11 @@ from designer import orbit_plots, plots, study_plots
 from designer.deck import Excitation, SolverSettings
 from designer.gate import GateResult
 from designer.modelfile import Expect, Response
-from designer.montecarlo import Answer, Verdict, Yield
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus, failed
 from designer.pipeline import Checked, Trace
 from designer.responses import ModelResponse
+from designer.verdict import Answer, Verdict, Yield
 from designer.waveform_orbit import Read
 
 PNG = b"\x89PNG\r\n\x1a\n"

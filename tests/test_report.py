@@ -18,7 +18,7 @@ from designer.bom import bill
 from designer.catalog import Catalog, load_catalog
 from designer.errors import InputError
 from designer.modelfile import Expect, parse_model_file, read_model_file
-from designer.montecarlo import Answer, Verdict, run_block
+from designer.montecarlo import run_block
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus, failed
 from designer.provenance import provenance
@@ -26,6 +26,7 @@ from designer.report import render_html, render_markdown, write_report
 from designer.report_data import ReportData
 from designer.report_tables import ngspice_table
 from designer.study import Study
+from designer.verdict import Answer, Verdict
 from designer.workers import SpicePool
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"

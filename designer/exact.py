@@ -1,0 +1,108 @@
+"""A block of boards on the exact circuit rung: every question, from its nominal orbit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from designer.circuit import nominal_board
+from designer.deck import Excitation
+from designer.ensemble import Ensemble
+from designer.flow import Flow
+from designer.gate import Subject
+from designer.orbit import Orbit, OrbitStatus
+from designer.reduction import Reduction
+from designer.spread import draw_many
+from designer.system import Array, Drive, PiecewiseLinearSystem
+from designer.verdict import Answer, StudyPlan, judge
+
+POINTS = 128
+"""Of an orbit per drive period, for the waveform error."""
+
+
+def drive_of(excitation: Excitation) -> Drive:
+    """The generator's setting as the exact circuit sees it (``Excitation`` says why the minus)."""
+    return Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude, excitation.offset)
+
+
+def block(
+    plan: StudyPlan,
+    indices: range,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[tuple[Answer, Subject | None]]:
+    """An answer for every board and every question, in order; with what ngspice would need of it.
+
+    ``progress`` is called once an answer.
+    """
+    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+    drives = [drive_of(q.excitation) for q in plan.questions]
+    asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
+    orbits = ensemble.settle(
+        [i for i, _ in asked],
+        [drives[number] for _, number in asked],
+        np.array([plan.questions[number].start.start for _, number in asked]),
+        jobs=jobs,
+        progress=progress,
+    )
+    nominal = [_displacement(plan, number) for number in range(len(plan.questions))]
+    out: list[tuple[Answer, Subject | None]] = []
+    for (i, number), orbit in zip(asked, orbits, strict=True):
+        question = plan.questions[number]
+        verdict, reason = judge(orbit, question.spec, question.start)
+        subject = None
+        waveform = float("nan")
+        if len(orbit.start):
+            subject = Subject(ensemble.reduction(i), question.excitation, orbit)
+            if orbit.status is OrbitStatus.PERIODIC:
+                shown = displacement(subject.system, drives[number], orbit)
+                waveform = waveform_error(shown, nominal[number])
+        answer = Answer(
+            sample=indices[i],
+            question=number,
+            verdict=verdict,
+            response=orbit.response,
+            reason=reason,
+            radius=_kept(orbit.radius),
+            penetration=_kept(orbit.penetration),
+            miss=_kept(orbit.miss),
+            asymmetry=_kept(orbit.asymmetry),
+            periods=orbit.periods,
+            waveform=_kept(waveform),
+        )
+        out.append((answer, subject))
+    return out
+
+
+def displacement(system: PiecewiseLinearSystem, drive: Drive, orbit: Orbit) -> Array:
+    """(n · POINTS,) the first moving state over the n periods of an orbit."""
+    j = system.displacement[0] if system.displacement else 0
+    run = Flow(system, drive).run(orbit.start, orbit.n, mode=orbit.mode or None, points=POINTS)
+    return np.asarray(run.strobes[:-1, j])
+
+
+def waveform_error(shown: Array, wanted: Array) -> float:
+    """RMS difference of two displacements over ``wanted``'s peak, at the best shift by whole drive
+    periods; nan where they have different periods."""
+    if len(shown) != len(wanted):
+        return float("nan")
+    shifts = [np.roll(shown, k * POINTS) for k in range(len(shown) // POINTS)]
+    least = min(float(np.sqrt(np.mean((s - wanted) ** 2))) for s in shifts)
+    return least / float(np.abs(wanted).max())
+
+
+def _displacement(plan: StudyPlan, number: int) -> Array:
+    """Empty where the nominal circuit has no answer; then no board has a waveform error."""
+    question = plan.questions[number]
+    system = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
+    try:
+        return displacement(system, drive_of(question.excitation), question.start)
+    except ArithmeticError:
+        return np.zeros(0)
+
+
+def _kept(value: float) -> float:
+    """A margin to nine digits: its last few depend on how a process lies in memory (which loops of
+    the numerical libraries run), and equal studies are equal files."""
+    return float(f"{value:.9g}")
