@@ -58,6 +58,7 @@ def _answers(block: range) -> list[Answer]:
             miss=1e-300,
             asymmetry=5e-17,
             periods=40,
+            waveform=0.01,
             ngspice="failed",
             ngspice_reason="singular matrix",
         )
