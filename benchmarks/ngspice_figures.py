@@ -12,27 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from designer import gate, warm_start
-from designer.attractor import settle
 from designer.circuit import Circuit
 from designer.deck import SolverSettings
-from designer.flow import Flow
+from designer.ensemble import Ensemble
 from designer.gate import Subject
 from designer.ngspice import SimulationFailed, Waveforms
 from designer.orbit import MAX_PERIOD
-from designer.reduction import Reduction
-from designer.spread import Spread, draw
-from designer.system import Array, Drive
+from designer.spread import Spread, draw_many
+from designer.system import Array
 from designer.waveform_orbit import STROBE_TOLERANCE, Read
 from designer.workers import SpiceJob, SpicePool
 
 SETTLED = 400
 """Drive periods of the run that a warm start is held against."""
-
-
-def flow_of(subject: Subject) -> Flow:
-    """The exact flow of a subject's board under its excitation."""
-    e = subject.excitation
-    return Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude, e.offset))
 
 
 def peak_of(subject: Subject) -> Array:
@@ -109,17 +101,18 @@ class Throughput:
 
 
 def boards(
-    circuit: Circuit, spread: Spread, nominal: Subject, samples: int, seed: int = 1
+    circuit: Circuit, spread: Spread, nominal: Subject, samples: int, jobs: int, seed: int = 1
 ) -> list[Subject]:
     """Boards of a study, each on the orbit of the exact circuit that it settles on."""
-    out = []
-    for index in range(samples):
-        board = draw(circuit, spread, seed, index)
-        subject = replace(nominal, reduction=Reduction(circuit, board))
-        orbit = settle(flow_of(subject), nominal.orbit.start)
-        if len(orbit.start):
-            out.append(replace(subject, orbit=orbit))
-    return out
+    ensemble = Ensemble(draw_many(circuit, spread, seed, range(samples)))
+    drives = [nominal.excitation.drive] * samples
+    starts = np.tile(nominal.orbit.start, (samples, 1))
+    orbits = ensemble.settle(range(samples), drives, starts, jobs=jobs)
+    return [
+        replace(nominal, reduction=ensemble.reduction(i), orbit=orbit)
+        for i, orbit in enumerate(orbits)
+        if len(orbit.start)
+    ]
 
 
 def throughput(

@@ -27,7 +27,7 @@ from designer.opamp_model import Rung
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.remedies import Outcome, Remedy, Task
-from designer.system import Array, Drive, PiecewiseLinearSystem
+from designer.system import Array, PiecewiseLinearSystem
 from designer.waveform_orbit import Read, Reading, read
 from designer.workers import SpiceJob, SpicePool
 
@@ -201,10 +201,11 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
     period = 1.0 / excitation.frequency
     if orbit.n == 0 or len(orbit.impact_times) == 0:
         return period
-    flow = Flow(system, Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude))
+    flow = Flow(system, excitation.drive)
     apart = period / WAVE_POINTS
     lap = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=WAVE_POINTS).strobes[:-1]
-    u = -excitation.amplitude * np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
+    swing = np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
+    u = excitation.offset - excitation.amplitude * swing
     shortest = period
     for side, row in zip((1, -1), contact_rows(system), strict=True):
         if row is None:
@@ -295,8 +296,7 @@ def wave_error(subject: Subject, read: Read) -> float:
     orbit = subject.orbit
     if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
         return float("nan")
-    e = subject.excitation
-    flow = Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude))
+    flow = Flow(subject.system, subject.excitation.drive)
     peak = np.abs(orbit.extremes).max(axis=1)
     time, states = read.trace
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]

@@ -25,8 +25,7 @@ OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.2
 
 def flow_of(subject: Subject) -> Flow:
     """The exact flow of a subject's board under its excitation."""
-    e = subject.excitation
-    return Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude, e.offset))
+    return Flow(subject.system, subject.excitation.drive)
 
 
 @cache
