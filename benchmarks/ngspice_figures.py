@@ -38,13 +38,13 @@ LAST = 50
 
 @dataclass(frozen=True)
 class WarmStart:
-    """A run of `SETTLED` periods from the exact circuit's orbit.
+    """A long run from the exact circuit's orbit.
 
-    gaps : (SETTLED + 1,) distance of each strobe from the settled one (the median of the last
-    `LAST`, since each has ngspice's noise), of the peak. needed : the first
-    strobe from which all later ones are within the strobe tolerance. predicted : what
-    ``warm_start`` says of the first periods. exact : what the exact circuit's multiplier alone
-    says. response : n-p-q at the end. seconds : wall time.
+    gaps : (periods + 1,) distance of each strobe from the settled one, of the peak. Settled is the
+    median of the last `LAST` laps, a quarter of the run at most, since each strobe has ngspice's
+    noise. needed : the first strobe from which all later ones are within the strobe tolerance.
+    predicted : what ``warm_start`` says of the first periods. exact : what the exact circuit's
+    multiplier alone says. response : n-p-q at the end. seconds : wall time.
     """
 
     gaps: Array
@@ -55,10 +55,10 @@ class WarmStart:
     seconds: float
 
 
-def warm_job(subject: Subject, settings: SolverSettings) -> SpiceJob[Read]:
+def warm_job(subject: Subject, settings: SolverSettings, periods: int = SETTLED) -> SpiceJob[Read]:
     """The run of a warm start; every strobe comes back."""
     n = max(subject.orbit.n, 1)
-    long = replace(subject, discard=SETTLED - 4 * n)
+    long = replace(subject, discard=periods - 4 * n)
     return gate.job(long, settings, whole=True)
 
 
@@ -66,7 +66,8 @@ def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
     """What a `warm_job` shows."""
     n, peak = max(subject.orbit.n, 1), peak_of(subject)
     strobes = result.strobes
-    settled = np.median(strobes[: -LAST * n - 1 : -n], axis=0)
+    last = min(LAST * n, len(strobes) // 4)
+    settled = np.median(strobes[: -last - 1 : -n], axis=0)
     gaps = (np.abs(strobes - settled) / peak).max(axis=1)
     far = np.flatnonzero(gaps > STROBE_TOLERANCE)
     short = strobes[: warm_start.PROBE * n + 1]

@@ -23,10 +23,11 @@ from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
-from designer.opamp_model import Rung
+from designer.opamp_model import Rung, limit_into
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.remedies import Outcome, Remedy, Task
+from designer.stages import stages
 from designer.system import Array, PiecewiseLinearSystem
 from designer.waveform_orbit import Read, Reading, read
 from designer.workers import SpiceJob, SpicePool
@@ -148,7 +149,7 @@ def job(
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
-    upper, lower = contact_rows(subject.system)
+    upper, lower = contact_rows(_as_the_rung_has_it(subject).system())
     reading = Reading(
         period=subject.period,
         discard=0 if whole else subject.discard,
@@ -184,6 +185,21 @@ def task(
 ) -> Task[Read]:
     """The run as one that remedies may change."""
     return Task(partial(job, subject, keep=keep, whole=whole), settings)
+
+
+def _as_the_rung_has_it(subject: Subject) -> Reduction:
+    """The reduction whose thresholds the rung's are: an impact is counted by those of the board at
+    hand. On ``full`` the output limits follow the loads, and with them a saturating stage's
+    clearance. A vendor's model has limits that nobody has told: the board's stand for them."""
+    figures = subject.circuit.figures
+    if subject.rung != "full" or figures is None or figures.spice is not None:
+        return subject.reduction
+    rails = dict(subject.board.rails)
+    for stage in stages(subject.circuit):
+        low, high = rails[stage.section.name]
+        ratio = limit_into(stage.load, figures)
+        rails[stage.section.name] = (ratio * low, ratio * high)
+    return Reduction(subject.circuit, replace(subject.board, rails=rails))
 
 
 def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
@@ -243,7 +259,7 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     All subjects move through the levels together, so that the workers stay busy. On a rung above
     ``ideal`` a short run first says how many periods are discarded (``warm_start``).
     """
-    subjects = _warmed(pool, subjects)
+    subjects = warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
     steps = [_steps(s, contact) for s, contact in zip(subjects, contacts, strict=True)]
     results: list[GateResult | None] = [None] * len(subjects)
@@ -262,8 +278,8 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     return [r for r in results if r is not None]
 
 
-def _warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
-    """The subjects with the periods that each has to discard on its rung."""
+def warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
+    """The subjects with the periods that each has to discard on its rung, from a short run."""
     out = list(subjects)
     asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
     tasks = []

@@ -142,6 +142,15 @@ def saturation_resistance(opamp: OpAmp) -> float:
     return min(headroom * RATED_LOAD / light, opamp.output_resistance.nominal)
 
 
+def limit_into(load: float, opamp: OpAmp) -> float:
+    """How far the limits of ``full`` into a load [Ω] are from those into the rated one, a ratio.
+
+    By Ohm's law: the limits fall by `saturation_resistance` times the current.
+    """
+    resistance = saturation_resistance(opamp)
+    return (1.0 + resistance / RATED_LOAD) / (1.0 + resistance / load)
+
+
 def instance(
     name: str,
     nets: tuple[str, str, str],
