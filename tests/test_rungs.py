@@ -16,7 +16,7 @@ from designer.circuit import nominal_board
 from designer.coefficients import coefficient_errors
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
-from designer.gate import Subject, job
+from designer.gate import RELTOL, Subject, job
 from designer.modelfile import parse_model_file
 from designer.ngspice import check_netlist, open_simulator
 from designer.opamp_model import Rung, limit_into
@@ -26,7 +26,9 @@ from designer.spread import Spread, draw
 from designer.stages import stages
 from designer.system import Drive
 from designer.waveform_orbit import Read
-from tests.paper_cases import synthesised
+from designer.workers import SpicePool
+from tests.paper_cases import OMEGA, synthesised
+from tests.paper_cases import subject as exact_parts
 from tests.stages import PAPER, stage
 from tests.test_rectifier_ngspice import SCALED
 from tests.test_reduction import EXACT, circuit_of
@@ -118,6 +120,46 @@ def test_impacts_on_full_are_counted_by_its_own_limits() -> None:
     assert asked.reduce(waves).orbit.response == "1-8-8"
     by_another = job(replace(subject, rung="ideal"), SolverSettings("trap", 1e-6))
     assert by_another.reduce(waves).orbit.response == "1-6-6"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("omega", "slow", "fast"), [(0.70, "1-2-2", "2-4-4"), (0.68, "1-2-2", "2-6-4")]
+)
+def test_bandwidth_changes_the_count_near_grazing(omega: float, slow: str, fast: str) -> None:
+    """The paper's own stage, whose gain is 210: 3 MHz against 30 MHz, all else equal.
+
+    With 30 MHz the response has doubled its period by omega = 0.70, and by 0.68 grazing has added
+    impacts; with 3 MHz neither has happened yet. Two step sizes and two methods say so, each from
+    the exact circuit's orbit, followed down from 1-2-2 at 0.85.
+    """
+    near = exact_parts(2)
+    volts = near.excitation.amplitude
+    frequency = near.excitation.frequency / OMEGA[2]
+    x = near.orbit.start
+    for down in (0.82, 0.79, 0.77, 0.75, 0.73, 0.72, 0.71, 0.70, 0.69, 0.687):
+        if down < omega:
+            break
+        orbit = settle(Flow(near.system, Excitation(down * frequency, volts).drive), x)
+        x = orbit.start
+    assert orbit.response == "2-4-4"
+    settings = [("trap", 600), ("trap", 1200), ("gear", 1200)]
+    jobs = [
+        job(
+            Subject(
+                Reduction(near.circuit, replace(near.board, gain_bandwidth=dict.fromkeys(
+                    (s.name for s in near.circuit.sections), bandwidth))),
+                Excitation(omega * frequency, volts), orbit, discard=60, rung="dynamic",
+            ),
+            SolverSettings(method, 1.0 / (omega * frequency) / steps, RELTOL),
+        )
+        for bandwidth in (3e6, 30e6)
+        for method, steps in settings
+    ]  # fmt: skip
+    with SpicePool(2) as pool:
+        found = dict(pool.map(jobs))
+    responses = [r.orbit.response if isinstance(r, Read) else r for _, r in sorted(found.items())]
+    assert responses == [slow] * 3 + [fast] * 3
 
 
 @finer
