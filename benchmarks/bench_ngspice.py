@@ -49,6 +49,8 @@ SAMPLES, RUNS = 1000, 5000
 TIMED = {1: 4, 8: 2}
 """p of the responses whose throughput is measured, and the samples of the naive flow."""
 GOAL_SECONDS, GOAL_RATIO = 60.0, 20.0
+SHOWN = 40
+"""Drive periods of a warm start that the picture and the JSON show."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ def _speed(
         made.catalog.opamp(spec.opamp), spec.resistor_grade, spec.capacitor_grade
     )
     began = time.perf_counter()
-    drawn = boards(made.design.circuit, spread, nominal, samples)
+    drawn = boards(made.design.circuit, spread, nominal, samples, jobs)
     exact = time.perf_counter() - began
     ours = throughput(pool, drawn, case.gate.settings, jobs)
     few = naive(drawn[: max(TIMED[case.p], jobs)], case.gate.settings, jobs)
@@ -179,7 +181,7 @@ def report(m: Measured) -> str:
     settled = [
         float(w.gaps[2:].max()) for c in m.cases if (w := c.warm["ideal"]) and c.radius < 0.9
     ]
-    half = m.memory[len(m.memory) // 10 :]
+    later = m.memory[len(m.memory) // 10 :]
     lines = [
         "# ngspice as the study uses it",
         "",
@@ -223,7 +225,7 @@ def report(m: Measured) -> str:
                 [
                     f"memory, growth over {len(m.memory)} runs (after the first tenth)",
                     "flat",
-                    f"{half[-1] - half[0]:+.1f} MB of {half[-1]:.0f} MB",
+                    f"{later[-1] - later[0]:+.1f} MB of {later[-1]:.0f} MB",
                 ],
             ],
         ),
@@ -335,7 +337,7 @@ def as_dict(m: Measured) -> dict[str, Any]:
                         "predicted_by_exact_multiplier": w.exact,
                         "discarded": c.discarded[rung],
                         "response": w.response,
-                        "gaps": w.gaps[:41],
+                        "gaps": w.gaps[: SHOWN + 1],
                     }
                     for rung, w in c.warm.items()
                 },
@@ -366,7 +368,7 @@ def plot(m: Measured) -> Figure:
         for c, colour in zip(m.cases, colours, strict=True):
             w = c.warm[rung]
             if w is not None:
-                shown = np.maximum(w.gaps[1:61], 1e-6)
+                shown = np.maximum(w.gaps[1 : SHOWN + 1], 1e-6)
                 ax.semilogy(
                     np.arange(1, len(shown) + 1), shown, color=colour, lw=1.2, label=f"p = {c.p}"
                 )
@@ -389,7 +391,7 @@ def plot(m: Measured) -> Figure:
         )
     ]
     bars = speed.bar(names, times, color=["#d62728", "#7f7f7f"] * len(m.speeds))
-    speed.bar_label(bars, [f"{t:.3g}" for t in times], fontsize=8)
+    speed.bar_label(bars, [f"{t:,.0f}" for t in times], fontsize=8)
     speed.set_yscale("log")
     speed.set(title=f"wall time a sample, {m.jobs} workers", ylabel="ms")
     speed.margins(y=0.15)

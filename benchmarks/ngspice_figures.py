@@ -12,27 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from designer import gate, warm_start
-from designer.attractor import settle
 from designer.circuit import Circuit
 from designer.deck import SolverSettings
-from designer.flow import Flow
+from designer.ensemble import Ensemble
 from designer.gate import Subject
 from designer.ngspice import SimulationFailed, Waveforms
 from designer.orbit import MAX_PERIOD
-from designer.reduction import Reduction
-from designer.spread import Spread, draw
-from designer.system import Array, Drive
+from designer.spread import Spread, draw_many
+from designer.system import Array
 from designer.waveform_orbit import STROBE_TOLERANCE, Read
 from designer.workers import SpiceJob, SpicePool
 
 SETTLED = 400
 """Drive periods of the run that a warm start is held against."""
-
-
-def flow_of(subject: Subject) -> Flow:
-    """The exact flow of a subject's board under its excitation."""
-    e = subject.excitation
-    return Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude, e.offset))
 
 
 def peak_of(subject: Subject) -> Array:
@@ -46,13 +38,13 @@ LAST = 50
 
 @dataclass(frozen=True)
 class WarmStart:
-    """A run of `SETTLED` periods from the exact circuit's orbit.
+    """A long run from the exact circuit's orbit.
 
-    gaps : (SETTLED + 1,) distance of each strobe from the settled one (the median of the last
-    `LAST`, since each has ngspice's noise), of the peak. needed : the first
-    strobe from which all later ones are within the strobe tolerance. predicted : what
-    ``warm_start`` says of the first periods. exact : what the exact circuit's multiplier alone
-    says. response : n-p-q at the end. seconds : wall time.
+    gaps : (periods + 1,) distance of each strobe from the settled one, of the peak. Settled is the
+    median of the last `LAST` laps, a quarter of the run at most, since each strobe has ngspice's
+    noise. needed : the first strobe from which all later ones are within the strobe tolerance.
+    predicted : what ``warm_start`` says of the first periods. exact : what the exact circuit's
+    multiplier alone says. response : n-p-q at the end. seconds : wall time.
     """
 
     gaps: Array
@@ -63,10 +55,10 @@ class WarmStart:
     seconds: float
 
 
-def warm_job(subject: Subject, settings: SolverSettings) -> SpiceJob[Read]:
+def warm_job(subject: Subject, settings: SolverSettings, periods: int = SETTLED) -> SpiceJob[Read]:
     """The run of a warm start; every strobe comes back."""
     n = max(subject.orbit.n, 1)
-    long = replace(subject, discard=SETTLED - 4 * n)
+    long = replace(subject, discard=periods - 4 * n)
     return gate.job(long, settings, whole=True)
 
 
@@ -74,7 +66,8 @@ def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
     """What a `warm_job` shows."""
     n, peak = max(subject.orbit.n, 1), peak_of(subject)
     strobes = result.strobes
-    settled = np.median(strobes[: -LAST * n - 1 : -n], axis=0)
+    last = min(LAST * n, len(strobes) // 4)
+    settled = np.median(strobes[: -last - 1 : -n], axis=0)
     gaps = (np.abs(strobes - settled) / peak).max(axis=1)
     far = np.flatnonzero(gaps > STROBE_TOLERANCE)
     short = strobes[: warm_start.PROBE * n + 1]
@@ -109,17 +102,18 @@ class Throughput:
 
 
 def boards(
-    circuit: Circuit, spread: Spread, nominal: Subject, samples: int, seed: int = 1
+    circuit: Circuit, spread: Spread, nominal: Subject, samples: int, jobs: int, seed: int = 1
 ) -> list[Subject]:
     """Boards of a study, each on the orbit of the exact circuit that it settles on."""
-    out = []
-    for index in range(samples):
-        board = draw(circuit, spread, seed, index)
-        subject = replace(nominal, reduction=Reduction(circuit, board))
-        orbit = settle(flow_of(subject), nominal.orbit.start)
-        if len(orbit.start):
-            out.append(replace(subject, orbit=orbit))
-    return out
+    ensemble = Ensemble(draw_many(circuit, spread, seed, range(samples)))
+    drives = [nominal.excitation.drive] * samples
+    starts = np.tile(nominal.orbit.start, (samples, 1))
+    orbits = ensemble.settle(range(samples), drives, starts, jobs=jobs)
+    return [
+        replace(nominal, reduction=ensemble.reduction(i), orbit=orbit)
+        for i, orbit in enumerate(orbits)
+        if len(orbit.start)
+    ]
 
 
 def throughput(

@@ -18,7 +18,7 @@ from designer.dead_zone_parts import OUTPUT
 from designer.diode_model import card
 from designer.opamp_model import Parameters, Rung
 from designer.reduction import FloatingCircuit, Reduction
-from designer.system import Array
+from designer.system import Array, Drive
 
 FORMAT = 1
 IDEAL_GAIN = 1e9
@@ -50,6 +50,11 @@ class Excitation:
     frequency: float
     amplitude: float
     offset: float = 0.0
+
+    @property
+    def drive(self) -> Drive:
+        """The voltage at the generator's net, as the exact circuit is driven by it."""
+        return Drive(2.0 * np.pi * self.frequency, -self.amplitude, self.offset)
 
 
 def write(
@@ -99,9 +104,34 @@ def write(
 
 
 def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, float]) -> list[str]:
-    """One element line for each section, the supplies that the model uses, and the model."""
+    """One element line for each section, and the model.
+
+    A vendor's model has a bandwidth of its own, which no board changes.
+    """
     gain = 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
-    lines = [
+    if rung == "ideal":
+        return _instances(circuit, board, rung, outputs, {}) + opamp_model.ideal(gain)
+    if circuit.figures is None:
+        raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
+    parameters = Parameters.of(circuit.figures, gain)
+    vendor = circuit.figures.spice if rung == "full" else None
+    bandwidths = {
+        name: opamp_model.bandwidth(rung, parameters, gbw)
+        for name, gbw in board.gain_bandwidth.items()
+        if vendor is None
+    }
+    lines = _instances(circuit, board, rung, outputs, bandwidths)
+    return lines + opamp_model.subcircuit(rung, parameters, vendor)
+
+
+def _instances(
+    circuit: Circuit,
+    board: Board,
+    rung: Rung,
+    outputs: Mapping[str, float],
+    bandwidths: Mapping[str, Mapping[str, float]],
+) -> list[str]:
+    return [
         opamp_model.instance(
             s.name,
             (s.noninverting, s.inverting, s.output),
@@ -110,15 +140,10 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
             ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],
             start=outputs.get(s.name, 0.0),
+            bandwidth=bandwidths.get(s.name),
         )
         for s in circuit.sections
     ]
-    if rung == "ideal":
-        return lines + opamp_model.ideal(gain)
-    if circuit.figures is None:
-        raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
-    figures = circuit.figures
-    return lines + opamp_model.subcircuit(rung, Parameters.of(figures, gain), figures.spice)
 
 
 def _outputs(

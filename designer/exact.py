@@ -23,7 +23,7 @@ POINTS = 128
 
 def drive_of(excitation: Excitation) -> Drive:
     """The generator's setting as the exact circuit sees it (``Excitation`` says why the minus)."""
-    return Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude, excitation.offset)
+    return excitation.drive
 
 
 def block(

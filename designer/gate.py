@@ -23,11 +23,12 @@ from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
-from designer.opamp_model import Rung
+from designer.opamp_model import Rung, limit_into
 from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.remedies import Outcome, Remedy, Task
-from designer.system import Array, Drive, PiecewiseLinearSystem
+from designer.stages import stages
+from designer.system import Array, PiecewiseLinearSystem
 from designer.waveform_orbit import Read, Reading, read
 from designer.workers import SpiceJob, SpicePool
 
@@ -148,7 +149,7 @@ def job(
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
-    upper, lower = contact_rows(subject.system)
+    upper, lower = contact_rows(_as_the_rung_has_it(subject).system())
     reading = Reading(
         period=subject.period,
         discard=0 if whole else subject.discard,
@@ -186,6 +187,21 @@ def task(
     return Task(partial(job, subject, keep=keep, whole=whole), settings)
 
 
+def _as_the_rung_has_it(subject: Subject) -> Reduction:
+    """The reduction whose thresholds the rung's are: an impact is counted by those of the board at
+    hand. On ``full`` the output limits follow the loads, and with them a saturating stage's
+    clearance. A vendor's model has limits that nobody has told: the board's stand for them."""
+    figures = subject.circuit.figures
+    if subject.rung != "full" or figures is None or figures.spice is not None:
+        return subject.reduction
+    rails = dict(subject.board.rails)
+    for stage in stages(subject.circuit):
+        low, high = rails[stage.section.name]
+        ratio = limit_into(stage.load, figures)
+        rails[stage.section.name] = (ratio * low, ratio * high)
+    return Reduction(subject.circuit, replace(subject.board, rails=rails))
+
+
 def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
     """Rows over (states, generator, 1) of the displacement past the upper, the lower stop."""
     rows = system.contact_rows(0)
@@ -201,10 +217,11 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
     period = 1.0 / excitation.frequency
     if orbit.n == 0 or len(orbit.impact_times) == 0:
         return period
-    flow = Flow(system, Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude))
+    flow = Flow(system, excitation.drive)
     apart = period / WAVE_POINTS
     lap = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=WAVE_POINTS).strobes[:-1]
-    u = -excitation.amplitude * np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
+    swing = np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
+    u = excitation.offset - excitation.amplitude * swing
     shortest = period
     for side, row in zip((1, -1), contact_rows(system), strict=True):
         if row is None:
@@ -242,7 +259,7 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     All subjects move through the levels together, so that the workers stay busy. On a rung above
     ``ideal`` a short run first says how many periods are discarded (``warm_start``).
     """
-    subjects = _warmed(pool, subjects)
+    subjects = warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
     steps = [_steps(s, contact) for s, contact in zip(subjects, contacts, strict=True)]
     results: list[GateResult | None] = [None] * len(subjects)
@@ -261,8 +278,8 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     return [r for r in results if r is not None]
 
 
-def _warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
-    """The subjects with the periods that each has to discard on its rung."""
+def warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
+    """The subjects with the periods that each has to discard on its rung, from a short run."""
     out = list(subjects)
     asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
     tasks = []
@@ -295,8 +312,7 @@ def wave_error(subject: Subject, read: Read) -> float:
     orbit = subject.orbit
     if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
         return float("nan")
-    e = subject.excitation
-    flow = Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude))
+    flow = Flow(subject.system, subject.excitation.drive)
     peak = np.abs(orbit.extremes).max(axis=1)
     time, states = read.trace
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]

@@ -1,7 +1,8 @@
 """Op-amp models for ngspice, written from the catalogue's data-sheet figures.
 
 Three rungs share one subcircuit, ``opamp`` with the pins ``inp inn out vcc vee`` and, per
-instance, ``vos`` [V], ``ib`` [A], ``low`` and ``high`` (its own output limits [V] about ground):
+instance, ``vos`` [V], ``ib`` [A], ``low`` and ``high`` (its own output limits [V] about ground),
+above ``ideal`` ``start`` [V] and, where it is drawn, ``gbw`` [Hz]:
 
 ``ideal``    limits and finite gain, nothing else.
 ``dynamic``  and gain-bandwidth, slew rate, output resistance, recovery from saturation.
@@ -19,6 +20,7 @@ offsets ever starts. The output resistance acts before the limit (``Hout``), so 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -140,6 +142,15 @@ def saturation_resistance(opamp: OpAmp) -> float:
     return min(headroom * RATED_LOAD / light, opamp.output_resistance.nominal)
 
 
+def limit_into(load: float, opamp: OpAmp) -> float:
+    """How far the limits of ``full`` into a load [Ω] are from those into the rated one, a ratio.
+
+    By Ohm's law: the limits fall by `saturation_resistance` times the current.
+    """
+    resistance = saturation_resistance(opamp)
+    return (1.0 + resistance / RATED_LOAD) / (1.0 + resistance / load)
+
+
 def instance(
     name: str,
     nets: tuple[str, str, str],
@@ -149,18 +160,33 @@ def instance(
     ib: float,
     rails: tuple[float, float],
     start: float = 0.0,
+    bandwidth: Mapping[str, float] | None = None,
     supplies: tuple[str, str] = ("vcc", "vee"),
 ) -> str:
     """The element line of one op-amp.
 
     nets : noninverting input, inverting input, output. rails : output limits [V]. start : output
-    voltage at the start of a transient [V]; ``ideal`` has no memory and takes none.
+    voltage at the start of a transient [V]. bandwidth : `bandwidth` of this one; the model's own
+    where None. ``ideal`` has neither memory nor bandwidth, and takes neither.
     """
     given = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
     if rung != "ideal":
-        given["start"] = start
+        given |= {"start": start, **(bandwidth or {})}
     words = " ".join(f"{key}={_n(value)}" for key, value in given.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
+
+
+def bandwidth(rung: Rung, parameters: Parameters, gbw: float) -> dict[str, float]:
+    """Parameters of one op-amp with a gain-bandwidth [Hz] of its own.
+
+    The second pole of ``full`` moves along, so that the phase margin stays the data sheet's.
+    """
+    if rung == "ideal":
+        return {}
+    own = {"gbw": gbw}
+    if rung == "full":
+        own["pole2"] = parameters.second_pole * gbw / parameters.gbw
+    return own
 
 
 def subcircuit(rung: Rung, parameters: Parameters, vendor: VendorModel | None = None) -> list[str]:

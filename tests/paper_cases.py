@@ -1,11 +1,14 @@
-"""The paper's circuit with exact parts, on its 1-p-p responses: what ngspice is tested on."""
+"""The paper's circuit with exact parts, on its 1-p-p responses, and as it is synthesised: what
+ngspice is tested on."""
 
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
+from designer.api import Synthesis, synthesise
 from designer.attractor import coexisting, settle, starts
 from designer.circuit import nominal_board
 from designer.coefficients import coefficient_errors
@@ -13,6 +16,7 @@ from designer.deck import Excitation
 from designer.flow import Flow
 from designer.gate import Subject
 from designer.model import Dimensionless
+from designer.modelfile import read_model_file
 from designer.reduction import Reduction
 from designer.system import Drive
 from tests.test_coefficients import exact_for_paper
@@ -25,8 +29,16 @@ OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.2
 
 def flow_of(subject: Subject) -> Flow:
     """The exact flow of a subject's board under its excitation."""
-    e = subject.excitation
-    return Flow(subject.system, Drive(2.0 * np.pi * e.frequency, -e.amplitude, e.offset))
+    return Flow(subject.system, subject.excitation.drive)
+
+
+PAPER = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
+
+
+@cache
+def synthesised() -> Synthesis:
+    """``examples/paper.toml``, synthesised once for all tests."""
+    return synthesise(read_model_file(PAPER))
 
 
 @cache

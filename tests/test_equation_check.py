@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,14 +15,14 @@ from designer.coefficients import coefficient_errors
 from designer.equation_check import FLOOR, EquationCheck, Finding, check, explained, transfer
 from designer.mechanics import SecondOrderSystem
 from designer.model import Dimensionless
-from designer.modelfile import parse_model_file, read_model_file
+from designer.modelfile import parse_model_file
 from designer.synthesis import Certificate, Design
 from designer.workers import SpicePool
 from designer.zone import Sides
+from tests.paper_cases import synthesised
 from tests.stages import bought, one_sided, rectifier, stage
 from tests.stages import model as stage_model
 
-ROOT = Path(__file__).resolve().parent.parent
 COARSE = """
 format = 1
 [model]
@@ -52,7 +51,7 @@ ALL = {
 @cache
 def made(name: str) -> Synthesis:
     if name == "paper":
-        return synthesise(read_model_file(ROOT / "examples" / "paper.toml"))
+        return synthesised()
     text = COARSE.replace("k0 = 0.95", "k0 = 0.0") if name == "no stops" else COARSE
     return synthesise(parse_model_file(text))
 

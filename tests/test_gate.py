@@ -179,6 +179,19 @@ def test_the_wave_at_every_p(pool: SpicePool) -> None:
         assert rms(who, result.read) < 2e-3
 
 
+def test_a_generator_with_an_offset(pool: SpicePool) -> None:
+    """Its DC shifts the orbit by a tenth of the peak, in ngspice as on the exact circuit: the
+    opposite sign would be twice that away."""
+    who = subject(1)
+    moved = replace(who, excitation=replace(who.excitation, offset=0.1 * who.excitation.amplitude))
+    orbit = settle(flow_of(moved), who.orbit.start)
+    peak = np.abs(who.orbit.extremes).max(axis=1)
+    assert np.abs((orbit.start - who.orbit.start) / peak).max() > 0.05
+    (result,) = gate.check(pool, [replace(moved, orbit=orbit)])
+    assert result.passed
+    assert result.wave < 2e-3
+
+
 # ---------------------------------------------------------------------------------------------
 # Traps
 

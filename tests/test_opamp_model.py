@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from designer import deck
 from designer.catalog import load_catalog
-from designer.circuit import nominal_board
+from designer.circuit import Board, nominal_board
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
 from designer.ngspice import check_netlist, open_simulator
@@ -197,6 +198,76 @@ def test_a_deck_of_every_rung(rung: Rung) -> None:
         assert waves.signals[net][-1] == pytest.approx(start[k], abs=0.05 * peak), net
         first = np.interp(1e-8, waves.time, waves.signals[net])
         assert first == pytest.approx(start[k], abs=0.03 * peak), f"{net} does not start there"
+
+
+def unity_gain(text: str, section: str, gbw: float) -> tuple[float, float]:
+    """Frequency [Hz] of unity gain and the phase left there, of one section of a deck."""
+
+    class Taken(Bench):
+        """That section's line and the deck's own models, on the bench."""
+
+        def deck(self, around: Sequence[str], *, inputs: tuple[str, str] = ("inp", "inn")) -> str:
+            lines = text.splitlines()
+            (own,) = (line.split() for line in lines if line.startswith(f"X{section} "))
+            first = next(i for i, x in enumerate(lines) if x.startswith(".subckt"))
+            last = max(i for i, x in enumerate(lines) if x.startswith(".ends"))
+            here = ["* a section", "VCC vcc 0 15.0", "VEE vee 0 -15.0",
+                    " ".join(["XU1", *inputs, "out", *own[4:]])]  # fmt: skip
+            return "\n".join([*here, *lines[first : last + 1], *around, ".end"]) + "\n"
+
+    bench = Bench.of(CATALOG.opamp("TL074C"), "full")
+    parameters = replace(bench.parameters, gbw=gbw)
+    return Taken(**{**bench.__dict__, "parameters": parameters}).unity_gain()
+
+
+@every_rung_with_memory
+def test_every_section_has_a_bandwidth_of_its_own(rung: Rung) -> None:
+    """Half the gain-bandwidth: half the unity-gain frequency at the same phase margin, in the
+    deck's own lines. Others keep theirs, and a deck without the figure is what it was."""
+    circuit = replace(CIRCUIT, figures=CATALOG.opamp("TL074C"))
+    board = nominal_board(circuit)
+    typical = CATALOG.opamp("TL074C").gbw.nominal
+    slow, other = circuit.sections[0].name, circuit.sections[1].name
+
+    def text(board: Board) -> str:
+        return deck.write(
+            circuit, board, Excitation(400.0, 0.6), SolverSettings("trap", 1e-5),
+            title="t", stop_time=1e-2, rung=rung,
+        )  # fmt: skip
+
+    drawn = text(replace(board, gain_bandwidth={slow: typical / 2.0}))
+    check_netlist(drawn)
+    frequency, margin = unity_gain(drawn, other, typical)
+    assert unity_gain(drawn, slow, typical / 2.0) == pytest.approx(
+        (frequency / 2.0, margin), rel=2e-4
+    )
+    changed = [
+        pair for pair in zip(drawn.splitlines(), text(board).splitlines(), strict=True)
+        if pair[0] != pair[1]
+    ]  # fmt: skip
+    assert [line.split()[0] for line, _ in changed] == [f"X{slow}"]
+    assert changed[0][0].startswith(changed[0][1]), "what is drawn is added, nothing else"
+    ideal = deck.write(
+        circuit, replace(board, gain_bandwidth={slow: 1e5}), Excitation(400.0, 0.6),
+        SolverSettings("trap", 1e-5), title="t", stop_time=1e-2,
+    )  # fmt: skip
+    assert "gbw" not in ideal
+
+
+def test_a_vendor_s_model_keeps_its_bandwidth() -> None:
+    lines = (".subckt vendor_x inp inn out vcc vee", "Eout out 0 inp inn 1e6",
+             "Rs vcc vee 1e4", ".ends vendor_x")  # fmt: skip
+    vendor = VendorModel("own", "vendor_x", PINS, lines, b"")
+    circuit = replace(CIRCUIT, figures=replace(CATALOG.opamp("TL074C"), spice=vendor))
+    board = replace(
+        nominal_board(circuit), gain_bandwidth={s.name: 1e6 for s in circuit.sections}
+    )  # fmt: skip
+    text = deck.write(
+        circuit, board, Excitation(400.0, 0.6), SolverSettings("trap", 1e-5),
+        title="t", stop_time=1e-3, rung="full",
+    )  # fmt: skip
+    assert "gbw" not in text
+    assert open_simulator("shared").run(text, circuit.state_nets, 1e-3).time[-1] > 0.99e-3
 
 
 def test_a_rung_without_figures() -> None:
