@@ -93,9 +93,11 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     """
     check_choices(modelfile.model, modelfile.circuit, catalog)
     found = find(modelfile.model, modelfile.responses)
-    return found, synthesise(
+    design = synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found
     )
+    Spread.of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
+    return found, design
 
 
 def nominal_reduction(design: Design) -> Reduction:
@@ -140,15 +142,14 @@ def plan_study(
     samples: int,
     seed: int,
 ) -> StudyPlan:
-    """The Monte Carlo study of these responses under ``bench-1``.
+    """The Monte Carlo study of these responses, boards as the model file says.
 
     Every one of ``checked`` is a question; who calls leaves out what the nominal circuit does not
     show periodically (``study.tolerance``), since there is no nominal orbit to start from.
     """
-    spec = modelfile.circuit
     return StudyPlan(
         circuit=design.circuit,
-        spread=Spread.bench_1(catalog.opamp(spec.opamp), spec.resistor_grade, spec.capacitor_grade),
+        spread=Spread.of(modelfile, design.circuit, catalog),
         seed=seed,
         samples=samples,
         questions=tuple(

@@ -277,7 +277,7 @@ WRONG = [
     ("[model]", "[modle]", "modle", "unknown key 'modle'", 'did you mean "model"?'),
     ("[model]", "[[model]]", "model", "[{", "a table [model]"),
     ("\n[model]", "\nresponse = 3\n[model]", "line", "[[response]]", "valid TOML"),
-    ("[circuit]", "[spread]\nx = 1\n[circuit]", "spread", "unknown key 'spread'", "one of"),
+    ("[circuit]", "[yield]\nx = 1\n[circuit]", "yield", "unknown key 'yield'", "one of"),
     ('title = "Soft', 'title = "\\nSoft', "title", '"?Soft', "line breaks"),
     ("title = ", "title = 3 #", "title", "3", "text"),
     # [model]
