@@ -41,7 +41,7 @@ _WHAT = ("offset", "low", "high", "bias", "gbw", "tempco", "ageing")
 
 @dataclass(frozen=True)
 class Group:
-    """Parts that vary together, of one network or one reel.
+    """Parts that vary together, of one network or (``reel``) one reel.
 
     share : in [0, 1], of a part's deviation that it has in common with the others; the rest is its
     own. So the total stays within the grade, and two parts correlate by s²/(s² + (1 − s)²).
@@ -50,6 +50,7 @@ class Group:
     name: str
     parts: tuple[str, ...]
     share: float
+    reel: bool = False
 
 
 @dataclass(frozen=True)

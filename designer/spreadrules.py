@@ -207,7 +207,7 @@ class _Rules:
                     key = f"reel:{letter}:{format_quantity(part.value, digits=12)}"
                     reels.setdefault(key, []).append(part.name)
         return tuple(
-            Group(name, tuple(parts), share)
+            Group(name, tuple(parts), share, reel=True)
             for name, parts in reels.items()
             if share > 0.0 and len(parts) > 1
         )
