@@ -15,7 +15,7 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -74,19 +74,31 @@ class Measured:
         ------
         InputError : a part that it lacks, or a value far from the one that the part is sold for.
         """
+        self.check_names(circuit)
         nominal = _nominal(circuit)
         for name, values in self.values.items():
             where = f"line {self.lines.get(name, 0)}"
-            if name not in nominal:
-                hint = did_you_mean(name, nominal)
-                known = "a part of this design" + (f"; {hint}" if hint else "")
-                raise InputError(self.source, where, name, known)
             low, high, unit = nominal[name]
             for value in values:
                 if not math.isnan(value) and not low <= value <= high:
                     ends = " to ".join(format_quantity(end, unit) for end in (low, high))
                     found = f"{name}, {format_quantity(value, unit)}"
                     raise InputError(self.source, where, found, f"a value within {ends}")
+
+    def check_names(self, circuit: Circuit, more: Collection[str] = ()) -> None:
+        """Refuse parts that are neither of this circuit nor among ``more``.
+
+        Raises
+        ------
+        InputError : names the first of them.
+        """
+        known = [*_nominal(circuit), *more]
+        for name in self.values:
+            if name not in known:
+                hint = did_you_mean(name, known)
+                expected = "a part of this design" + (f"; {hint}" if hint else "")
+                where = f"line {self.lines.get(name, 0)}"
+                raise InputError(self.source, where, name, expected)
 
 
 def read_measured(path: Path) -> Measured:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer import gate
+from designer.attempt import zone_of_spec
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.deck import Excitation
@@ -21,9 +22,11 @@ from designer.gate import GateResult
 from designer.modelfile import ModelFile
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
+from designer.partnames import parts_of
 from designer.reduction import Reduction
 from designer.responses import ModelResponse, circuit_flow, find, on_circuit, peaks
 from designer.spread import Spread
+from designer.spreadrules import check_names
 from designer.synthesis import check_choices, synthesise
 from designer.system import Array, Drive
 from designer.verdict import Answer, Question, StudyPlan, Yield, count
@@ -92,6 +95,8 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     InputError, Unreachable : see ``responses.find`` and ``synthesis.synthesise``.
     """
     check_choices(modelfile.model, modelfile.circuit, catalog)
+    choice = modelfile.model, modelfile.circuit, catalog
+    check_names(modelfile, parts_of(*choice, zone_of_spec(*choice)))
     found = find(modelfile.model, modelfile.responses)
     design = synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found

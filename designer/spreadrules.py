@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from designer.modelfile import ModelFile
 
 Part = Resistor | Capacitor | Reference
+KINDS = {"resistors": Resistor, "capacitors": Capacitor, "references": Reference}
+"""What a list of parts may say for all of a kind."""
 
 
 def spread_of(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Spread:
@@ -31,6 +33,30 @@ def spread_of(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Sprea
         catalogue sells no such part, measured values that cannot be of this circuit.
     """
     return _Rules(modelfile, circuit, catalog).spread()
+
+
+def check_names(modelfile: ModelFile, circuit: Circuit) -> None:
+    """Refuse names of parts that no design of this circuit has, before one is sought.
+
+    circuit : of any values. Where resistors may become two parts, their names are known too.
+
+    Raises
+    ------
+    InputError : names the first unknown part, and the known ones.
+    """
+    may = modelfile.circuit.composites
+    halves = [f"{r.name}{half}" for r in circuit.resistors for half in "AB" if may]
+    parts = [p.name for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)]
+    known = [*KINDS, *parts]
+    rules = modelfile.spread
+    asked = [(f"part[{i}].names", rule.names) for i, rule in enumerate(rules.part, start=1)]
+    asked += [(f"network[{i}].parts", rule.parts) for i, rule in enumerate(rules.network, start=1)]
+    for field, names in asked:
+        for name in names:
+            if name not in known and name not in halves:
+                raise InputError(modelfile.source, f"spread.{field}", name, one_of(name, known))
+    if modelfile.measured is not None:
+        modelfile.measured.check_names(circuit, halves)
 
 
 class _Rules:
@@ -97,9 +123,8 @@ class _Rules:
     def named(self, names: tuple[str, ...], field: str) -> Iterator[str]:
         """The parts that are meant: of a kind, both of a composite, or the one of that name."""
         kinds = {
-            "resistors": [r.name for r in self.circuit.resistors],
-            "capacitors": [c.name for c in self.circuit.capacitors],
-            "references": [r.name for r in self.circuit.references],
+            word: [name for name, part in self.parts.items() if isinstance(part, kind)]
+            for word, kind in KINDS.items()
         }
         pairs = {name: [f"{name}A", f"{name}B"] for name in composites_of(self.circuit)}
         for name in names:
