@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from designer.catalog import Catalog
-from designer.catalogentry import Figure, Kind
+from designer.catalogentry import Figure, Kind, PartFamily
 from designer.circuit import Capacitor, Circuit, Reference, Resistor
 from designer.errors import InputError, Unreachable
 from designer.laws import Law, Split, Uniform
@@ -180,17 +180,31 @@ class _Rules:
         return found
 
     def catalogued(self, part: Part, rule: PartRule | None) -> float:
-        """The temperature coefficient [1/K] of the part that the bill of materials buys."""
+        """The temperature coefficient [1/K] of a part as the bill of materials buys it."""
         if isinstance(part, Reference):
             return self.catalog.reference(part.model).temperature_coefficient
+        return self.family(part, rule, "temperature", "tempco").temperature_coefficient
+
+    def drift(self, part: Resistor | Capacitor, rule: PartRule | None) -> float:
+        """What a part's data sheet lets it change by."""
+        family = self.family(part, rule, "ageing", "ageing")
+        if family.drift is None:
+            said = f"{part.name}, {family.name}, of which the catalogue has no drift"
+            raise self.refuse("ageing", said, "a drift there, or an ageing in [[spread.part]]")
+        return family.drift
+
+    def family(
+        self, part: Resistor | Capacitor, rule: PartRule | None, key: str, own: str
+    ) -> PartFamily:
+        """The family that the bill of materials buys the part from; for the figure ``own``."""
         kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
         try:
             bought = self.catalog.part(kind, part.value, self.grade(part, rule))
         except Unreachable as error:
             said = f"{part.name}, {error.found}"
-            expected = f"{error.expected}; or a tempco in [[spread.part]]"
-            raise self.refuse("temperature", said, expected) from None
-        return bought.family.temperature_coefficient
+            expected = f"{error.expected}; or {own} in [[spread.part]]"
+            raise self.refuse(key, said, expected) from None
+        return bought.family
 
     def ageing(self) -> dict[str, Law]:
         """Of the parts that age: resistors and capacitors by the file's figure, or their own."""
@@ -199,7 +213,12 @@ class _Rules:
             rule = self.own.get(name)
             if rule is not None and rule.ageing is not None:
                 found[name] = Uniform(*rule.ageing)
-            elif self.rules.ageing is not None and not isinstance(part, Reference):
+            elif self.rules.ageing is None or isinstance(part, Reference):
+                continue
+            elif self.rules.ageing == "catalogue":
+                width = self.drift(part, rule)
+                found[name] = Uniform(-width, width)
+            else:
                 found[name] = Uniform(*self.rules.ageing)
         return found
 

@@ -84,7 +84,8 @@ class SpreadSpec:
     resistors, capacitors : how they lie within their grade. offset : None: the catalogue's.
     saturation, supply : half-widths, fractions. bias [A], gain_bandwidth [Hz] : the typical figure,
     what the data sheet gives, or lowest and highest. reference_grade : a fraction; None: the
-    catalogue's. temperature : of the board [°C]. ageing : relative, of resistors and capacitors.
+    catalogue's. temperature : of the board [°C]. ageing : relative, of resistors and capacitors;
+    "catalogue" : each ± its family's drift.
     reels : what parts of one value have in common. measured : file of a bench's list.
     """
 
@@ -97,7 +98,7 @@ class SpreadSpec:
     supply: float = 0.0
     reference_grade: float | None = None
     temperature: tuple[float, float] | None = None
-    ageing: tuple[float, float] | None = None
+    ageing: Literal["catalogue"] | tuple[float, float] | None = None
     reels: float = 0.0
     network: tuple[NetworkRule, ...] = ()
     part: tuple[PartRule, ...] = ()
@@ -187,9 +188,15 @@ def _tempco() -> Accepts:
     return _drift(said, lambda value: abs(value) < 0.01)
 
 
-def _ageing() -> Accepts:
+def _ageing(catalogue: bool = False) -> Accepts:
     said = "a fraction >= 0 such as 0.005 for ±, or [low, high]"
-    return _drift(said, lambda value: abs(value) < 1.0)
+    said += ', or "catalogue"' if catalogue else ""
+    given = _drift(said, lambda value: abs(value) < 1.0)
+
+    def check(value: object) -> object:
+        return value if catalogue and value == "catalogue" else given.check(value)
+
+    return Accepts(said, check)
 
 
 def _figure(unit: str, example: str) -> Accepts:
@@ -255,7 +262,7 @@ class SpreadTable(BaseModel):
         float | None, _fraction("a fraction in [0, 1): 0.001 is ± 0.1 %")
     ] = None
     temperature: Annotated[tuple[float, float] | None, _temperature()] = None
-    ageing: Annotated[tuple[float, float] | None, _ageing()] = None
+    ageing: Annotated[Literal["catalogue"] | tuple[float, float] | None, _ageing(True)] = None
     reels: Annotated[float, _share()] = SpreadSpec.reels
     network: tuple[_NetworkTable, ...] = Field(
         default=(), strict=False, description="tables [[spread.network]]"

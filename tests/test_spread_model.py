@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from designer.boards import Boards
 from designer.catalog import load_catalog
 from designer.circuit import Circuit
+from designer.errors import InputError
 from designer.laws import Binned, Normal, Split, Uniform
 from designer.modelfile import ModelFile, parse_model_file
 from designer.samples import cube
@@ -317,6 +318,17 @@ share = 0.8
         "by up to 2 %",
     ):
         assert part in words_of(spread, SOLD), part
+
+
+def test_ageing_by_the_catalogue() -> None:
+    """Thick film at 1 %: 1 % in the endurance test; the C0G capacitors' drift is in no sheet."""
+    given_ = '[[spread.part]]\nnames = "capacitors"\nageing = 0.003'
+    spread = of(f'ageing = "catalogue"\n{given_}', SOLD)
+    assert spread.ageing["R3"] == Uniform(-0.01, 0.01)
+    assert spread.ageing["C3"] == Uniform(-0.003, 0.003)
+    assert "VR1" not in spread.ageing
+    with pytest.raises(InputError, match=r"C1, .* no drift"):
+        of('ageing = "catalogue"', SOLD)
 
 
 def test_parts_of_one_value_share_a_reel() -> None:

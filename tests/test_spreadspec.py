@@ -8,6 +8,7 @@ import pytest
 
 from designer import cli
 from designer.errors import InputError
+from designer.measured import read_measured
 from designer.modelfile import SpreadSpec, parse_model_file, read_model_file
 from designer.spread import Spread
 from designer.spreadspec import NetworkRule, Offset, PartRule, Shape
@@ -42,6 +43,22 @@ def test_what_the_comments_of_the_example_offer_is_valid() -> None:
     read = table(said + "\nreference_grade = 0.001")
     assert read.resistors == Shape("binned", inner=0.002)
     assert read.offset == Offset(0.0, 0.0)
+
+
+def test_the_examples_of_the_documentation(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "spread.md").read_text(encoding="utf-8")
+    blocks = [block.partition("\n") for block in text.split("```")[1::2]]
+    (example,) = [body for language, _, body in blocks if language == "toml"]
+    read = parse_model_file(f"{PAPER}\n{example}").spread
+    assert (read.reels, read.temperature, len(read.network), len(read.part)) == (
+        0.5,
+        (10, 40),
+        1,
+        1,
+    )
+    (listed,) = [body for language, _, body in blocks if not language]
+    (tmp_path / "bench.csv").write_text(listed, encoding="utf-8")
+    assert read_measured(tmp_path / "bench.csv").values["U1A.offset"] == (-1.3e-3,)
 
 
 def test_units_and_short_forms() -> None:
@@ -193,7 +210,7 @@ UNFIT = [
         'temperature = [0, 50]\n[[spread.part]]\nnames = "R7"\ngrade = 1e-6',
         "spread.temperature",
         "R7",
-        "a tempco in [[spread.part]]",
+        "tempco in [[spread.part]]",
     ),
 ]
 
