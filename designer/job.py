@@ -46,6 +46,7 @@ from designer.jsonout import (
     study_json,
     synthesis_json,
 )
+from designer.measured import MEASURED
 from designer.modelfile import ModelFile, read_model_file
 from designer.opamp_model import Rung
 from designer.pipeline import Checked
@@ -106,6 +107,12 @@ class Outcome:
     result: RunResult | None = None
 
 
+def model_file(path: Path) -> ModelFile:
+    """Read a model file; a design folder's has its measured values from the folder's own copy."""
+    inside = path.name == MODEL and is_design_folder(path.parent)
+    return read_model_file(path, measured=path.parent / MEASURED if inside else None)
+
+
 def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
     """The model file of a verb's argument (a model file or a design folder), and where to write.
 
@@ -114,7 +121,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
     InputError : neither, or a model file without ``out``.
     """
     if not path.is_dir():
-        modelfile = read_model_file(path)
+        modelfile = model_file(path)
         if out is None:
             raise InputError(
                 None, "--out", "nothing", "a folder to write into: this verb writes a design folder"
@@ -125,7 +132,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
             path, "the folder", "no manifest.json", "a model file (TOML) or a design folder"
         )
     folder = Folder(path)
-    modelfile = read_model_file(path / MODEL)
+    modelfile = model_file(path / MODEL)
     if _made_from(folder).get("model") != modelfile.sha256:
         raise InputError(
             path / MODEL,
@@ -202,6 +209,7 @@ def run_into(
     if (
         folder.state("design", wanted["design"][0]) == "other"
         and made_from.get("model") == modelfile.sha256
+        and made_from.get("measured") == wanted["design"][0].get("measured")
         and modelfile.source == out / MODEL
     ):
         # A folder that came from elsewhere: its parts stand, whatever can be bought here.
@@ -291,7 +299,7 @@ def simulate_answer(
         if engine != "model":
             made = load(Folder(path), modelfile, catalog)
     else:
-        modelfile = read_model_file(path)
+        modelfile = model_file(path)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
     names = simulate_plots.names([w for w in wanted if w is not None])
     if plots is not None:
@@ -341,9 +349,11 @@ def _wanted(
         "catalogue": catalog.hash,
         "version": __version__,
     }
-    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
-        "design": (inputs, list(DESIGN_FILES))
-    }
+    files = list(DESIGN_FILES)
+    if modelfile.measured is not None:
+        inputs["measured"] = modelfile.measured.sha256
+        files.append(MEASURED)
+    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {"design": (inputs, files)}
     if study:
         more = {"seed": options.seed, "samples": options.samples}
         names = [TOLERANCE, *REPORTS, *block_names(options.samples)]
@@ -354,10 +364,7 @@ def _wanted(
 def _study_provenance(
     made: Synthesis, checked: tuple[Checked, ...], options: Options
 ) -> dict[str, Any]:
-    spec = made.modelfile.circuit
-    spread = Spread.bench_1(
-        made.catalog.opamp(spec.opamp), spec.resistor_grade, spec.capacitor_grade
-    )
+    spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
     return provenance(
         made.modelfile,
         made.catalog.hash,
