@@ -145,19 +145,22 @@ def shoot_symmetric(flow: Flow, x: Array, n: int) -> tuple[Array, Array] | None:
     return None
 
 
-def describe(flow: Flow, x: Array, n: int, monodromy: Array, mode: ModeKey | None = None) -> Orbit:
-    """The orbit through the fixed point x (states,) of the n-period map, over 3n periods.
+def describe(
+    flow: Flow, x: Array, n: int, monodromy: Array, mode: ModeKey | None = None, laps: int = 3
+) -> Orbit:
+    """The orbit through the fixed point x (states,) of the n-period map, over laps·n periods.
 
-    Checks by running that the strobe repeats, counts impacts, refines extremes.
+    Checks by running that the strobe repeats, counts impacts, refines extremes. Unstable orbits
+    want a single lap: what rounding leaves grows by their multipliers.
     """
-    run = flow.run(x, 3 * n, mode=mode, measure=True)
+    run = flow.run(x, laps * n, mode=mode, measure=True)
     j = flow.system.displacement[0] if flow.system.displacement else 0
     peak = np.abs(run.extremes).max(axis=1)
-    drift = np.abs(run.strobes - np.tile(run.strobes[:n], (4, 1))[: 3 * n + 1])
+    drift = np.abs(run.strobes - np.tile(run.strobes[:n], (laps + 1, 1))[: laps * n + 1])
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
-    counts = run.counts.reshape(3, n, -1, 2).sum(axis=(1, 2))
-    # Entries at the very strobe may fall into one lap or the next: judge the three together.
-    lower, upper = (round(c / 3) for c in counts.sum(axis=0))
+    counts = run.counts.reshape(laps, n, -1, 2).sum(axis=(1, 2))
+    # Entries at the very strobe may fall into one lap or the next: judge them together.
+    lower, upper = (round(c / laps) for c in counts.sum(axis=0))
     once = run.impacts.time < n * flow.drive.period
     status = OrbitStatus.PERIODIC
     floor = ENGINE_ERROR * peak[j]

@@ -1,0 +1,133 @@
+"""Branches and bifurcation points over an interval of a parameter, from known orbits on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.attractor import mirrored_strobes
+from designer.bifurcations import Bifurcation, Kind, locate
+from designer.continuation import Branch, End, start, trace
+from designer.curve import Curve
+from designer.family import Family
+from designer.orbit import Orbit, OrbitStatus
+from designer.switching import switch
+from designer.system import Array
+
+DEPTH = 2
+"""Branch switches in a row: a twin's period-doubled orbits, from a symmetric branch."""
+MEETING = 1e-6
+"""Of the parameter's size: two points of a kind nearer than this are one."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Branches, and the bifurcation points on them; ``Bifurcation.branch`` numbers the branches.
+
+    parents : for each branch the number of the one it was switched to from, or -1.
+    """
+
+    parameter: str
+    branches: tuple[Branch, ...]
+    parents: tuple[int, ...]
+    points: tuple[Bifurcation, ...]
+
+    def on(self, branch: int) -> list[Bifurcation]:
+        """The points on one branch, in its order."""
+        return [p for p in self.points if p.branch == branch]
+
+
+def survey(
+    family: Family,
+    known: Sequence[tuple[float, Orbit]],
+    low: float,
+    high: float,
+    *,
+    depth: int = DEPTH,
+    progress: Callable[[], None] = lambda: None,
+) -> Survey:
+    """Follow known orbits both ways, and what leaves them where stability changes.
+
+    known : values of the parameter with a periodic orbit found there, stable or not; those that
+    lie on a branch already followed add none. low, high : ends of the interval. depth : branch
+    switches in a row. progress : called once a branch.
+    """
+    branches: list[Branch] = []
+    parents: list[int] = []
+    points: list[Bifurcation] = []
+
+    def add(branch: Branch, parent: int) -> int:
+        number = len(branches)
+        branches.append(branch)
+        parents.append(parent)
+        points.extend(locate(branch, number))
+        progress()
+        return number
+
+    for value, orbit in known:
+        if orbit.status is not OrbitStatus.PERIODIC or not low <= value <= high:
+            continue
+        if any(passes(b, value, orbit) for b in branches):
+            continue
+        try:
+            origin = start(family, orbit, value)
+        except ArithmeticError:
+            continue
+        queue = [(add(trace(origin, low, high), -1), 0)]
+        while queue:
+            number, deep = queue.pop(0)
+            if deep == depth:
+                continue
+            for where in [p for p in points if p.branch == number]:
+                if not _leads(where) or _met(where, branches, parents, number):
+                    continue
+                child = switch(branches[number], where, low, high)
+                if child is not None:
+                    queue.append((add(child, number), deep + 1))
+    return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
+
+
+def passes(branch: Branch, value: float, orbit: Orbit, tolerance: float = 1e-6) -> bool:
+    """Whether an orbit, or its mirror twin, lies on a branch.
+
+    tolerance : of the peak, at any of the strobes.
+    """
+    curve = branch.curve
+    if curve.n != orbit.n:
+        return False
+    flow = curve.family.flow(value)
+    laps = flow.run(orbit.start, orbit.n).strobes[:-1]
+    if flow.system.mirror is not None:
+        laps = np.concatenate([laps, mirrored_strobes(flow, orbit)])
+    for a, b in zip(branch.points, branch.points[1:], strict=False):
+        if not min(a.value, b.value) <= value <= max(a.value, b.value) or a.value == b.value:
+            continue
+        share = (value - a.value) / (b.value - a.value)
+        guess = a.solved.y + share * (b.solved.y - a.solved.y)
+        near = curve.near(guess[:-1], value)
+        if near is not None and _least(laps, near.x, curve) < tolerance:
+            return True
+    return False
+
+
+def _least(laps: Array, x: Array, curve: Curve) -> float:
+    return float((np.abs(laps - x) / curve.scale[:-1]).max(axis=1).min())
+
+
+def _leads(where: Bifurcation) -> bool:
+    """Whether another branch leaves here and the change concerns a stable orbit."""
+    return where.kind in (Kind.PITCHFORK, Kind.DOUBLING) and where.stable[0] != where.stable[1]
+
+
+def _met(where: Bifurcation, branches: list[Branch], parents: list[int], parent: int) -> bool:
+    """Whether a branch that left this parent elsewhere came back to it here."""
+    close = MEETING**0.5 * float(branches[parent].curve.scale[-1])
+    n = (2 if where.kind is Kind.DOUBLING else 1) * branches[parent].curve.n
+    for child, origin in zip(branches, parents, strict=True):
+        if origin != parent or child.ends[1] is not End.JOINED or child.curve.n != n:
+            continue
+        if abs(child.points[-1].value - where.value) < close:
+            return True
+    return False
