@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.attractor import settle
-from designer.bifurcations import Bifurcation, locate
-from designer.continuation import Branch, BranchPoint, start, trace
+from designer.bifurcations import Bifurcation, Kind, locate
+from designer.continuation import Branch, BranchPoint, End, start, trace
 from designer.family import Family
 from designer.orbit import Orbit
+from designer.survey import Survey
 
 OUTSIDE = 5e-4
 """Of the parameter's size: how far past the end of a window its orbit is let go."""
@@ -85,6 +86,25 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
         symmetric = branch.curve.symmetric
         out.append(Window(branch.parameter, inside[0].response, symmetric, low, high, number))
     return out
+
+
+def all_windows(found: Survey) -> list[Window]:
+    """The windows on every branch; one that reaches to the parent branch ends at its point."""
+    out = []
+    for number, branch in enumerate(found.branches):
+        for one in windows(branch, found.on(number), number):
+            parent = found.on(found.parents[number]) if found.parents[number] >= 0 else []
+            out.append(replace(one, low=_origin(one.low, parent), high=_origin(one.high, parent)))
+    return sorted(out, key=lambda w: w.low.value)
+
+
+def _origin(end: WindowEnd, parent: Sequence[Bifurcation]) -> WindowEnd:
+    """The parent's bifurcation point, for an end where a branch joins its parent."""
+    points = [p for p in parent if p.kind in (Kind.PITCHFORK, Kind.DOUBLING)]
+    if end.why != End.JOINED or not points:
+        return end
+    near = min(points, key=lambda p: abs(p.value - end.value))
+    return WindowEnd(near.value, near.error, str(near.kind), near, near.point.orbit)
 
 
 def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> Window:
