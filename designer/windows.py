@@ -15,6 +15,8 @@ from designer.survey import Survey
 
 OUTSIDE = 5e-4
 """Of the parameter's size: how far past the end of a window its orbit is let go."""
+MEETING = 2e-3
+"""Of the parameter: how far from its parent's bifurcation point a branch's last orbit may be."""
 
 
 @dataclass(frozen=True)
@@ -90,21 +92,32 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
 
 def all_windows(found: Survey) -> list[Window]:
     """The windows on every branch; one that reaches to the parent branch ends at its point."""
-    out = []
+    out: list[Window] = []
     for number, branch in enumerate(found.branches):
-        for one in windows(branch, found.on(number), number):
-            parent = found.on(found.parents[number]) if found.parents[number] >= 0 else []
-            out.append(replace(one, low=_origin(one.low, parent), high=_origin(one.high, parent)))
+        above = found.parents[number]
+        meetings = [] if above < 0 else _meetings(branch, found.branches[above], found.on(above))
+        out += [
+            replace(w, low=_met(w.low, meetings), high=_met(w.high, meetings))
+            for w in windows(branch, found.on(number), number)
+        ]
     return sorted(out, key=lambda w: w.low.value)
 
 
-def _origin(end: WindowEnd, parent: Sequence[Bifurcation]) -> WindowEnd:
+def _meetings(branch: Branch, parent: Branch, points: Sequence[Bifurcation]) -> list[Bifurcation]:
+    """Where branches of this one's period may leave the parent."""
+    kind = Kind.PITCHFORK if branch.curve.n == parent.curve.n else Kind.DOUBLING
+    return [p for p in points if p.kind is kind]
+
+
+def _met(end: WindowEnd, meetings: Sequence[Bifurcation]) -> WindowEnd:
     """The parent's bifurcation point, for an end where a branch joins its parent."""
-    points = [p for p in parent if p.kind in (Kind.PITCHFORK, Kind.DOUBLING)]
-    if end.why != End.JOINED or not points:
+    if end.why != End.JOINED:
         return end
-    near = min(points, key=lambda p: abs(p.value - end.value))
-    return WindowEnd(near.value, near.error, str(near.kind), near, near.point.orbit)
+    for p in sorted(meetings, key=lambda p: abs(p.value - end.value)):
+        if abs(p.value - end.value) < MEETING * abs(p.value):
+            return WindowEnd(p.value, p.error, str(p.kind), p, p.point.orbit)
+        break
+    return end
 
 
 def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> Window:
