@@ -26,6 +26,7 @@ from designer.model import Dimensionless
 from designer.orbit import Orbit
 from designer.paper_statements import Statement, main_cascades, main_windows, statements
 from designer.plots import to_png, to_svg
+from designer.progress import Progress
 from designer.responses import scale_of
 from designer.survey import Survey, survey
 from designer.sweep_subject import ModelSubject
@@ -39,8 +40,8 @@ LOW, HIGH = 0.2, 1.8
 """Of ω: where branches are followed."""
 FIRST = 1.55
 """ω at which the branch of symmetric orbits is set out from."""
-DEPTH = 3
-"""Branch switches in a row: twins, their doubled orbits, and those doubled once more."""
+DEPTH = 2
+"""Branch switches in a row: to the twins, and to their doubled orbits."""
 FIGURES = {"fig2a": (0.1, 1.8, 1801), "fig2b": (0.2, 0.6, 801), "fig2c": (1.25, 1.6, 701)}
 """ω from, to and steps of each picture of the paper's Fig. 2."""
 SHARED = (1.55, 1.505, 1.43, 1.35, 0.85, 0.77, 0.54, 0.41, 0.25, 0.225)
@@ -80,40 +81,42 @@ def reproduce(
     out: Path,
     *,
     jobs: int = 1,
-    progress: Callable[[], None] = lambda: None,
+    progress: Progress | None = None,
     extent: Extent | None = None,
 ) -> Dynamics:
     """Write the report into a folder, which is made; files of the report's names are replaced.
 
-    jobs : threads of the sweeps. progress : called once a branch, a sweep's block, a frequency.
+    jobs : threads of the sweeps. progress : is told the stages. extent : the report's by default.
 
     Raises
     ------
     InputError : the folder cannot be written.
     """
     extent = Extent() if extent is None else extent
+    said = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             out, "--out", error.strerror or str(error), "a directory that can be written"
         ) from None
-    dynamics = measure(extent, progress)
-    pictures = _pictures(out, dynamics, extent, jobs, progress)
-    said = provenance.versions()
-    _parquet(out / "branches.parquet", dynamics.found, said)
-    text = json.dumps(_plain(dynamics, extent, said), indent=1, sort_keys=True)
+    dynamics = measure(extent, said)
+    pictures = _pictures(out, dynamics, extent, jobs, said)
+    versions = provenance.versions()
+    _parquet(out / "branches.parquet", dynamics.found, versions)
+    text = json.dumps(_plain(dynamics, extent, versions), indent=1, sort_keys=True)
     (out / "dynamics.json").write_text(text + "\n", encoding="utf-8")
     (out / "README.md").write_text(_readme(dynamics, pictures), encoding="utf-8")
     return dynamics
 
 
-def measure(extent: Extent, progress: Callable[[], None] = lambda: None) -> Dynamics:
+def measure(extent: Extent, progress: Progress) -> Dynamics:
     """Branches, windows, what coexists, and the judgement of each statement."""
     over = family.of_model(MODEL, FIRST, "omega")
     first = settle(over.flow(FIRST), np.zeros(4))
+    step = progress.stage("Branches of periodic orbits")
     found = survey(
-        over, [(FIRST, first)], extent.low, extent.high, depth=extent.depth, progress=progress
+        over, [(FIRST, first)], extent.low, extent.high, depth=extent.depth, progress=step
     )
     windows = all_windows(found)
     after = {}
@@ -124,7 +127,8 @@ def measure(extent: Extent, progress: Callable[[], None] = lambda: None) -> Dyna
             kind = "S" if one.symmetric else "AS"
             low, high = outside(over, one.low, -1.0)[1], outside(over, one.high, 1.0)[1]
             after[p, kind + " low"], after[p, kind + " high"] = low.response, high.response
-    shared = {w: tuple(_coexisting(w, progress)) for w in extent.shared}
+    step = progress.stage("Coexisting attractors", len(extent.shared))
+    shared = {w: tuple(_coexisting(w, step)) for w in extent.shared}
     chatter = tuple((w, settle(over.flow(w), np.zeros(4))) for w in extent.chatter)
     said = statements(found, windows, chatter)
     return Dynamics(
@@ -144,7 +148,7 @@ def _named(orbit: Orbit) -> str:
 
 
 def _pictures(
-    out: Path, dynamics: Dynamics, extent: Extent, jobs: int, progress: Callable[[], None]
+    out: Path, dynamics: Dynamics, extent: Extent, jobs: int, progress: Progress
 ) -> list[str]:
     """Draw everything; names of the pictures without their endings."""
     drawn = {
@@ -164,7 +168,7 @@ def _pictures(
             np.linspace(low, high, steps),
             **sweep.follow("down", "up"),
         )
-        made = sweep.run(plan, jobs, progress=progress)
+        made = sweep.run(plan, jobs, progress=progress.stage(f"Sweep for {name}"))
         within = [m for m in marks if low <= m.value <= high]
         drawn[name] = bifurcation_plots.diagram(made, within if name != "fig2a" else ())
     for name, figure in drawn.items():
