@@ -10,11 +10,14 @@ other, microvolts wide, as long as the gain is finite.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from designer.circuit import Board, Circuit, Stop
 from designer.nodal import NodalEquations, Solution
 from designer.system import Array, Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.working import working_keys
 
 
 class FloatingCircuit(ArithmeticError):
@@ -42,8 +45,11 @@ class Reduction:
     def __init__(self, circuit: Circuit, board: Board) -> None:
         self.circuit = circuit
         self.board = board
-        self._equations = NodalEquations(circuit, board)
         self._solutions: dict[ModeKey, Solution] = {}
+
+    @cached_property
+    def _equations(self) -> NodalEquations:
+        return NodalEquations(self.circuit, self.board)
 
     def system(self) -> PiecewiseLinearSystem:
         """States are the capacitor voltages in volts, time in seconds, the drive in volts.
@@ -58,6 +64,7 @@ class Reduction:
             clearances=tuple(s.clearance for s in c.stops),
             displacement=tuple(c.states.index(s.state) for s in c.stops),
             mirror=-np.eye(len(c.states)) if self._even() else None,
+            working=working_keys(c),
         )
 
     def solution(self, key: ModeKey) -> Solution:
