@@ -25,6 +25,8 @@ STROBE_TOLERANCE = 1e-8
 """Of the peak of each state (docs/definitions.md)."""
 ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
+WORTH = 1e-2
+"""Of the peak: how nearly a strobe must repeat to be worth polishing."""
 NEAR = 0.05
 """Of the peak: how far a polished orbit may lie from where settling had arrived."""
 CLOSING = 400
@@ -279,7 +281,7 @@ def _polish(flow: Flow, run: FlowResult) -> tuple[Orbit | None, int]:
     peak = peaks_near(flow, strobes[-1], run.mode)
     for n in range(1, min(MAX_PERIOD, len(strobes) - 1) + 1):
         gap = np.abs(strobes[-1] - strobes[-1 - n]) / peak
-        if gap.max() > 1e-2:
+        if gap.max() > WORTH:
             continue
         found = shoot(flow, strobes[-1], n, run.mode, peak)
         cost += 8 * n

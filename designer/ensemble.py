@@ -1,26 +1,64 @@
-"""The attractors of many boards of one circuit: what every study of yields is made of."""
+"""The attractors of many boards of one circuit: what every study of yields is made of.
+
+Boards are reduced together, and the usual way to an answer (settle, shoot, check) is compiled
+(``designer.circuit_kernel``). What is unusual on that way goes to ``designer.attractor.settle``,
+which it must equal: a period above ``circuit_kernel.LONGEST``, none after 140 drive periods, a mode
+that is no working one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from designer.attractor import settle
+from designer import attractor, working
+from designer import circuit_kernel as kernel
 from designer.boards import Boards
-from designer.flow import Flow
-from designer.orbit import Orbit, failed
+from designer.flow import MAX_EVENTS, Flow, FlowResult, heed
+from designer.orbit import Complex, Orbit, OrbitStatus, failed
 from designer.reduction import FloatingCircuit, Reduction
-from designer.system import Array, Drive
+from designer.system import Array, Drive, ModeKey
 from designer.threads import parallel
+
+CHUNK = 32
+"""Questions that one thread takes at a time; no answer depends on it."""
+RULES = np.array(
+    [
+        MAX_EVENTS,
+        attractor.WORTH,
+        attractor.NEAR,
+        attractor.CLOSING,
+        attractor.STROBE_TOLERANCE,
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Response:
+    """An orbit with the displacement (n · POINTS,) over its n drive periods; empty where none was
+    drawn."""
+
+    orbit: Orbit
+    trace: Array
 
 
 class Ensemble:
-    """N boards, reduced once each and asked as often as is wanted."""
+    """N boards, reduced once each and asked as often as is wanted.
 
-    def __init__(self, boards: Boards) -> None:
+    fast : take the compiled way where it fits; False: ``attractor.settle`` of each board.
+    """
+
+    def __init__(self, boards: Boards, *, fast: bool = True) -> None:
         self.boards = boards
+        self._fast = fast
         self._reductions: dict[int, Reduction] = {}
+        self._modes: kernel.Modes | None = None
+        self._good = np.zeros(len(boards), dtype=np.bool_)
+        self._keys = working.working_keys(boards.circuit)
+        if fast:
+            self._modes, self._good = working.of_boards(boards)
 
     def __len__(self) -> int:
         return len(self.boards)
@@ -44,18 +82,147 @@ class Ensemble:
     ) -> list[Orbit]:
         """The attractor of board ``which[k]`` under ``drives[k]`` from ``starts[k]``, for each k.
 
-        A board may be asked more than once. starts : (len(which), states), at drive phase 0.
-        Equal to ``designer.attractor.settle`` of each; a board without an answer gives a failed
-        orbit with the reason. progress : called once an answer.
+        A board may be asked more than once; questions of one board under one drive that follow
+        each other share its tables. starts : (len(which), states), at drive phase 0. Equal to
+        ``designer.attractor.settle`` of each, to rounding; a board without an answer gives a
+        failed orbit with the reason. progress : called once an answer.
         """
+        return [r.orbit for r in self.respond(which, drives, starts, jobs=jobs, progress=progress)]
 
-        def one(k: int) -> Orbit:
+    def respond(
+        self,
+        which: Sequence[int],
+        drives: Sequence[Drive],
+        starts: Array,
+        *,
+        jobs: int = 1,
+        progress: Callable[[], None] = lambda: None,
+    ) -> list[Response]:
+        """``settle``, with the displacement that each orbit draws."""
+        index = np.asarray(which, dtype=np.int64)
+        states = np.ascontiguousarray(starts, dtype=np.float64)
+
+        def chunk(first: int) -> list[Response]:
+            heed()
+            part = slice(first, first + CHUNK)
+            found = self._compiled(index[part], drives[part], states[part])
+            for k, response in enumerate(found):
+                if response is None:
+                    found[k] = self._alone(
+                        int(index[first + k]), drives[first + k], states[first + k]
+                    )
+                progress()
+            return [r for r in found if r is not None]
+
+        chunks = parallel(chunk, range(0, len(index), CHUNK), jobs)
+        return [response for found in chunks for response in found]
+
+    def run(
+        self,
+        which: Sequence[int],
+        drives: Sequence[Drive],
+        starts: Array,
+        periods: int,
+        *,
+        modes: Sequence[ModeKey | None] | None = None,
+        jobs: int = 1,
+    ) -> list[FlowResult | None]:
+        """Each board's plain flow over ``periods`` drive periods, without settling.
+
+        modes : in which each starts, where that is known. None where a board has no flow: no
+        mode holds at its start, or its nodal equations are singular.
+        """
+        begin = [None] * len(which) if modes is None else modes
+
+        def one(k: int) -> FlowResult | None:
             try:
-                flow = Flow(self.reduction(which[k]).system(), drives[k])
-                orbit = settle(flow, starts[k])
-            except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
-                orbit = failed(str(error))
-            progress()
-            return orbit
+                flow = Flow(self.reduction(which[k]).system(), drives[k], fast=self._fast)
+                return flow.run(starts[k], periods, mode=begin[k])
+            except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError):
+                return None
 
         return list(parallel(one, range(len(which)), jobs))
+
+    def _alone(self, board: int, drive: Drive, start: Array) -> Response:
+        """One question, in Python."""
+        try:
+            flow = Flow(self.reduction(board).system(), drive, fast=self._fast)
+            orbit = attractor.settle(flow, start)
+            trace = np.zeros(0)
+            if orbit.status is OrbitStatus.PERIODIC:
+                trace = displacement(flow, orbit)
+        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
+            return Response(failed(str(error)), np.zeros(0))
+        return Response(orbit, trace)
+
+    def _compiled(
+        self, which: kernel.Int, drives: Sequence[Drive], starts: Array
+    ) -> list[Response | None]:
+        """None for each question that the compiled way leaves open."""
+        out: list[Response | None] = [None] * len(which)
+        if self._modes is None:
+            return out
+        asked = np.flatnonzero(self._good[which])
+        if not len(asked):
+            return out
+        given = np.array([[d.omega, d.amplitude, d.offset] for d in drives])
+        count = len(asked)
+        answers = kernel.Answers(
+            whole=np.zeros((count, 7), dtype=np.int64),
+            real=np.zeros((count, 32)),
+            when=np.zeros((count, kernel.IMPACTS)),
+            speed=np.zeros((count, kernel.IMPACTS)),
+            stop=np.zeros((count, kernel.IMPACTS), dtype=np.int64),
+            trace=np.zeros((count, kernel.LONGEST * kernel.POINTS)),
+        )
+        j = self.boards.circuit.states.index(self.boards.circuit.stops[0].state)
+        kernel.respond_all(
+            self._modes, which[asked], given[asked], starts[asked], RULES, working.WAYS, j, answers
+        )
+        found = np.flatnonzero(answers.whole[:, 0] == kernel.FOUND)
+        multipliers = np.linalg.eigvals(answers.real[found, 4:20].reshape(-1, 4, 4)).astype(complex)
+        for e, multiplier in zip(found, multipliers, strict=True):
+            period = drives[int(asked[e])].period
+            out[int(asked[e])] = self._response(answers, int(e), period, multiplier, j)
+        return out
+
+    def _response(
+        self, answers: kernel.Answers, e: int, period: float, multipliers: Complex, j: int
+    ) -> Response:
+        """Answer e in the normal form; the rules are those of ``attractor.describe``."""
+        n, p, q, spent, mode, met = (int(v) for v in answers.whole[e, 1:])
+        real = answers.real[e]
+        extremes = real[20:28].reshape(4, 2).copy()
+        penetration, miss = float(real[28]), float(real[29])
+        floor = attractor.ENGINE_ERROR * float(np.abs(extremes[j]).max())
+        grazing = min(penetration, miss) < floor or real[31] > 0.0
+        status = OrbitStatus.GRAZING if grazing else OrbitStatus.PERIODIC
+        radius = float(np.abs(multipliers).max())
+        once = answers.when[e, :met] < n * period
+        orbit = Orbit(
+            status=status,
+            n=n,
+            p=p,
+            q=q,
+            start=real[:4].copy(),
+            mode=self._keys[mode],
+            extremes=extremes,
+            impact_times=answers.when[e, :met][once],
+            impact_velocities=answers.speed[e, :met][once],
+            impact_sides=answers.stop[e, :met][once].astype(float),
+            asymmetry=float(real[30]),
+            multipliers=multipliers,
+            lyapunov=float(np.log(radius) / (n * period)) if radius > 0.0 else -np.inf,
+            penetration=penetration,
+            miss=miss,
+            reason=f"while classifying period {n}" if grazing else "",
+            periods=spent,
+        )
+        return Response(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+
+
+def displacement(flow: Flow, orbit: Orbit) -> Array:
+    """(n · POINTS,) the first moving state over the n periods of an orbit."""
+    j = flow.system.displacement[0] if flow.system.displacement else 0
+    run = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=kernel.POINTS)
+    return np.asarray(run.strobes[:-1, j])

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from designer import ensemble
 from designer.circuit import nominal_board
+from designer.circuit_kernel import POINTS
 from designer.deck import Excitation
 from designer.ensemble import Ensemble
 from designer.flow import Flow
@@ -16,9 +18,6 @@ from designer.reduction import Reduction
 from designer.spread import draw_many
 from designer.system import Array, Drive, PiecewiseLinearSystem
 from designer.verdict import Answer, StudyPlan, judge
-
-POINTS = 128
-"""Of an orbit per drive period, for the waveform error."""
 
 
 def drive_of(excitation: Excitation) -> Drive:
@@ -36,10 +35,10 @@ def block(
 
     ``progress`` is called once an answer.
     """
-    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+    boards = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
     drives = [drive_of(q.excitation) for q in plan.questions]
     asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
-    orbits = ensemble.settle(
+    found = boards.respond(
         [i for i, _ in asked],
         [drives[number] for _, number in asked],
         np.array([plan.questions[number].start.start for _, number in asked]),
@@ -47,17 +46,17 @@ def block(
         progress=progress,
     )
     nominal = [_displacement(plan, number) for number in range(len(plan.questions))]
+    twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
     out: list[tuple[Answer, Subject | None]] = []
-    for (i, number), orbit in zip(asked, orbits, strict=True):
-        question = plan.questions[number]
+    for (i, number), response in zip(asked, found, strict=True):
+        orbit, question = response.orbit, plan.questions[number]
         verdict, reason = judge(orbit, question.spec, question.start)
         subject = None
         waveform = float("nan")
         if len(orbit.start):
-            subject = Subject(ensemble.reduction(i), question.excitation, orbit)
+            subject = Subject(boards.reduction(i), question.excitation, orbit)
             if orbit.status is OrbitStatus.PERIODIC:
-                shown = displacement(subject.system, drives[number], orbit)
-                waveform = waveform_error(shown, nominal[number])
+                waveform = waveform_error(response.trace, nominal[number], mirror=twins)
         answer = Answer(
             sample=indices[i],
             question=number,
@@ -77,18 +76,24 @@ def block(
 
 def displacement(system: PiecewiseLinearSystem, drive: Drive, orbit: Orbit) -> Array:
     """(n · POINTS,) the first moving state over the n periods of an orbit."""
-    j = system.displacement[0] if system.displacement else 0
-    run = Flow(system, drive).run(orbit.start, orbit.n, mode=orbit.mode or None, points=POINTS)
-    return np.asarray(run.strobes[:-1, j])
+    return ensemble.displacement(Flow(system, drive), orbit)
 
 
-def waveform_error(shown: Array, wanted: Array) -> float:
+def waveform_error(shown: Array, wanted: Array, *, mirror: bool = False) -> float:
     """RMS difference of two displacements over ``wanted``'s peak, at the best shift by whole drive
-    periods; nan where they have different periods."""
+    periods; nan where they have different periods.
+
+    mirror : the mirror image of ``wanted``, half a drive period on, does as well: a board with
+    stops on both sides may show the twin, and is as good.
+    """
     if len(shown) != len(wanted):
         return float("nan")
-    shifts = [np.roll(shown, k * POINTS) for k in range(len(shown) // POINTS)]
-    least = min(float(np.sqrt(np.mean((s - wanted) ** 2))) for s in shifts)
+    images = [wanted] + ([-np.roll(wanted, -POINTS // 2)] if mirror else [])
+    least = min(
+        float(np.sqrt(np.mean((np.roll(shown, k * POINTS) - image) ** 2)))
+        for image in images
+        for k in range(len(shown) // POINTS)
+    )
     return least / float(np.abs(wanted).max())
 
 

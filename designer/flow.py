@@ -15,8 +15,8 @@ from enum import StrEnum
 import numpy as np
 from scipy.linalg import matrix_balance
 
+from designer import circuit_kernel, modal, modal_kernel, working
 from designer import flow_kernel as kernel
-from designer import modal, modal_kernel
 from designer.errors import InputError
 from designer.system import Array, Drive, Mode, ModeKey, PiecewiseLinearSystem
 
@@ -86,7 +86,8 @@ class Flow:
     def __init__(self, system: PiecewiseLinearSystem, drive: Drive, *, fast: bool = True) -> None:
         self.system = system
         self.drive = drive
-        self._modal = modal.tables(system, drive) if fast else None
+        self._modal = modal.tables(system, drive) if fast and not system.working else None
+        self._working = working.tables(system, drive) if fast else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
@@ -124,6 +125,12 @@ class Flow:
         stretches = periods * points if stretches is None else stretches
         if self._modal is not None and points == 1 and not measure and stretches == periods:
             return self._run_modal(self._modal, x, periods, key, tangent, max_events)
+        if self._working is not None and key in self.system.working:
+            found = self._run_working(
+                self._working, x, stretches, points, key, tangent, max_events, room, measure=measure
+            )
+            if found is not None:
+                return found
         z = np.concatenate([x, [0.0, 1.0, 1.0]])
         clock = np.zeros(2)
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
@@ -148,7 +155,7 @@ class Flow:
             depth[j] = np.inf if side else 0.0
         code = kernel.DONE
         while cursor[0] < stretches:
-            _heed()
+            heed()
             code = kernel.advance(
                 self._tables,
                 z,
@@ -213,7 +220,7 @@ class Flow:
         counts = np.zeros((periods, 2), dtype=np.int64)
         done, code = 0, modal_kernel.DONE
         while done < periods and code == modal_kernel.DONE:
-            _heed()
+            heed()
             last = min(done + CHUNK, periods)
             code = modal_kernel.advance(
                 tables,
@@ -238,6 +245,70 @@ class Flow:
             penetration=np.inf,
             miss=np.inf,
             tangencies=0,
+            clipped_time=0.0,
+        )
+
+    def _run_working(
+        self,
+        tables: working.Tables,
+        x: Array,
+        stretches: int,
+        points: int,
+        key: ModeKey,
+        tangent: Array | None,
+        max_events: int,
+        room: int | None,
+        *,
+        measure: bool,
+    ) -> FlowResult | None:
+        """The same by the fast path of circuits; None where the run leaves the working modes."""
+        keys = self.system.working
+        cursor = np.array([keys.index(key), 0, measure], dtype=np.int64)
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
+        strobes = np.empty((stretches + 1, 4))
+        strobes[0] = x
+        counts = np.zeros((stretches, 2), dtype=np.int64)
+        capacity = (8 + 16 * stretches // points if room is None else room) if measure else 0
+        trail = working.trail(capacity)
+        anchor = working.anchors(points)
+        drive = np.array([self.drive.omega, self.drive.period, max_events])
+        done, code, chunk = 0, circuit_kernel.DONE, stretches if measure else CHUNK * points
+        while done < stretches and code == circuit_kernel.DONE:
+            heed()
+            last = min(done + chunk, stretches)
+            code = circuit_kernel.advance(
+                tables.data,
+                tables.ints,
+                strobes[done].copy(),
+                cursor,
+                drive,
+                anchor,
+                phi,
+                strobes[done : last + 1],
+                counts[done:last],
+                trail,
+            )
+            if code == circuit_kernel.LEFT:
+                return None
+            done += int(cursor[1])
+        met = int(trail.met[0])
+        if met > capacity and measure:  # more impacts than room: again, with room for all
+            return self._run_working(
+                tables, x, stretches, points, key, tangent, max_events, met, measure=True
+            )
+        return FlowResult(
+            status=_STATUS[code],
+            strobes=strobes[: done + 1],
+            counts=counts[:done, None, :],
+            mode=keys[int(cursor[0])],
+            tangent=None if tangent is None else phi,
+            impacts=Impacts(
+                trail.when[:met], np.zeros(met, dtype=np.int64), trail.stop[:met], trail.at[:met]
+            ),
+            extremes=trail.extremes,
+            penetration=float(trail.graze[0]) if measure else np.inf,
+            miss=float(trail.graze[1]),
+            tangencies=int(trail.graze[2]) if measure else 0,
             clipped_time=0.0,
         )
 
@@ -273,7 +344,8 @@ class Flow:
         self._tables.target[number, guard] = target
 
 
-def _heed() -> None:
+def heed() -> None:
+    """Stop here if ``interrupt`` is set."""
     if interrupt.is_set():
         raise KeyboardInterrupt
 

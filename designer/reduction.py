@@ -1,9 +1,6 @@
 """A board's parts and nets reduced to a piecewise-linear system, by modified nodal analysis.
 
-Capacitors become voltage sources (their voltages are the states), op-amps either a virtual short
-v+ - v- + offset = v_out/gain or, at a limit, a fixed output voltage. Diodes carry no current or
-drop a constant voltage and that of their series resistance, without which a diode between two
-op-amps' outputs would have no answer. Nothing here knows the formulas that chose the parts, so the
+``designer.nodal`` has the equations. Nothing here knows the formulas that chose the parts, so the
 result can be held against the model.
 
 Between two diodes around an op-amp, one off and the other not yet on, nothing closes the loop: its
@@ -13,29 +10,18 @@ other, microvolts wide, as long as the gain is finite.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from designer.circuit import GROUND, Board, Circuit, Diode, Section, Stop
+from designer.circuit import Board, Circuit, Stop
+from designer.nodal import NodalEquations, Solution
 from designer.system import Array, Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.working import working_keys
 
 
 class FloatingCircuit(ArithmeticError):
     """The nodal equations are singular: a net that nothing determines."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Linear functions of (states, generator, 1), each a row of length n + 2.
-
-    voltage : by net; current : into each state capacitor and through each diode, by name; output :
-    out of each op-amp section's output, by name [A].
-    """
-
-    voltage: dict[str, Array]
-    current: dict[str, Array]
-    output: dict[str, Array]
 
 
 EVEN = 1e-9
@@ -59,11 +45,11 @@ class Reduction:
     def __init__(self, circuit: Circuit, board: Board) -> None:
         self.circuit = circuit
         self.board = board
-        self._nets = {net: i for i, net in enumerate(circuit.nets)}
-        self._first = _layout(circuit, len(self._nets))
-        self._matrix, self._right = self._assemble()
-        self._number = {name: i for i, name in enumerate(circuit.switches)}
         self._solutions: dict[ModeKey, Solution] = {}
+
+    @cached_property
+    def _equations(self) -> NodalEquations:
+        return NodalEquations(self.circuit, self.board)
 
     def system(self) -> PiecewiseLinearSystem:
         """States are the capacitor voltages in volts, time in seconds, the drive in volts.
@@ -78,13 +64,16 @@ class Reduction:
             clearances=tuple(s.clearance for s in c.stops),
             displacement=tuple(c.states.index(s.state) for s in c.stops),
             mirror=-np.eye(len(c.states)) if self._even() else None,
+            working=working_keys(c),
         )
 
     def solution(self, key: ModeKey) -> Solution:
         """Every net's voltage and every capacitor's current in this mode."""
         known = self._solutions.get(key)
         if known is None:
-            known = self._solutions[key] = self._solve(key)
+            G, right = self._equations.of(key)
+            known = self._equations.solution(_solved(G, right, key))
+            self._solutions[key] = known
         return known
 
     def output(self, key: ModeKey, net: str, x: Array, u: Array) -> Array:
@@ -92,161 +81,22 @@ class Reduction:
         row = self.solution(key).voltage[net]
         return np.asarray(x @ row[:-2] + row[-2] * u + row[-1])
 
-    def _assemble(self) -> tuple[Array, Array]:
-        c, board = self.circuit, self.board
-        n, nodes = len(c.states), len(self._nets)
-        # Each branch has its current as an unknown and a row of its own, in this order.
-        first = self._first
-        size = first["generator"] + 1
-        G = np.zeros((size, size))
-        right = np.zeros((size, n + 2))
-
-        def stamp(row: int, net: str, value: float) -> None:
-            if net != GROUND:
-                G[row, self._nets[net]] += value
-
-        def current(net: str, column: int, value: float) -> None:
-            if net != GROUND:
-                G[self._nets[net], column] += value
-
-        def source(row: int, plus: str, minus: str) -> None:
-            """v(plus) - v(minus) is given; the unknown is the current that leaves plus into it."""
-            stamp(row, plus, 1.0)
-            stamp(row, minus, -1.0)
-            current(plus, row, 1.0)
-            current(minus, row, -1.0)
-
-        for r in c.resistors:
-            g = 1.0 / board.values[r.name]
-            for here, there in ((r.a, r.b), (r.b, r.a)):
-                if here != GROUND:
-                    stamp(self._nets[here], here, g)
-                    stamp(self._nets[here], there, -g)
-        for i, cap in enumerate(c.capacitors, nodes):
-            source(i, cap.plus, cap.minus)
-            right[i, c.states.index(cap.name)] = 1.0
-        for i, s in enumerate(c.sections, first["sections"]):
-            current(s.output, i, 1.0)
-            for net in (s.inverting, s.noninverting):
-                if net != GROUND:
-                    right[self._nets[net], n + 1] -= board.bias.get(s.name, 0.0)
-        for i, d in enumerate(c.diodes, first["diodes"]):
-            current(d.anode, i, 1.0)
-            current(d.cathode, i, -1.0)
-        for i, ref in enumerate(c.references, first["references"]):
-            source(i, ref.cathode, ref.anode)
-            right[i, n + 1] = board.reference[ref.name]
-        for i, rail in enumerate(c.supplies, first["supplies"]):
-            source(i, rail.net, GROUND)
-            right[i, n + 1] = board.supply.get(rail.name, rail.volts)
-        source(first["generator"], c.generator.net, GROUND)
-        right[first["generator"], n] = 1.0
-        return G, right
-
-    def _solve(self, key: ModeKey) -> Solution:
-        c, board = self.circuit, self.board
-        G, right = self._matrix.copy(), self._right.copy()
-        nodes, n, first = len(self._nets), len(c.states), self._first
-        amplifiers = len(c.sections)
-        for row, (s, position) in enumerate(
-            zip(c.sections, key[:amplifiers], strict=True), first["sections"]
-        ):
-            if position:
-                G[row, self._nets[s.output]] = 1.0
-                right[row, n + 1] = board.rails[s.name][1 if position > 0 else 0]
-                continue
-            for net, sign in ((s.noninverting, 1.0), (s.inverting, -1.0)):
-                if net != GROUND:
-                    G[row, self._nets[net]] += sign
-            G[row, self._nets[s.output]] -= board.inverse_gain
-            right[row, n + 1] = -board.offset.get(s.name, 0.0)
-        for row, (d, position) in enumerate(
-            zip(c.diodes, key[amplifiers:], strict=True), first["diodes"]
-        ):
-            if not position:
-                G[row, row] = 1.0  # no current
-                continue
-            for net, sign in ((d.anode, 1.0), (d.cathode, -1.0)):
-                if net != GROUND:
-                    G[row, self._nets[net]] += sign
-            G[row, row] = -d.model.resistance
-            right[row, n + 1] = board.drop[d.name]
-        y = _solved(G, right, key)
-        voltage = {net: y[i] for net, i in self._nets.items()}
-        voltage[GROUND] = np.zeros(n + 2)
-        # The unknown is the current that leaves ``plus`` through the source: into the capacitor.
-        amps = {cap.name: y[i] for i, cap in enumerate(c.capacitors, nodes)}
-        amps |= {d.name: y[i] for i, d in enumerate(c.diodes, first["diodes"])}
-        out = {s.name: -y[i] for i, s in enumerate(c.sections, first["sections"])}
-        return Solution(voltage, amps, out)
-
     def _mode(self, key: ModeKey) -> Mode:
-        c, board = self.circuit, self.board
-        solved, n = self.solution(key), len(c.states)
-        rows = np.array([solved.current[name] / board.values[name] for name in c.states])
-        guards: list[Guard] = []
-        sides = self._sides(key)
-        switches: tuple[Section | Diode, ...] = (*c.sections, *c.diodes)
-        for i, (switch, position) in enumerate(zip(switches, key, strict=True)):
-            for row, to in self._exits(switch, position, solved):
-                target = (*key[:i], to, *key[i + 1 :])
-                changed = [j for j, s in enumerate(self._sides(target)) if s != sides[j]]
-                j = changed[0] if changed else -1
-                largest = float(np.abs(row[:n]).max(initial=0.0))
-                scale = 1.0
-                if j >= 0:
-                    across = abs(row[c.states.index(c.stops[j].state)])
-                    scale = across if across > 1e-9 * largest else 1.0
-                elif isinstance(switch, Diode) and largest > 0.0:
-                    scale = largest  # amperes beside volts: bring both to states
-                guards.append(
-                    Guard(
-                        C=row[:n] / scale,
-                        D=float(row[n] / scale),
-                        e=float(row[n + 1] / scale),
-                        target=target,
-                        clearance=j,
-                    )
-                )
-        amplifiers = zip(c.sections, key, strict=False)
+        solved, n = self.solution(key), len(self.circuit.states)
+        rows = self._equations.rates(solved)
+        exits = self._equations.exits(key, solved)
+        guards = tuple(
+            Guard(e.row[:n], float(e.row[n]), float(e.row[n + 1]), e.target, e.clearance)
+            for e in exits
+        )
         return Mode(
             A=rows[:, :n],
             B=rows[:, n],
             d=rows[:, n + 1],
-            guards=tuple(guards),
-            sides=sides,
-            clipped=any(position != 0 and not s.limits for s, position in amplifiers),
+            guards=guards,
+            sides=self._equations.sides(key),
+            clipped=self._equations.clipped(key),
         )
-
-    def _sides(self, key: ModeKey) -> tuple[int, ...]:
-        """For each stop 1, 0 or -1: in contact with its upper side, open, with its lower."""
-        return tuple(self._side(stop, key) for stop in self.circuit.stops)
-
-    def _side(self, stop: Stop, key: ModeKey) -> int:
-        for side, contact in stop.contacts:
-            if key[self._number[contact.switch]] == contact.position:
-                return side
-        return 0
-
-    def _exits(
-        self, switch: Section | Diode, position: int, solved: Solution
-    ) -> list[tuple[Array, int]]:
-        """Rows that become positive where the switch leaves its position, with the next one."""
-        one = np.zeros(len(self.circuit.states) + 2)
-        one[-1] = 1.0
-        if isinstance(switch, Diode):
-            if position:
-                return [(-solved.current[switch.name], 0)]
-            across = solved.voltage[switch.anode] - solved.voltage[switch.cathode]
-            return [(across - self.board.drop[switch.name] * one, 1)]
-        low, high = self.board.rails[switch.name]
-        if position == 0:
-            out = solved.voltage[switch.output]
-            return [(out - high * one, 1), (low * one - out, -1)]
-        across = solved.voltage[switch.noninverting] - solved.voltage[switch.inverting]
-        across = across + self.board.offset.get(switch.name, 0.0) * one
-        limit = (high if position > 0 else low) * self.board.inverse_gain
-        return [(-position * (across - limit * one), 0)]
 
     def _even(self) -> bool:
         """Whether x → -x, u → -u is a symmetry: no DC anywhere, and both stops alike.
@@ -277,22 +127,6 @@ class Reduction:
             and len(ends) == 2
             and ends[1] - ends[0] <= EVEN * abs(ends[1])
         )
-
-
-def _layout(circuit: Circuit, nodes: int) -> dict[str, int]:
-    """First unknown of each group of branches; the nets' voltages come before them all."""
-    groups = {
-        "capacitors": circuit.capacitors,
-        "sections": circuit.sections,
-        "diodes": circuit.diodes,
-        "references": circuit.references,
-        "supplies": circuit.supplies,
-    }
-    first, at = {}, nodes
-    for name, members in groups.items():
-        first[name] = at
-        at += len(members)
-    return {**first, "generator": at}
 
 
 def _close(a: Array, b: Array, scale: float) -> bool:

@@ -107,6 +107,8 @@ class PiecewiseLinearSystem:
     clearances : names of the clearances, in the order of ``Mode.sides``.
     displacement : index of the state that moves in each clearance.
     mirror : (n, n) M with x → M x, u → -u a symmetry of the system, or None.
+    working : keys of the modes that a board as it should be moves between, ``start`` first; the
+        fast path of circuits tabulates them.
     """
 
     states: tuple[str, ...]
@@ -115,6 +117,7 @@ class PiecewiseLinearSystem:
     clearances: tuple[str, ...]
     displacement: tuple[int, ...]
     mirror: Array | None = None
+    working: tuple[ModeKey, ...] = ()
     _modes: dict[ModeKey, Mode] = field(default_factory=dict, repr=False)
 
     @property
