@@ -188,6 +188,12 @@ def tolerance(
         StudyRung,
         typer.Option("--rung", help="exact: no ngspice; ngspice: every board in ngspice too."),
     ] = StudyRung.AUTO,
+    tuned: Annotated[
+        bool, typer.Option("--tuned", help="Also with the generator free within its bands.")
+    ] = False,
+    reached: Annotated[
+        bool, typer.Option("--reached", help="Also from power-up, by the start recipe.")
+    ] = False,
     cluster: Annotated[
         str | None,
         typer.Option("--cluster", metavar="tcp://…", help="A Dask scheduler that shares the work."),
@@ -207,7 +213,16 @@ def tolerance(
         from designer.options import Options
 
         options = Options(
-            seed, jobs, samples, overwrite, resume, until=until, rung=rung.value, cluster=cluster
+            seed,
+            jobs,
+            samples,
+            overwrite,
+            resume,
+            until=until,
+            rung=rung.value,
+            tuned=tuned,
+            reached=reached,
+            cluster=cluster,
         )
         options.check()
         modelfile, folder = job.source(model, out)

@@ -18,7 +18,8 @@ MOST_SAMPLES = 1_000_000
 class Options:
     """Options of the verbs that write.
 
-    until, rung : as ``study.tolerance``. cluster : address of a Dask scheduler, or None.
+    until, rung, tuned, reached : as ``study.tolerance``. cluster : address of a Dask
+    scheduler, or None.
     """
 
     seed: int = SEED
@@ -28,6 +29,8 @@ class Options:
     resume: bool = False
     until: float | None = None
     rung: RungName = "auto"
+    tuned: bool = False
+    reached: bool = False
     cluster: str | None = None
 
     def check(self) -> None:
@@ -53,6 +56,8 @@ class Options:
         if verb == "tolerance":
             said += [] if self.until is None else ["--until", f"{self.until:g}"]
             said += [] if self.rung == "auto" else ["--rung", self.rung]
+            said += ["--tuned"] if self.tuned else []
+            said += ["--reached"] if self.reached else []
         return shlex.join(said)
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from designer.all_on_one import all_on_one
 from designer.bom import bill
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
 from designer.pipeline import Checked
-from designer.verdict import Answer, StudyPlan, Yield, all_on_one
+from designer.verdict import Answer, StudyPlan, Yield
 
 if TYPE_CHECKING:
     from designer.api import RunResult
@@ -101,4 +102,4 @@ class ReportData:
         """Boards that show every response; None unless each was asked of each board."""
         if len(self.checked) < 2 or None in self.question_of or not self.answers:
             return None
-        return all_on_one(((a.sample, a.verdict) for a in self.answers), len(self.checked))
+        return all_on_one(self.answers)

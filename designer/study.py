@@ -8,6 +8,8 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal
 
 from designer import combined, hearing, layers, pipeline
+from designer.all_on_one import all_on_one
+from designer.bands import Bands
 from designer.blocks import BlockStore
 from designer.combined import Combined
 from designer.hearing import NOMINAL_SAMPLES, Ask, Hearing
@@ -16,7 +18,11 @@ from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, need_responses
 from designer.progress import Progress
-from designer.verdict import BLOCK, Answer, StudyPlan, Yield, all_on_one, count
+from designer.reached import Reached
+from designer.recipe import Recipe
+from designer.recipe_search import find_recipes
+from designer.tuning import Tuned
+from designer.verdict import BLOCK, Answer, StudyPlan, Yield, count
 from designer.workers import SpicePool
 
 if TYPE_CHECKING:
@@ -35,20 +41,6 @@ RungName = Literal["exact", "auto", "ngspice"]
 RUNGS: tuple[RungName, ...] = ("exact", "auto", "ngspice")
 
 
-@dataclass(frozen=True)
-class Scope:
-    """What a study is to hold.
-
-    samples : at least. until : width of the 95 % intervals at which it stops growing; None: it does
-    not grow. rung : ``exact`` asks no ngspice, ``auto`` as ``designer.hearing`` says, ``ngspice``
-    about every board.
-    """
-
-    samples: int = SAMPLES
-    until: float | None = None
-    rung: RungName = "auto"
-
-
 class Stores:
     """Where the layers of a study are kept; this one keeps nothing."""
 
@@ -58,6 +50,12 @@ class Stores:
     def ngspice(self, plan: StudyPlan) -> BlockStore[Hearing] | None:
         return None
 
+    def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned] | None:
+        return None
+
+    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached] | None:
+        return None
+
 
 @dataclass(frozen=True)
 class Study:
@@ -65,7 +63,8 @@ class Study:
 
     asked : for each question of the plan, the index of its response. left_out : why a response
     is no question, by index. heard : what ngspice said. until : the width that was asked for;
-    narrow : whether every interval is narrower (None where no width was asked for).
+    narrow : whether every interval is narrower (None where no width was asked for). tuned,
+    reached : their rows; None where they were not asked for. recipes : one for each question.
     """
 
     checked: tuple[Checked, ...]
@@ -76,6 +75,9 @@ class Study:
     heard: tuple[Hearing, ...] = ()
     until: float | None = None
     narrow: bool | None = None
+    tuned: tuple[Tuned, ...] | None = None
+    reached: tuple[Reached, ...] | None = None
+    recipes: tuple[Recipe, ...] | None = None
 
     def answers_to(self, index: int) -> tuple[Answer, ...]:
         """The answers for response number ``index``, by sample."""
@@ -84,6 +86,14 @@ class Study:
     def heard_of(self, index: int) -> tuple[Hearing, ...]:
         """What ngspice said about response number ``index``, by sample."""
         return tuple(h for h in self.heard if self.asked[h.question] == index)
+
+    def tuned_of(self, index: int) -> tuple[Tuned, ...]:
+        """The rows of the tuned layer of response number ``index``."""
+        return tuple(t for t in self.tuned or () if self.asked[t.question] == index)
+
+    def reached_of(self, index: int) -> tuple[Reached, ...]:
+        """The rows of the reached layer of response number ``index``."""
+        return tuple(r for r in self.reached or () if self.asked[r.question] == index)
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
@@ -106,10 +116,24 @@ class Study:
 
     @property
     def all_on_one_board(self) -> Yield | None:
-        """Boards that show every response; None unless each of at least two was asked."""
-        if len(self.asked) < len(self.checked):
+        """Boards that show every response as built; None unless there are two at least and each
+        was asked."""
+        return self._on_one(self.answers)
+
+    @property
+    def all_tuned(self) -> Yield | None:
+        """The same with the generator free within the bands, for each response its own."""
+        return self._on_one(self.tuned)
+
+    @property
+    def all_reached(self) -> Yield | None:
+        """The same from power-up by the recipes."""
+        return self._on_one(self.reached)
+
+    def _on_one(self, rows: Sequence[Answer | Tuned | Reached] | None) -> Yield | None:
+        if not rows or len(self.asked) < max(len(self.checked), 2):
             return None
-        return all_on_one(((a.sample, a.verdict) for a in self.answers), len(self.asked))
+        return all_on_one(rows)
 
     @cached_property
     def _answers(self) -> dict[int, tuple[Answer, ...]]:
@@ -137,6 +161,8 @@ def tolerance(
     samples: int = SAMPLES,
     until: float | None = None,
     rung: RungName = "auto",
+    tuned: bool = False,
+    reached: bool = False,
     seed: int = SEED,
     jobs: int | None = None,
     pool: SpicePool | None = None,
@@ -147,9 +173,12 @@ def tolerance(
 ) -> Study:
     """How many boards show each response, under the spread of the model file.
 
-    samples, until, rung : as `Scope`. checked : of the same design, to save the time of the gate.
-    pool : where ngspice runs; without one ngspice is not asked. stores : where rows are read from
-    and written to. runner : who computes blocks; this process if None.
+    samples : at least. until : width of the 95 % intervals at which the study stops growing; it
+    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``designer.hearing`` says,
+    ``ngspice`` about every board. tuned, reached : whether these layers are wanted.
+    checked : of the same design, to save the time of the gate. pool : where ngspice runs; without
+    one ngspice is not asked. stores : where rows are read from and written to. runner : who
+    computes blocks; this process if None.
     """
     need_responses(synthesis.modelfile)
     said = Progress() if progress is None else progress
@@ -180,7 +209,10 @@ def tolerance(
         said,
         rung,
     )
-    return work.grown(study) if until is not None else work.made(study)
+    study = work.grown(study) if until is not None else work.made(study)
+    if tuned:
+        study = work.tuned(study, synthesis.modelfile.tuning)
+    return work.reached(study) if reached else study
 
 
 @dataclass(frozen=True)
@@ -232,6 +264,36 @@ class _Work:
                 f"{MOST_UNTIL} samples at most, and to {MOST_NOMINAL} boards in ngspice"
             )
         return replace(study, narrow=narrow)
+
+    def tuned(self, study: Study, bands: Bands) -> Study:
+        """With the generator free within the bands."""
+        plan = study.plan
+        step = self.said.stage("tuned boards", len(study.answers))
+        rows = layers.fill(
+            plan,
+            self.stores.tuned(plan, bands),
+            layers.SEARCH,
+            partial(layers.Tunings, plan, study.answers, bands),
+            self.runner,
+            step,
+        )
+        return replace(study, tuned=tuple(rows))
+
+    def reached(self, study: Study) -> Study:
+        """From power-up, by the recipes that the nominal circuit and a few boards suggest."""
+        plan = study.plan
+        self.said.stage("start recipes")
+        recipes = find_recipes(plan, self.jobs)
+        step = self.said.stage("boards from power-up", len(study.answers))
+        rows = layers.fill(
+            plan,
+            self.stores.reached(plan, recipes),
+            layers.SEARCH,
+            partial(layers.PowerUps, plan, recipes),
+            self.runner,
+            step,
+        )
+        return replace(study, reached=tuple(rows), recipes=recipes)
 
     def _sampled(self, study: Study, samples: int) -> Study:
         """With the answers of so many samples; those that it has are at an edge of a block."""
@@ -304,7 +366,6 @@ __all__ = (
     "SAMPLES",
     "SEED",
     "RungName",
-    "Scope",
     "Stores",
     "Study",
     "check",

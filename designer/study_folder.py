@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.bands import Bands
 from designer.blocks import BlockStore
 from designer.folder import REPORTS, TOLERANCE, Folder
 from designer.hearing import Hearing
-from designer.layers import CHUNK
+from designer.layers import CHUNK, SEARCH
+from designer.reached import Reached
+from designer.recipe import Recipe
 from designer.study import Stores
 from designer.study_hash import study_hash
+from designer.tuning import MOST_TRIES, Tuned
 from designer.verdict import BLOCK, Answer, StudyPlan
 
 if TYPE_CHECKING:
     from designer.options import Options
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
+TUNED, REACHED = "tuned.parquet", "reached.parquet"
 ALL_IN_NGSPICE = "ngspice of every board"
 
 
@@ -29,6 +34,8 @@ def layers_of(options: Options) -> list[str]:
         names.add("ngspice")
     if options.rung == "ngspice":
         names.add(ALL_IN_NGSPICE)
+    names |= {"tuned"} if options.tuned else set()
+    names |= {"reached"} if options.reached else set()
     return sorted(names)
 
 
@@ -43,15 +50,14 @@ def merged(folder: Folder, inputs: Mapping[str, Any], options: Options) -> Optio
     rung = options.rung
     if "ngspice" in names:
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
-    return replace(options, rung=rung)
+    return replace(options, rung=rung, tuned="tuned" in names, reached="reached" in names)
 
 
 def study_files(options: Options) -> list[str]:
     """What the stage writes; a name that ends in "/" is a folder of blocks."""
-    folders = [f"{SAMPLES}/"]
-    if "ngspice" in layers_of(options):
-        folders.append(f"{NGSPICE}/")
-    return [TOLERANCE, *REPORTS, *folders]
+    names = layers_of(options)
+    folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "reached": REACHED}
+    return [TOLERANCE, *REPORTS, *(f"{place}/" for name, place in folders.items() if name in names)]
 
 
 class FolderStores(Stores):
@@ -66,6 +72,14 @@ class FolderStores(Stores):
 
     def ngspice(self, plan: StudyPlan) -> BlockStore[Hearing]:
         return self._store(plan, NGSPICE, Hearing, "ngspice", CHUNK)
+
+    def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned]:
+        more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
+        return self._store(plan, TUNED, Tuned, "tuned", SEARCH, more)
+
+    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached]:
+        more = {"recipes": [r.as_dict() for r in recipes]}
+        return self._store(plan, REACHED, Reached, "reached", SEARCH, more)
 
     @property
     def names(self) -> Iterable[str]:

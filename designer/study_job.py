@@ -155,6 +155,8 @@ def _studied(
         samples=options.samples,
         until=options.until,
         rung=options.rung,
+        tuned=options.tuned,
+        reached=options.reached,
         seed=options.seed,
         jobs=help_.jobs,
         pool=help_.pool,
