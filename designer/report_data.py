@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from designer.bom import bill
 from designer.design import Design
 from designer.modelfile import ModelFile
 from designer.pipeline import Checked
+from designer.report_layers import Layers
 from designer.verdict import Answer, StudyPlan, Verdict, Yield
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ class ReportData:
     plan None where there was none. yields : one for each response (None where it was left out) or
     one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
     command : the command line that makes these results again. equations : the equation check.
+    layers : what the study has beside its answers.
     """
 
     modelfile: ModelFile
@@ -39,6 +41,7 @@ class ReportData:
     provenance: Mapping[str, Any]
     command: str
     equations: EquationCheck | None = None
+    layers: Layers = field(default_factory=Layers)
 
     @classmethod
     def of(cls, result: RunResult, command: str) -> ReportData:
