@@ -26,6 +26,7 @@ from typing import Annotated, Literal, NoReturn
 
 from pydantic import BaseModel, Field
 
+from designer.bands import Bands
 from designer.circuitspec import CircuitSpec, CircuitTable
 from designer.errors import InputError
 from designer.model import Dimensionless, Mechanical, Sides
@@ -131,6 +132,7 @@ class ModelFile:
     circuit: CircuitSpec
     text: str = field(repr=False)
     source: Path | None = None
+    tuning: Bands = field(default_factory=Bands)
 
     @property
     def sha256(self) -> str:
@@ -196,7 +198,8 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
             f"a voltage within the supply of {circuit.supply:g} V",
         )
     title = tables.title or (source.stem if source is not None else "untitled")
-    return ModelFile(title, model, mechanical, responses, circuit, text, source)
+    tuning = Bands(**dict(tables.tuning))
+    return ModelFile(title, model, mechanical, responses, circuit, text, source, tuning)
 
 
 def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
@@ -317,6 +320,10 @@ def _clearance() -> Accepts:
     return Accepts(expected, check)
 
 
+def _band() -> Accepts:
+    return number("", "a number in [0, 1)", lambda value: 0.0 <= value < 1.0)
+
+
 # The tables of a file, key by key.
 
 
@@ -357,6 +364,13 @@ class _ResponseTable(BaseModel):
     b: Annotated[float | tuple[float, float] | None, _clearance()] = None
 
 
+class _TuningTable(BaseModel):
+    model_config = STRICT
+    frequency: Annotated[float, _band()] = Bands.frequency
+    amplitude: Annotated[float, _band()] = Bands.amplitude
+    offset: Annotated[float, number("", "a number >= 0", lambda value: value >= 0.0)] = Bands.offset
+
+
 class _File(BaseModel):
     model_config = STRICT
     format: Annotated[int, exactly(1, "1, the format that this version reads")]
@@ -367,3 +381,4 @@ class _File(BaseModel):
         (), strict=False, description="one table [[response]] for each response"
     )
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
+    tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")

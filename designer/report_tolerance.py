@@ -15,7 +15,7 @@ from designer.blame import Blame, ResponseBlame, Subject
 from designer.report_data import ReportData
 from designer.report_layers import Benched, Both, Judged
 from designer.report_tables import Table
-from designer.verdict import Verdict, Yield
+from designer.verdict import Verdict, Yield, all_on_one, count
 
 PARTS_SHOWN = 4
 DIFFERENCES_SHOWN = 20
@@ -93,41 +93,20 @@ def _whole(data: ReportData) -> dict[str, str]:
     if data.all_on_one_board is None:
         return {}
     out = {"as built": _share(data.all_on_one_board)}
-    number = len(data.checked)
+
+    def whole(rows: Iterable[Judged]) -> str:
+        return _share(all_on_one(((r.sample, r.verdict) for r in rows), len(data.checked)))
+
     if data.layers.tuned is not None:
-        out["tuned"] = _share(on_one_board(data.layers.tuned, number))
-        bench = on_one_board([_Bench(r) for r in data.layers.tuned], number)
-        out["tuned on the bench"] = _share(bench)
+        out["tuned"] = whole(data.layers.tuned)
+        out["tuned on the bench"] = whole(_Bench(r) for r in data.layers.tuned)
     if data.layers.reached is not None:
-        out["reached"] = _share(on_one_board(data.layers.reached, number))
+        out["reached"] = whole(data.layers.reached)
     return out
 
 
-def on_one_board(rows: Iterable[Judged], questions: int) -> Yield:
-    """Boards that show every response, of those asked about each."""
-    boards: dict[int, list[Verdict]] = {}
-    for row in rows:
-        boards.setdefault(row.sample, []).append(row.verdict)
-    order = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
-    tally = dict.fromkeys(Verdict, 0)
-    for met in boards.values():
-        if len(met) == questions:
-            tally[next(v for v in order if v in met)] += 1
-    return _yield(tally)
-
-
 def _count(rows: Iterable[Judged], question: int | None) -> Yield | None:
-    if question is None:
-        return None
-    tally = dict.fromkeys(Verdict, 0)
-    for row in rows:
-        if row.question == question:
-            tally[row.verdict] += 1
-    return _yield(tally)
-
-
-def _yield(tally: dict[Verdict, int]) -> Yield:
-    return Yield(*(tally[v] for v in (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED)))
+    return None if question is None else count(r for r in rows if r.question == question)
 
 
 def _share(counted: Yield | None) -> str:

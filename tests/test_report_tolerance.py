@@ -18,7 +18,7 @@ from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
 from designer.report_data import ReportData
 from designer.report_layers import Layers
-from designer.report_tolerance import facts, on_one_board
+from designer.report_tolerance import facts
 from designer.verdict import Verdict
 from designer.yield_maps import Axis, YieldMap
 from tests.test_report import Page
@@ -158,14 +158,6 @@ def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
     assert second[4:] == ("–", "–")
     assert whole[0] == "all on one board"
     assert whole[2].startswith("75 %")
-
-
-def test_all_on_one_board_takes_the_worst_of_a_board_that_was_asked_everything() -> None:
-    ok, lost, failed = Verdict.OK, Verdict.LOST, Verdict.FAILED
-    rows = [Row(0, 0, ok), Row(0, 1, ok), Row(1, 0, ok), Row(1, 1, lost), Row(2, 0, ok)]
-    rows += [Row(3, 0, failed), Row(3, 1, ok), Row(4, 0, failed), Row(4, 1, lost)]
-    counted = on_one_board(rows, 2)
-    assert (counted.ok, counted.lost, counted.grazing, counted.failed) == (1, 2, 0, 1)
 
 
 def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
