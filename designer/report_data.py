@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
 from designer.pipeline import Checked
+from designer.report_layers import Layers
 from designer.verdict import Answer, StudyPlan, Yield
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class ReportData:
     plan None where there was none. yields : one for each response (None where it was left out) or
     one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
     command : the command line that makes these results again. equations : the equation check.
-    heard : what ngspice said about boards of the study.
+    heard : what ngspice said about boards of the study. layers : what else the study has.
     """
 
     modelfile: ModelFile
@@ -42,6 +43,7 @@ class ReportData:
     command: str
     equations: EquationCheck | None = None
     heard: tuple[Hearing, ...] = ()
+    layers: Layers = field(default_factory=Layers)
 
     @classmethod
     def of(cls, result: RunResult, command: str) -> ReportData:
@@ -59,6 +61,14 @@ class ReportData:
             command=command,
             equations=result.equations,
             heard=result.study.heard,
+            layers=Layers(
+                tuned=result.study.tuned,
+                reached=result.study.reached,
+                combined=result.study.combined,
+                recipes=result.study.recipes or (),
+                blame=result.study.blame,
+                maps=result.study.maps,
+            ),
         )
 
     @cached_property

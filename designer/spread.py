@@ -1,30 +1,65 @@
-"""How boards differ: the reference spread ``bench-1`` of docs/definitions.md.
+"""How boards differ: what varies by how much, and the boards of uniform numbers.
 
-Resistors and capacitors uniform over ± grade; op-amp offset normal, cut at its limit, each section
-its own; saturation uniform ± 5 %, each rail of each section its own; references uniform over ±
-their grade. Diodes are exact: their drop stands inside a loop. Every sample is drawn from (seed,
-sample index) alone, so a study is the same on one worker or many.
+The reference spread ``bench-1`` of docs/definitions.md is what a ``Spread`` is by default; the
+table ``[spread]`` of a model file says more (docs/spread.md). Diodes are exact: their drop stands
+inside a loop. The boards of a study are those of (seed, sample index) alone
+(``designer.samples``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from scipy.stats import truncnorm
 
+from designer import samples
 from designer.boards import Boards
 from designer.catalog import OpAmp
-from designer.circuit import Board, Circuit
+from designer.circuit import Board, Capacitor, Circuit, Reference, Resistor
+from designer.laws import Law, Normal, Uniform
+from designer.system import Array
 
 NAME = "bench-1"
 SATURATION_SPREAD = 0.05
+ROOM = 25.0
+"""°C at which parts have the values they are sold for."""
+
+EVEN = Uniform(-1.0, 1.0)
+"""Anywhere within the grade."""
+
+Passive = Resistor | Capacitor
+TEMPERATURE = "temperature"
+_WHAT = ("offset", "low", "high", "bias", "gbw", "tempco", "ageing")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Parts that vary together, of one network or one reel.
+
+    share : in [0, 1], of a part's deviation that it has in common with the others; the rest is its
+    own. So the total stays within the grade, and two parts correlate by s²/(s² + (1 − s)²).
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    share: float
 
 
 @dataclass(frozen=True)
 class Spread:
-    """resistor, capacitor : grades as fractions. offset_sigma, offset_limit [V]. saturation :
-    half-width as a fraction. reference : half-width over the grade of each reference."""
+    """What varies from board to board, and by how much.
+
+    resistor, capacitor : grades as fractions; their shapes : of a deviation over the grade.
+    offset_sigma, offset_limit [V]. saturation : half-width as a fraction. reference : half-width
+    over the grade of each reference. bias [A], gain_bandwidth [Hz] : of each section; None: the
+    circuit's, which is the typical figure. supply : half-width as a fraction, each rail its own.
+    laws : relative deviation of parts with a grade of their own. temperature : range [°C] of the
+    board. tempco [1/K], ageing (relative) : by part; tempco counts where there is a temperature.
+    groups : parts that track.
+    """
 
     resistor: float
     capacitor: float
@@ -32,52 +67,222 @@ class Spread:
     offset_limit: float
     saturation: float = SATURATION_SPREAD
     reference: float = 1.0
+    resistor_shape: Law = EVEN
+    capacitor_shape: Law = EVEN
+    bias: Law | None = None
+    gain_bandwidth: Law | None = None
+    supply: float = 0.0
+    laws: Mapping[str, Law] = field(default_factory=dict)
+    temperature: tuple[float, float] | None = None
+    tempco: Mapping[str, Law] = field(default_factory=dict)
+    ageing: Mapping[str, Law] = field(default_factory=dict)
+    groups: tuple[Group, ...] = ()
 
     @classmethod
     def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:
         """The reference spread for these grades and this op-amp."""
         return cls(resistor_grade, capacitor_grade, opamp.offset_sigma, opamp.offset_limit)
 
-    def as_dict(self) -> dict[str, float | str]:
-        return {"name": NAME, **self.__dict__}
+    @property
+    def name(self) -> str:
+        """``bench-1`` where nothing is added to it."""
+        plain = Spread(self.resistor, self.capacitor, self.offset_sigma, self.offset_limit)
+        return NAME if self == plain else "model file"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything that decides the boards, as JSON holds it."""
+        return {"name": self.name} | {
+            f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)
+        }
+
+    def with_grades(self, resistor: float | None = None, capacitor: float | None = None) -> Spread:
+        """The same spread with parts of another grade; those with a grade of their own keep it."""
+        return replace(
+            self,
+            resistor=self.resistor if resistor is None else resistor,
+            capacitor=self.capacitor if capacitor is None else capacitor,
+        )
+
+    def coordinates(self, circuit: Circuit) -> tuple[str, ...]:
+        """Names of what is drawn for a board of this circuit, in the order of a cube's columns.
+
+        A part's own deviation has the part's name; an op-amp section has ``U1A.offset``,
+        ``U1A.low``, ``U1A.high`` and, where they are spread, ``U1A.bias`` and ``U1A.gbw``; then
+        ``R1.tempco``, ``R1.ageing``, ``VCC``, ``VEE``, ``temperature``, and a group's common
+        ``network:1`` or ``reel:R:10k``, with ``.tempco`` and ``.ageing`` as a part has them.
+        """
+        parts = _varying(circuit)
+        names = [p.name for p in parts]
+        names += [f"{s.name}.{what}" for s in circuit.sections for what in self._of_a_section]
+        if self.supply > 0.0:
+            names += [rail.name for rail in circuit.rails]
+        if self.temperature is not None:
+            names.append(TEMPERATURE)
+        for suffix, laws in self._slow:
+            names += [p.name + suffix for p in parts if p.name in laws]
+        for group in self.groups:
+            names.append(group.name)
+            names += [group.name + suffix for suffix, _ in self._slow]
+        return tuple(names)
+
+    def from_cube(self, circuit: Circuit, cube: Array) -> Boards:
+        """N boards of a cube (N, K) of uniform numbers in [0, 1), columns as ``coordinates``.
+
+        Every quantity of a board, the lower output limits by their magnitude, is non-decreasing in
+        its own numbers; below room temperature a part's value falls with its temperature
+        coefficient's.
+        """
+        names = self.coordinates(circuit)
+        if cube.ndim != 2 or cube.shape[1] != len(names):
+            raise ValueError(f"a cube of {cube.shape}; this circuit has {len(names)} coordinates")
+        return _Draw(self, circuit, dict(zip(names, cube.T, strict=True)), len(cube)).boards()
+
+    @property
+    def _of_a_section(self) -> tuple[str, ...]:
+        more = [("bias", self.bias), ("gbw", self.gain_bandwidth)]
+        return ("offset", "low", "high", *(name for name, law in more if law is not None))
+
+    @property
+    def _slow(self) -> tuple[tuple[str, Mapping[str, Law]], ...]:
+        """What a part does after it was measured, as a suffix of its name; by part."""
+        found = [(".ageing", self.ageing)] if self.ageing else []
+        if self.temperature is not None:
+            found.insert(0, (".tempco", self.tempco))
+        return tuple(found)
+
+    def law_of(self, part: Passive | Reference) -> Law:
+        """Of a part's relative deviation over its grade; the grade is ``grade_of``'s."""
+        if isinstance(part, Reference):
+            return EVEN
+        return self.resistor_shape if isinstance(part, Resistor) else self.capacitor_shape
+
+    def grade_of(self, part: Passive | Reference) -> float:
+        """The grade that the part has by its kind."""
+        if isinstance(part, Reference):
+            return self.reference * part.grade
+        return self.resistor if isinstance(part, Resistor) else self.capacitor
 
 
 def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
     """Board number ``index`` of the study with this seed."""
-    rng = np.random.default_rng([seed, index])
-    values = {
-        r.name: r.value * (1.0 + spread.resistor * rng.uniform(-1.0, 1.0))
-        for r in circuit.resistors
-    }
-    values |= {
-        c.name: c.value * (1.0 + spread.capacitor * rng.uniform(-1.0, 1.0))
-        for c in circuit.capacitors
-    }
-    names = [s.name for s in circuit.sections]
-    offsets = np.zeros(len(names))
-    if spread.offset_sigma > 0.0:
-        cut = spread.offset_limit / spread.offset_sigma
-        offsets = spread.offset_sigma * truncnorm.ppf(rng.uniform(size=len(names)), -cut, cut)
-    limits = circuit.saturation * (
-        1.0 + spread.saturation * rng.uniform(-1.0, 1.0, size=(len(names), 2))
-    )
-    limits = np.minimum(limits, circuit.supply)  # no output passes its rail
-    # Drawn last, so that circuits without references keep the boards they had.
-    references = {
-        r.name: r.volts * (1.0 + spread.reference * r.grade * rng.uniform(-1.0, 1.0))
-        for r in circuit.references
-    }
-    return Board(
-        values=values,
-        offset=dict(zip(names, (float(v) for v in offsets), strict=True)),
-        rails={n: (-float(low), float(high)) for n, (low, high) in zip(names, limits, strict=True)},
-        inverse_gain=1.0 / circuit.gain,
-        bias=dict.fromkeys(names, circuit.bias),
-        reference=references,
-        drop={d.name: d.model.drop for d in circuit.diodes},
-    )
+    return draw_many(circuit, spread, seed, range(index, index + 1)).board(0)
 
 
 def draw_many(circuit: Circuit, spread: Spread, seed: int, indices: range) -> Boards:
     """The boards of these numbers of the study with this seed."""
-    return Boards.of(circuit, [draw(circuit, spread, seed, index) for index in indices])
+    names = spread.coordinates(circuit)
+    return spread.from_cube(circuit, samples.cube(seed, names, indices))
+
+
+def part_of(coordinate: str) -> str:
+    """The part, section, rail or group that a coordinate belongs to: ``U1A.offset`` is U1A's."""
+    head, _, what = coordinate.rpartition(".")
+    return head if what in _WHAT else coordinate
+
+
+class _Draw:
+    """The boards of one cube. u : (N,) uniform numbers by coordinate."""
+
+    def __init__(
+        self, spread: Spread, circuit: Circuit, u: Mapping[str, Array], count: int
+    ) -> None:
+        self.spread, self.circuit, self.u, self.count = spread, circuit, u, count
+        self.group = {name: group for group in spread.groups for name in group.parts}
+
+    def boards(self) -> Boards:
+        c, spread, u = self.circuit, self.spread, self.u
+        sections = [s.name for s in c.sections]
+        offset = Normal(spread.offset_sigma, spread.offset_limit)
+        supply = self.supply()
+        low, high = self.limits(supply)
+        bias = gain_bandwidth = None
+        if spread.bias is not None:
+            bias = {s: spread.bias.ppf(u[f"{s}.bias"]) for s in sections}
+        if spread.gain_bandwidth is not None:
+            gain_bandwidth = {s: spread.gain_bandwidth.ppf(u[f"{s}.gbw"]) for s in sections}
+        return Boards(
+            circuit=c,
+            values={p.name: p.value * self.factor(p) for p in _passives(c)},
+            offset={s: offset.ppf(u[f"{s}.offset"]) for s in sections},
+            low=low,
+            high=high,
+            bias={s: self.same(c.bias) for s in sections} if bias is None else bias,
+            reference={r.name: r.volts * self.factor(r) for r in c.references},
+            drop={d.name: self.same(d.model.drop) for d in c.diodes},
+            supply=supply,
+            gain_bandwidth={} if gain_bandwidth is None else gain_bandwidth,
+            inverse_gain=self.same(1.0 / c.gain),
+        )
+
+    def same(self, value: float) -> Array:
+        return np.full(self.count, value)
+
+    def factor(self, part: Passive | Reference) -> Array:
+        """A part's value over the one it is sold for."""
+        spread, name = self.spread, part.name
+        own = spread.laws.get(name)
+        if own is None:
+            grade = spread.grade_of(part)
+            factor = 1.0 + grade * self.shared(name, "", spread.law_of(part))
+        else:
+            factor = 1.0 + self.shared(name, "", own)
+        if name in spread.ageing:
+            factor = factor * (1.0 + self.shared(name, ".ageing", spread.ageing[name]))
+        if spread.temperature is not None and name in spread.tempco:
+            warmer = Uniform(*spread.temperature).ppf(self.u[TEMPERATURE]) - ROOM
+            tempco = self.shared(name, ".tempco", spread.tempco[name])
+            factor = factor * (1.0 + tempco * warmer)
+        return factor
+
+    def shared(self, name: str, what: str, law: Law) -> Array:
+        """A part's own draw; in a group mixed with the common one."""
+        own = law.ppf(self.u[name + what])
+        group = self.group.get(name)
+        if group is None:
+            return own
+        common = law.ppf(self.u[group.name + what])
+        return group.share * common + (1.0 - group.share) * own
+
+    def supply(self) -> dict[str, Array]:
+        """By rail; empty where the supply is exact."""
+        width = self.spread.supply
+        if width == 0.0:
+            return {}
+        law = Uniform(-width, width)
+        return {r.name: r.volts * (1.0 + law.ppf(self.u[r.name])) for r in self.circuit.rails}
+
+    def limits(self, supply: Mapping[str, Array]) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lowest and highest output of each section: its distance to the rail stays when the rail
+        moves, and no output passes its rail."""
+        c = self.circuit
+        width = self.spread.saturation
+        law = Uniform(-width, width)
+        exact = self.same(c.supply)
+        above, below = supply.get("VCC", exact), -supply.get("VEE", -exact)  # of ground
+
+        def limit(number: str, rail: Array) -> Array:
+            wanted = c.saturation * (1.0 + law.ppf(self.u[number]))
+            return np.minimum(wanted + (rail - c.supply), rail)
+
+        low = {s.name: -limit(f"{s.name}.low", below) for s in c.sections}
+        high = {s.name: limit(f"{s.name}.high", above) for s in c.sections}
+        return low, high
+
+
+def _passives(circuit: Circuit) -> tuple[Passive, ...]:
+    return (*circuit.resistors, *circuit.capacitors)
+
+
+def _varying(circuit: Circuit) -> tuple[Passive | Reference, ...]:
+    """The parts that have a deviation of their own."""
+    return (*_passives(circuit), *circuit.references)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in sorted(value.items())}
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, Group):
+        return dataclasses.asdict(value)
+    return value.as_dict() if hasattr(value, "as_dict") else value

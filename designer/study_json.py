@@ -18,6 +18,7 @@ from designer.reached import Reached
 from designer.study import Study
 from designer.tuning import Tuned
 from designer.verdict import Answer, Verdict, Yield, count
+from designer.yield_maps import YieldMap
 
 MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")
 ORDER = (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED)
@@ -43,6 +44,7 @@ def study_json(
         },
         "equation_check": None if equations is None else equations.as_dict(),
         "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
+        "maps": [_map(found) for found in study.maps],
         "provenance": provenance,
         "cost": dict(cost),
     }
@@ -71,6 +73,7 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "combined": _combined(study.combined[index]),
         "tuned": _tuned(study.tuned_of(index)),
         "reached": _reached(study, index),
+        "blame": _blame(study, index),
     }
     if counted is None:
         row["left_out"] = study.left_out[index]
@@ -121,6 +124,18 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
         "clipped_at_start": sum(r.clipped for r in rows),
         "recipe": study.recipes[study.asked.index(index)].as_dict(),
     }
+
+
+def _blame(study: Study, index: int) -> dict[str, Any] | None:
+    if study.blame is None or index not in study.asked:
+        return None
+    found: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
+    return found
+
+
+def _map(found: YieldMap) -> dict[str, Any]:
+    """Without what it cost, which stands with the other costs."""
+    return {key: value for key, value in found.as_dict().items() if key != "cost"}
 
 
 def _counted(counted: Yield) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.stats import kstest, truncnorm
 
 from designer.catalog import load_catalog
 from designer.circuit import Board
-from designer.spread import Spread, draw
+from designer.spread import Spread, draw, draw_many
 from tests.test_reduction import EXACT, circuit_of
 
 CIRCUIT = circuit_of(EXACT)
@@ -22,7 +23,8 @@ N = 4000
 
 @cache
 def boards() -> tuple[Board, ...]:
-    return tuple(draw(CIRCUIT, SPREAD, 17, i) for i in range(N))
+    many = draw_many(CIRCUIT, SPREAD, 17, range(N))
+    return tuple(many.board(i) for i in range(N))
 
 
 def test_bench_1_is_the_definition() -> None:
@@ -78,8 +80,8 @@ def test_everything_is_independent() -> None:
 
 
 def test_neighbouring_samples_and_seeds_are_unrelated() -> None:
-    one = np.array([draw(CIRCUIT, SPREAD, 1, i).values["R1"] for i in range(1000)])
-    two = np.array([draw(CIRCUIT, SPREAD, 2, i).values["R1"] for i in range(1000)])
+    one = draw_many(CIRCUIT, SPREAD, 1, range(1000)).values["R1"]
+    two = draw_many(CIRCUIT, SPREAD, 2, range(1000)).values["R1"]
     assert abs(np.corrcoef(one, two)[0, 1]) < 0.15
     assert abs(np.corrcoef(one[:-1], one[1:])[0, 1]) < 0.15
     # (1, 2) is not (2, 1), nor (12,).
@@ -122,22 +124,20 @@ def test_the_leftover_stiffness_has_the_spread_that_theory_says() -> None:
     assert np.std(left) == pytest.approx(scale * math.sqrt(variance), rel=0.05)
 
 
-def test_boards_of_a_design_are_those_that_they_always_were() -> None:
-    """Figures drawn before circuits had references: later kinds of part are drawn last."""
-    board = draw(CIRCUIT, SPREAD, 17, 3)
-    assert board.values["R1"] == 99822.06260192711
-    assert board.values["R210"] == 99793.84738799756
-    assert board.values["C4"] == 9.79792707351779e-08
-    assert board.offset["U3D"] == -0.001715270381739697
-    assert board.rails["U3D"] == (-12.447047818900929, 12.384324654675924)
-    assert board.reference == {}
+def test_the_number_of_a_part_is_that_of_its_name_alone() -> None:
+    """PCG64 from NumPy, seeded with (seed, CRC-32 of the name), read one number after the other."""
+    drawn = draw_many(CIRCUIT, SPREAD, 17, range(5)).values["R50"]
+    stream = np.random.Generator(np.random.PCG64(np.random.SeedSequence([17, crc32(b"R50")])))
+    deviation = [2.0 * stream.random() - 1.0 for _ in range(5)]
+    assert drawn / EXACT["R50"] == pytest.approx([1.0 + 0.01 * d for d in deviation], rel=1e-15)
 
 
 def test_references_are_uniform_over_their_grade() -> None:
     from tests.stages import rectifier, stage
 
     circuit = stage("rectifier", "both", rectifier())
-    drawn = [draw(circuit, SPREAD, 17, i) for i in range(1500)]
+    many = draw_many(circuit, SPREAD, 17, range(1500))
+    drawn = [many.board(i) for i in range(1500)]
     for reference in circuit.references:
         assert (reference.volts, reference.grade) == (5.0, 0.005)
         off = np.array([b.reference[reference.name] / 5.0 - 1.0 for b in drawn]) / 0.005
