@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from designer import __version__
-from designer.errors import EnvironmentMissing, InputError
+from designer.errors import EnvironmentMissing
 from designer.layers import Step, Task
 from designer.study_hash import RULES
 
@@ -31,14 +31,11 @@ class Cluster:
 
     Raises
     ------
-    InputError : the address is none of tcp:// or tls://.
     EnvironmentMissing : ``distributed`` is not installed, nobody answers at the address, there is
         no worker, or workers have another version of this tool.
     """
 
     def __init__(self, address: str) -> None:
-        if not address.startswith(("tcp://", "tls://")):
-            raise InputError(None, "--cluster", address, "the address of a scheduler, tcp://…")
         self._client = _connected(address)
         try:
             self._check(address)
@@ -85,7 +82,7 @@ class Cluster:
         from distributed import as_completed
 
         make: Any = as_completed
-        return make()
+        return make(loop=self._client.loop)
 
     def _feed(
         self, source: Iterator[tuple[int, Task]], index: dict[Any, int], done: Any, limit: int

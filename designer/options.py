@@ -42,6 +42,8 @@ class Options:
             raise InputError(None, "--samples", self.samples, f"at most {MOST_SAMPLES}")
         if self.until is not None and not 0.0 < self.until <= 1.0:
             raise InputError(None, "--until", self.until, "a width above 0, at most 1")
+        if self.cluster is not None and not self.cluster.startswith(("tcp://", "tls://")):
+            raise InputError(None, "--cluster", self.cluster, "a scheduler's address, tcp://…")
         at_least("--seed", self.seed, 0)
         if self.jobs is not None:
             at_least("--jobs", self.jobs, 1)
