@@ -1,158 +1,166 @@
-"""Samples on disk: one Parquet file for each finished block of a study.
+"""Rows of a study on disk: folders of Parquet files, one for each finished block of samples.
 
-Block edges follow from the sample index alone, and every file says which study it belongs to, so
-that an interrupted study goes on where it stopped and a longer one takes over what is there. A
-file appears whole or not at all.
+A row is a flat frozen dataclass with a field ``sample``. Block edges follow from the sample index
+alone, and every file says which study it belongs to, so that an interrupted study goes on where
+it stopped and a longer one takes over what is there. A file appears whole or not at all.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, fields
+from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, get_type_hints
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from designer import __version__, confirmation
 from designer.errors import InputError
-from designer.verdict import BLOCK, Answer, StudyPlan, Verdict
+from designer.verdict import BLOCK
 
-FORMAT = 1
-FOLDER = "samples.parquet"
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    class Sampled(DataclassInstance, Protocol):
+        """A row of one sample."""
+
+        @property
+        def sample(self) -> int: ...
+
+    Row = TypeVar("Row", bound=Sampled)
+else:
+    Row = TypeVar("Row")
+
+FORMAT = 2
 _KEY = b"designer"
-_SCHEMA = pa.schema(
-    [
-        ("sample", pa.int64()),
-        ("question", pa.int64()),
-        ("omega", pa.float64()),
-        ("verdict", pa.string()),
-        ("response", pa.string()),
-        ("reason", pa.string()),
-        ("radius", pa.float64()),
-        ("penetration", pa.float64()),
-        ("miss", pa.float64()),
-        ("asymmetry", pa.float64()),
-        ("periods", pa.int64()),
-        ("waveform", pa.float64()),
-        ("ngspice", pa.string()),
-        ("ngspice_reason", pa.string()),
-        ("ngspice_remedies", pa.string()),
-        ("ngspice_nominal", pa.string()),
-        ("ngspice_nominal_reason", pa.string()),
-        ("ngspice_nominal_remedies", pa.string()),
-        ("ngspice_nominal_periods", pa.int64()),
-    ]
-)
+_TYPES: dict[type, pa.DataType] = {
+    bool: pa.bool_(),
+    int: pa.int64(),
+    float: pa.float64(),
+    str: pa.string(),
+}
 
 
-def block_name(block: range) -> str:
-    """File name of the block, inside the design folder."""
-    return f"{FOLDER}/block-{block.start // BLOCK:06d}.parquet"
+class BlockStore(Generic[Row]):
+    """The rows of one layer of a study.
 
+    Parameters
+    ----------
+    root : the design folder. folder : the layer's, in it, such as ``samples.parquet``.
+    row : the dataclass; its fields are str, int, float, bool or StrEnum.
+    study : hash of everything that decides a row.
+    omegas : of the questions; where rows have a ``question``, readers get a column ``omega``.
+    size : samples of a block.
+    guard : called before each write; raises where the folder is no longer the study's.
+    """
 
-def block_names(samples: int) -> list[str]:
-    """File names of a study of so many samples."""
-    return [
-        block_name(range(first, min(first + BLOCK, samples))) for first in range(0, samples, BLOCK)
-    ]
+    def __init__(
+        self,
+        root: Path,
+        folder: str,
+        row: type[Row],
+        study: str,
+        *,
+        omegas: Sequence[float | None] = (),
+        size: int = BLOCK,
+        guard: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.names: set[str] = set()
+        """Files of this study that were read or written, relative to the design folder."""
+        self.size = size
+        self._root, self._folder, self._row, self._study = root, folder, row, study
+        self._omegas, self._guard = omegas, guard
+        self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
+        self._schema = self._schema_of()
+        self._found: dict[str, list[Row]] = {}
 
+    def name(self, block: range) -> str:
+        """File of a block, relative to the design folder."""
+        return f"{self._folder}/block-{block.start // self.size:06d}.parquet"
 
-def study_hash(plan: StudyPlan) -> str:
-    """Hash of everything that decides an answer; not of how many there are."""
-    circuit = plan.circuit
-    said = {
-        "version": __version__,
-        "parts": [[type(p).__name__, asdict(p)] for p in circuit.parts],
-        "opamp": [circuit.opamp, circuit.gain, circuit.bias, circuit.supply, circuit.saturation],
-        "spread": plan.spread.as_dict(),
-        "seed": plan.seed,
-        "ngspice": [
-            confirmation.OWN_SAMPLES,
-            confirmation.OWN_REFINEMENTS,
-            confirmation.NOMINAL_SAMPLES,
-            confirmation.NOMINAL_REFINEMENTS,
-            confirmation.SLOW,
-            confirmation.MOST_PERIODS,
-        ],
-        "questions": [
-            {
-                "spec": asdict(q.spec),
-                "excitation": asdict(q.excitation),
-                "start": [float(v) for v in q.start.start],
-                "nominal": q.start.response,
-                "settings": None if q.settings is None else q.settings.as_dict(),
-            }
-            for q in plan.questions
-        ],
-    }
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode("ascii")).hexdigest()
-
-
-@dataclass(frozen=True)
-class BlockStore:
-    """The blocks of one study in a design folder; root is the design folder."""
-
-    root: Path
-    plan: StudyPlan
-    study: str
-
-    @classmethod
-    def of(cls, root: Path, plan: StudyPlan) -> BlockStore:
-        """The store of this plan's study."""
-        return cls(root, plan, study_hash(plan))
-
-    def read(self, block: range) -> list[Answer] | None:
-        """The answers of a finished block of this very study; None where there is none."""
-        path = self.root / block_name(block)
-        if not path.is_file():
-            return None
+    def read(self, block: range) -> list[Row]:
+        """What is known of the block's samples in this very study; nothing where a file is of
+        another study, damaged or not there."""
+        name = self.name(block)
         try:
-            table = pq.read_table(path, schema=_SCHEMA, partitioning=None)
-            said = json.loads((pq.read_schema(path).metadata or {}).get(_KEY, b"{}"))
-            rows: list[dict[str, Any]] = table.to_pylist()
-        except (OSError, ValueError, pa.ArrowException):
-            return None
-        if said != self._said(block) or len(rows) != len(block) * len(self.plan.questions):
-            return None
-        for row in rows:
-            del row["omega"]
-            row["verdict"] = Verdict(row["verdict"])
-        return [Answer(**row) for row in rows]
+            held = pq.read_schema(self._root / name).metadata or {}
+            said = json.loads(held.get(_KEY, b"{}"))
+            if {k: said.get(k) for k in ("format", "study")} != self._said():
+                return []
+            table = pq.read_table(self._root / name, schema=self._schema, partitioning=None)
+            rows = [self._row_of(found) for found in table.to_pylist()]
+        except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
+            return []
+        if len(rows) != said.get("rows"):
+            return []
+        self._found[name] = rows
+        return [row for row in rows if row.sample in block]
 
-    def write(self, block: range, answers: Sequence[Answer]) -> None:
-        """Put a finished block where it belongs, all at once."""
-        path = self.root / block_name(block)
-        rows = [
-            {
-                **asdict(a),
-                "verdict": str(a.verdict),
-                "omega": self.plan.questions[a.question].spec.omega,
-            }
-            for a in answers
-        ]
-        schema = _SCHEMA.with_metadata({_KEY: json.dumps(self._said(block), sort_keys=True)})
+    def put(self, block: range, rows: Sequence[Row]) -> None:
+        """Keep a block's rows, all at once; a file that holds just these is left alone.
+
+        Raises
+        ------
+        InputError : the place cannot be written, the disk is full, or ``guard`` says so.
+        """
+        name = self.name(block)
+        self.names.add(name)
+        if self._found.get(name) == list(rows):
+            return
+        self._guard()
+        said = {**self._said(), "first": block.start, "rows": len(rows)}
+        schema = self._schema.with_metadata({_KEY: json.dumps(said, sort_keys=True)})
+        table = pa.Table.from_pylist([self._columns(row) for row in rows], schema=schema)
+        path = self._root / name
         partial = path.with_name(f".{path.name}.part")
         try:
             path.parent.mkdir(exist_ok=True)
-            pq.write_table(pa.Table.from_pylist(rows, schema=schema), partial)
+            pq.write_table(table, partial)
             os.replace(partial, path)
         except OSError as error:
-            expected = "a place that can be written"
-            raise InputError(path, "--out", error.strerror or str(error), expected) from None
+            raise InputError(
+                path,
+                "the block of samples",
+                os.strerror(error.errno) if error.errno else str(error),
+                "a place that can be written; finished blocks are kept: --resume goes on",
+            ) from None
         finally:
             with contextlib.suppress(OSError):
                 partial.unlink(missing_ok=True)
+        self._found[name] = list(rows)
 
-    def _said(self, block: range) -> dict[str, Any]:
-        return {
-            "format": FORMAT,
-            "study": self.study,
-            "first": block.start,
-            "stop": block.stop,
-        }
+    def forget(self) -> None:
+        """Let go of the rows that are kept for comparison: memory stays flat."""
+        self._found.clear()
+
+    def _said(self) -> dict[str, Any]:
+        return {"format": FORMAT, "study": self._study}
+
+    def _schema_of(self) -> pa.Schema:
+        columns = []
+        for name, kind in self._hints.items():
+            plain = str if issubclass(kind, StrEnum) else kind
+            columns.append((name, _TYPES[plain]))
+            if name == "question" and self._omegas:
+                columns.append(("omega", pa.float64()))
+        return pa.schema(columns)
+
+    def _columns(self, row: Row) -> dict[str, Any]:
+        values = asdict(row)
+        for name, value in values.items():
+            if isinstance(value, StrEnum):
+                values[name] = str(value)
+        if self._omegas:
+            values["omega"] = self._omegas[values["question"]]
+        return values
+
+    def _row_of(self, values: dict[str, Any]) -> Row:
+        known = {name: values[name] for name in self._hints}
+        for name, kind in self._hints.items():
+            if issubclass(kind, StrEnum):
+                known[name] = kind(known[name])
+        return self._row(**known)

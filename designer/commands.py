@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,18 @@ from designer.progress import Progress, progress_for
 if TYPE_CHECKING:
     from designer.job import Outcome
 
+STUDY_KEYS = (
+    "format",
+    "samples",
+    "until",
+    "narrow",
+    "all_on_one_board",
+    "equation_check",
+    "responses",
+    "maps",
+    "provenance",
+)
+"""Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance reproduce catalog new".split()
 )
@@ -49,6 +62,23 @@ class RungName(StrEnum):
     IDEAL = "ideal"
     DYNAMIC = "dynamic"
     FULL = "full"
+
+
+class MapOver(StrEnum):
+    """What a yield is mapped over."""
+
+    OMEGA = "omega"
+    B = "b"
+    GRADE = "grade"
+    OMEGA_GRADE = "omega-grade"
+
+
+class StudyRung(StrEnum):
+    """Which engines a tolerance study asks."""
+
+    EXACT = "exact"
+    AUTO = "auto"
+    NGSPICE = "ngspice"
 
 
 Source = Annotated[
@@ -112,13 +142,14 @@ def run(
 ) -> int:
     """Everything: parts, circuit, check in ngspice, yield, report."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
-        from designer import job
+        from designer import job, study_job
+        from designer.options import Options
 
-        options = job.Options(seed, jobs, samples, overwrite, resume)
+        options = Options(seed, jobs, samples, overwrite, resume)
         options.check()
         modelfile, folder = job.source(model, out)
-        command = options.command("run", model, out)
-        outcome = job.run_into(modelfile, folder, options, progress, command)
+        command = partial(Options.command, verb="run", model=model, out=out)
+        outcome = study_job.run_into(modelfile, folder, options, progress, command)
     return _answer(outcome, json, quiet, "run")
 
 
@@ -161,6 +192,28 @@ def tolerance(
     model: Source,
     out: Out = None,
     samples: Samples = 200,
+    until: Annotated[
+        float | None,
+        typer.Option("--until", metavar="WIDTH", help="Add boards until intervals are narrower."),
+    ] = None,
+    rung: Annotated[
+        StudyRung,
+        typer.Option("--rung", help="exact: no ngspice; ngspice: every board in ngspice too."),
+    ] = StudyRung.AUTO,
+    tuned: Annotated[
+        bool, typer.Option("--tuned", help="Also with the generator free within its bands.")
+    ] = False,
+    reached: Annotated[
+        bool, typer.Option("--reached", help="Also from power-up, by the start recipe.")
+    ] = False,
+    map_: Annotated[
+        list[MapOver] | None,
+        typer.Option("--map", help="Also the yield over this setting; may be repeated."),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", metavar="tcp://…", help="A Dask scheduler that shares the work."),
+    ] = None,
     seed: Seed = 1,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
@@ -172,13 +225,26 @@ def tolerance(
 ) -> int:
     """How many boards will work; writes into the design folder (a model file needs --out)."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
-        from designer import job
+        from designer import job, study_job
+        from designer.options import Options
 
-        options = job.Options(seed, jobs, samples, overwrite, resume)
+        options = Options(
+            seed,
+            jobs,
+            samples,
+            overwrite,
+            resume,
+            until=until,
+            rung=rung.value,
+            tuned=tuned,
+            reached=reached,
+            maps=tuple(dict.fromkeys(over.value for over in map_ or ())),
+            cluster=cluster,
+        )
         options.check()
         modelfile, folder = job.source(model, out)
-        command = options.command("tolerance", model, out)
-        outcome = job.run_into(modelfile, folder, options, progress, command)
+        command = partial(Options.command, verb="tolerance", model=model, out=out)
+        outcome = study_job.run_into(modelfile, folder, options, progress, command)
     return _answer(outcome, json, quiet, "tolerance")
 
 
@@ -351,8 +417,7 @@ def _compiling(progress: Progress) -> Iterator[None]:
 def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
     answer = outcome.answer
     if verb == "tolerance":
-        keys = ("format", "samples", "equation_check", "responses", "provenance")
-        answer = {**{k: answer[k] for k in keys}, "cost": answer["cost"]["study"]}
+        answer = {**{k: answer[k] for k in STUDY_KEYS}, "cost": answer["cost"]["study"]}
     if json:
         _print_json(answer)
     elif not quiet:

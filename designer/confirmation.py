@@ -3,7 +3,7 @@
 Two starts. On the sample's own orbit of the exact circuit rung ngspice only has to stay there. From
 the nominal design's orbit it has to find its way, as the exact rung did: at least 5/(1 - ρ) drive
 periods (times n for a period of n), and no fewer than the exact trajectory from that very start
-takes to come within `REMAINDER` of its attractor.
+takes to come within `REMAINDER` of its attractor. `designer.hearing` says who is asked.
 """
 
 from __future__ import annotations
@@ -14,43 +14,41 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from designer import gate, remedies
+from designer import exact, gate, remedies
 from designer.deck import SolverSettings
 from designer.flow import Flow, FlowStatus
 from designer.gate import Subject
+from designer.hearing import UNDECIDED, Ask, Hearing, Kind
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.system import Array
+from designer.verdict import StudyPlan
 from designer.waveform_orbit import Read
 from designer.workers import SpicePool
 
-OWN_SAMPLES = 40
-"""How many samples of each response ngspice repeats from their own orbit (all, where fewer)."""
-NOMINAL_SAMPLES = 50
-"""How many it starts from the nominal orbit. Boards are independent draws from (seed, index), so
-the first fifty are a random subset, and the same one however many samples follow."""
-SLOW = 0.9
-"""Every sample with a larger multiplier starts from the nominal orbit too, whatever its index."""
 UNKNOWN_PERIODS = 20
 """Drive periods for a sample without a period: 64 more follow, in which none must be found."""
 REMAINDER = 5e-4
 """Of the peak: a quarter of the strobe tolerance."""
-MOST_PERIODS = 400
+MOST_PERIODS = 4000
 """Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
-out by name: the run would take minutes."""
+out by name."""
+STRETCH = 40
+"""Drive periods after which the exact trajectory is looked at again, and for which it must have
+stayed with the attractor before it counts as arrived."""
 OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
 """How often the step is halved where ngspice disagrees, until two step sizes say the same."""
-UNDECIDED = "undecided"
-"""What is heard where the last two step sizes still say different things."""
 
 
 @dataclass(frozen=True)
 class Query:
-    """One run of ngspice. expected : the exact circuit's response."""
+    """One run of ngspice. expected : the exact circuit's response. refinements : how often the
+    step is halved at most."""
 
     subject: Subject
     settings: SolverSettings
     expected: str
+    refinements: int = OWN_REFINEMENTS
 
 
 @dataclass(frozen=True)
@@ -61,57 +59,141 @@ class Heard:
     response: str
     reason: str = ""
     remedies: str = ""
+    symmetric: bool = False
 
 
-def starts_from_nominal(sample: int, orbit: Orbit) -> bool:
-    """Whether a sample belongs to those that ngspice starts from the nominal orbit."""
-    return sample < NOMINAL_SAMPLES or orbit.radius > SLOW
+def hear(
+    plan: StudyPlan,
+    asks: Sequence[Ask],
+    pool: SpicePool,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Hearing]:
+    """ngspice's answers, in the order of ``asks``; ``progress`` is called once for each.
+
+    The exact rung is asked again for the boards in question: where to start and how long to run
+    is its to say.
+    """
+    subjects = _subjects(plan, asks, jobs)
+    queries: dict[int, Query] = {}
+    heard: dict[int, Hearing] = {}
+    for k, ask in enumerate(asks):
+        subject, question = subjects.get((ask.sample, ask.question)), plan.questions[ask.question]
+        if subject is None or question.settings is None:
+            continue
+        refinements = OWN_REFINEMENTS
+        if ask.kind is Kind.NOMINAL:
+            way = periods_to_settle(_flow(subject), question.start.start, subject.orbit)
+            if way > MOST_PERIODS:
+                heard[k] = _too_long(ask, way)
+                progress()
+                continue
+            subject = replace(subject, start=question.start.start, discard=int(way))
+            refinements = NOMINAL_REFINEMENTS
+        expected = subject.orbit.response
+        queries[k] = Query(subject, question.settings, expected, refinements)
+    answers = confirm(pool, list(queries.values()), progress)
+    for (k, query), said in zip(queries.items(), answers, strict=True):
+        heard[k] = Hearing(
+            asks[k].sample,
+            asks[k].question,
+            asks[k].kind,
+            asks[k].why,
+            said.response,
+            said.reason,
+            said.remedies,
+            query.subject.discard,
+            said.symmetric,
+        )
+    return [heard[k] for k in sorted(heard)]
 
 
-def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | None:
-    """Drive periods from ``start`` (states,) to the attractor ``orbit``; None if too many.
+def _subjects(
+    plan: StudyPlan, asks: Sequence[Ask], jobs: int
+) -> dict[tuple[int, int], Subject | None]:
+    """What ngspice needs of each board, by (sample, question)."""
+    numbers = sorted({a.question for a in asks})
+    fewer = replace(plan, questions=tuple(plan.questions[n] for n in numbers))
+    found: dict[tuple[int, int], Subject | None] = {}
+    for run in _runs(sorted({a.sample for a in asks})):
+        for answer, subject in exact.block(fewer, run, jobs):
+            found[answer.sample, numbers[answer.question]] = subject
+    return found
+
+
+def _runs(samples: Sequence[int]) -> list[range]:
+    """Sorted sample indices as runs without gaps."""
+    runs: list[range] = []
+    for i in samples:
+        if runs and runs[-1].stop == i:
+            runs[-1] = range(runs[-1].start, i + 1)
+        else:
+            runs.append(range(i, i + 1))
+    return runs
+
+
+def _too_long(ask: Ask, way: float) -> Hearing:
+    needed = f"{way:.0f} drive periods" if math.isfinite(way) else "more than can be said"
+    reason = f"too long a way from the nominal orbit: {needed}, at most {MOST_PERIODS} are run"
+    return Hearing(ask.sample, ask.question, ask.kind, ask.why, "", reason, "", 0, False)
+
+
+def _flow(subject: Subject) -> Flow:
+    return Flow(subject.system, exact.drive_of(subject.excitation))
+
+
+def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
+    """Drive periods from ``start`` (states,) to the attractor ``orbit``.
 
     At least n · 5/(1 - ρ), rounded up, and until every later strobe of the exact trajectory is
-    within `REMAINDER` of a strobe of the orbit.
+    within `REMAINDER` of a strobe of the orbit; "later" ends when the trajectory has stayed there
+    for that least number again, or for `STRETCH`. More than `MOST_PERIODS`, possibly inf, where the
+    way is longer than that.
     """
     if orbit.n == 0:
         return UNKNOWN_PERIODS
     if not orbit.radius < 1.0:
-        return None
+        return math.inf
     least = math.ceil(orbit.n * 5.0 / (1.0 - orbit.radius))
     if least > MOST_PERIODS:
-        return None
-    way = flow.run(start, MOST_PERIODS)
+        return least
     laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
-    if way.status is not FlowStatus.DONE:
-        return None
     peak = np.abs(orbit.extremes).max(axis=1)
-    gap = (np.abs(way.strobes[:, None] - laps) / peak).max(axis=2).min(axis=1)
-    far = np.flatnonzero(gap > REMAINDER)
-    arrived = int(far[-1]) + 1 if len(far) else 0
-    if arrived > MOST_PERIODS:
-        return None
+    x, mode, done, arrived = start, None, 0, 0
+    stay = max(STRETCH, least)
+    while done - arrived < stay:
+        if arrived > MOST_PERIODS:
+            return math.inf
+        way = flow.run(x, stay - (done - arrived), mode=mode)
+        if way.status is not FlowStatus.DONE:
+            return math.inf
+        gap = (np.abs(way.strobes[:, None] - laps) / peak).max(axis=2).min(axis=1)
+        far = np.flatnonzero(gap > REMAINDER)
+        arrived = done + int(far[-1]) + 1 if len(far) else arrived
+        done += len(way.strobes) - 1
+        x, mode = way.strobes[-1], way.mode
     return max(least, arrived)
 
 
 def confirm(
     pool: SpicePool,
     queries: Sequence[Query],
-    refinements: int,
     progress: Callable[[], None] = lambda: None,
 ) -> list[Heard]:
     """ngspice's answers, in order.
 
     A first answer that is the expected one stands: its settings have passed the gate at two step
-    sizes. Where it is another the step is halved, at most ``refinements`` times, until two step
-    sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A failed
-    run is no answer: it is neither the same as another nor different. ``progress`` is called once
-    a query.
+    sizes. Where it is another the step is halved, at most as often as the query says, until two
+    step sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A
+    failed run is no answer: it is neither the same as another nor different. ``progress`` is
+    called once a query.
     """
     heard: list[Heard | None] = [None] * len(queries)
     answered: list[str | None] = [None] * len(queries)
-    asked = [(k, q.settings) for k, q in enumerate(queries)]
-    for level in range(refinements + 1):
+    # The longest first: the workers then end together.
+    order = sorted(range(len(queries)), key=lambda k: -_steps(queries[k]))
+    asked = [(k, queries[k].settings) for k in order]
+    for level in range(max((q.refinements for q in queries), default=-1) + 1):
         tasks = [gate.task(queries[k].subject, settings) for k, settings in asked]
         again = []
         for i, outcome in remedies.run(pool, tasks):
@@ -119,14 +201,19 @@ def confirm(
             before, said = answered[k], _heard(outcome)
             failed = said.response == OrbitStatus.FAILED
             settled = not failed and said.response == (before or queries[k].expected)
-            if settled or level == refinements:
+            if settled or level == queries[k].refinements:
                 heard[k] = said if settled or failed else _undecided(before, said)
                 progress()
             else:
                 again.append((k, replace(settings, max_step=settings.max_step / 2.0)))
             answered[k] = before if failed else said.response
-        asked = sorted(again, key=lambda item: item[0])
+        asked = sorted(again, key=lambda item: (-_steps(queries[item[0]]), item[0]))
     return [h for h in heard if h is not None]
+
+
+def _steps(query: Query) -> float:
+    """Steps of a run, which its time goes with."""
+    return gate.length(query.subject) * query.subject.period / query.settings.max_step
 
 
 def _undecided(before: str | None, said: Heard) -> Heard:
@@ -140,4 +227,4 @@ def _heard(outcome: remedies.Outcome[Read]) -> Heard:
     if isinstance(outcome.result, SimulationFailed):
         return Heard(str(OrbitStatus.FAILED), outcome.result.reason, tried)
     orbit = outcome.result.orbit
-    return Heard(orbit.response, orbit.reason, tried)
+    return Heard(orbit.response, orbit.reason, tried, bool(orbit.symmetric))

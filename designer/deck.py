@@ -67,11 +67,13 @@ def write(
     stop_time: float,
     initial: Array | None = None,
     rung: Rung = "ideal",
+    kept_from: float = 0.0,
 ) -> str:
     """The deck as text, ending in a newline.
 
     initial : (states,) capacitor voltages at t = 0; discharged where None. rung : the op-amps'
-    model; those with a memory start at the output voltages that belong to ``initial``.
+    model; those with a memory start at the output voltages that belong to ``initial``. kept_from :
+    time [s] before which ngspice keeps no point; what it computes is the same.
 
     Raises
     ------
@@ -97,7 +99,8 @@ def write(
         f".options method={settings.method} reltol={_n(settings.reltol)} "
         f"abstol={_n(settings.abstol)} vntol={_n(settings.vntol)} noopiter",
         ".save " + " ".join(f"v({net})" for net in nets),
-        f".tran {_n(settings.max_step)} {_n(stop_time)} 0 {_n(settings.max_step)} uic",
+        f".tran {_n(settings.max_step)} {_n(stop_time)} "
+        f"{_n(kept_from) if kept_from else 0} {_n(settings.max_step)} uic",
         ".end",
     ]
     return "\n".join(lines) + "\n"

@@ -22,11 +22,11 @@ from designer.jsonout import dumps, synthesis_json
 from designer.measured import MEASURED
 from designer.modelfile import ModelFile, Response
 from designer.pipeline import Checked, nominal_reduction
-from designer.preconditions import naming
+from designer.preconditions import cores, naming
 from designer.provenance import provenance
 from designer.responses import find, on_circuit, peaks
 from designer.selection import SOLVER
-from designer.setup_table import scales_csv, setup_csv
+from designer.setup_table import scales_csv, setup_csv, start_recipes
 
 DECK_PERIODS = 20
 """Drive periods that ``circuit.cir`` runs for."""
@@ -39,7 +39,7 @@ def texts(made: Synthesis) -> dict[str, str]:
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(made),
         "bom.csv": bill_csv(bill(design.circuit, modelfile.circuit, made.catalog)),
-        "setup.csv": setup_csv(design, made.found),
+        "setup.csv": setup_csv(design, made.found, start_recipes(made, cores())),
         "scales.csv": scales_csv(modelfile, design, made.found),
     }
 

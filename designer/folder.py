@@ -2,88 +2,36 @@
 
 ``manifest.json`` lists every file that the tool wrote, with its hash, and the stages (``design``,
 ``study``, ``comparison``) with the hash of their inputs. A stage with the same inputs is not done
-again; one with others only with ``--overwrite``, which touches listed files and no others. A
-stage's files are listed before the first of them is written, so that interrupted work can be told
-from foreign files.
+again; one with others only with ``--overwrite``, which touches listed files and no others. Where
+only a list among the inputs has grown (``layers`` of a study) the stage is extended. A stage's
+files are listed before the first of them is written, so that interrupted work can be told from
+foreign files; a name that ends in "/" stands for a folder of blocks until the stage is finished.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 from designer.errors import InputError
 from designer.jsonout import dumps
-from designer.provenance import sha256
+from designer.manifest import MANIFEST as MANIFEST
+from designer.manifest import OF_DESIGN, Manifest, Stage, State, grown, read_manifest
+from designer.manifest import StageName as StageName
+from designer.manifest import file_hash as file_hash
+from designer.manifest import read_json as read_json
 
-FORMAT = 1
-MANIFEST = "manifest.json"
 MODEL = "model.toml"
 DESIGN = "design.json"
 TOLERANCE = "tolerance.json"
 REPORTS = ("report.html", "report.md")
 COMPARISON, COMPARISON_PICTURES = "compare.json", ("compare.svg", "compare.png")
+BLOCKS = "block-*.parquet"
+"""Files of a folder of blocks; others in it are not ours."""
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "bom.csv", "setup.csv", "scales.csv")
-
-StageName = Literal["design", "study", "comparison", "sweep", "map", "basins"]
-STAGES: tuple[StageName, ...] = ("design", "study", "comparison", "sweep", "map", "basins")
-OF_DESIGN: tuple[StageName, ...] = ("study", "comparison")
-"""Stages that depend on the design, and on it alone."""
-State = Literal["new", "same", "unfinished", "other"]
-_MAX_MANIFEST = 20_000_000
-
-
-@dataclass
-class Stage:
-    """inputs : what decides the stage's files; equal inputs give equal files."""
-
-    inputs: dict[str, Any]
-    complete: bool = False
-
-    @property
-    def hash(self) -> str:
-        return sha256(json.dumps(self.inputs, sort_keys=True).encode("ascii"))
-
-
-@dataclass
-class Manifest:
-    """stages by name; files: name → (stage, hash or None while unfinished)."""
-
-    stages: dict[str, Stage] = field(default_factory=dict)
-    files: dict[str, tuple[str, str | None]] = field(default_factory=dict)
-    provenance: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def complete(self) -> bool:
-        return bool(self.stages) and all(s.complete for s in self.stages.values())
-
-    def as_dict(self) -> dict[str, Any]:
-        files = {
-            name: {
-                "stage": stage,
-                "format": 1,
-                "sha256": digest,
-                **({"sha256_without": "cost"} if name.endswith(".json") else {}),
-            }
-            for name, (stage, digest) in sorted(self.files.items())
-        }
-        stages = {
-            name: {"inputs": s.inputs, "inputs_sha256": s.hash, "complete": s.complete}
-            for name, s in sorted(self.stages.items())
-        }
-        return {
-            "format": FORMAT,
-            "tool": "designer",
-            "complete": self.complete,
-            "stages": stages,
-            "files": files,
-            "provenance": self.provenance,
-        }
 
 
 class Folder:
@@ -96,7 +44,7 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.manifest = _read_manifest(path)
+        self.manifest = read_manifest(path)
         if self.manifest is None:
             _check_free(path)
 
@@ -108,9 +56,11 @@ class Folder:
         known = None if self.manifest is None else self.manifest.stages.get(stage)
         if known is None:
             return "new"
-        if known.hash != Stage(dict(inputs)).hash:
+        if known.hash == Stage(dict(inputs)).hash:
+            return "same" if known.complete else "unfinished"
+        if not grown(known.inputs, inputs):
             return "other"
-        return "same" if known.complete else "unfinished"
+        return "more" if known.complete else "unfinished"
 
     def decide(
         self,
@@ -151,9 +101,11 @@ class Folder:
         listed = {} if self.manifest is None else self.manifest.files
         for stage in todo:
             for name in wanted[stage][1]:
-                if name not in listed and (self / name).exists():
+                for found in [] if name in listed else self._there(name):
+                    if found in listed:
+                        continue
                     raise InputError(
-                        self / name,
+                        self / found,
                         "the file",
                         "a file that manifest.json does not list",
                         "no file of this name: --overwrite replaces listed files only",
@@ -198,7 +150,11 @@ class Folder:
             manifest.stages[stage] = Stage(inputs)
             manifest.files |= dict.fromkeys(names, (stage, None))
         for name in manifest.files:  # what a killed process left behind
-            _partial(self / name).unlink(missing_ok=True)
+            if name.endswith("/"):
+                for left in (self / name).glob(f".{BLOCKS}.part"):
+                    left.unlink(missing_ok=True)
+            else:
+                _partial(self / name).unlink(missing_ok=True)
         manifest.provenance = provenance
         self.manifest = manifest
         self._save()
@@ -226,12 +182,21 @@ class Folder:
         self.write(name, content)
         self._save()
 
-    def finish(self, stage: StageName) -> None:
-        """Mark a stage as complete and remove listed files that nothing writes any more."""
+    def finish(self, stage: StageName, blocks: Iterable[str] = ()) -> None:
+        """Mark a stage as complete and remove listed files that nothing writes any more.
+
+        blocks : files in its folders of blocks that belong to it.
+        """
         manifest = self.manifest
         assert manifest is not None
+        folders = [
+            name
+            for name, (owner, _) in manifest.files.items()
+            if name.endswith("/") and owner in (stage, "replaced")
+        ]
+        manifest.files |= dict.fromkeys(blocks, (stage, None))
         for name, (owner, _) in list(manifest.files.items()):
-            if owner != stage:
+            if owner != stage or name in folders:
                 continue
             if (self / name).exists():
                 manifest.files[name] = (owner, file_hash(name, (self / name).read_bytes()))
@@ -239,13 +204,70 @@ class Folder:
                 del manifest.files[name]
         manifest.stages[stage].complete = True
         gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
-        for name in gone:
-            (self / name).unlink(missing_ok=True)
+        for name in folders:
             del manifest.files[name]
+            gone += [n for n in self._there(name) if n not in manifest.files]
+        for name in gone:
+            if not name.endswith("/"):
+                (self / name).unlink(missing_ok=True)
+            manifest.files.pop(name, None)
             with contextlib.suppress(OSError):  # a folder that is empty now
                 if "/" in name:
                     (self / name).parent.rmdir()
         self._save()
+
+    def watch(self) -> Callable[[], None]:
+        """A check that the folder is still the one that work began in: to be called before each
+        write of long work.
+
+        It raises InputError where the folder is gone, or somebody has changed its manifest, its
+        model or its design.
+        """
+        assert self.manifest is not None
+        ours = {name: stage.hash for name, stage in self.manifest.stages.items()}
+        digests = {name: self.manifest.files[name][1] for name in (MODEL, DESIGN)}
+        seen: list[object] = []
+
+        def look() -> None:
+            try:
+                now = [
+                    (s.st_mtime_ns, s.st_size, s.st_ino)
+                    for s in ((self / name).stat() for name in (MANIFEST, MODEL, DESIGN))
+                ]
+                if now == seen:
+                    return
+                for name, digest in digests.items():
+                    if file_hash(name, (self / name).read_bytes()) != digest:
+                        raise self._changed_under_work(name)
+                manifest = read_manifest(self.path)
+            except OSError as error:
+                raise InputError(
+                    self.path,
+                    "the folder",
+                    error.strerror or str(error),
+                    "the design folder that this work began in: was it moved or deleted?",
+                ) from None
+            if manifest is None or {n: s.hash for n, s in manifest.stages.items()} != ours:
+                raise self._changed_under_work(MANIFEST)
+            seen[:] = now
+
+        return look
+
+    def _changed_under_work(self, name: str) -> InputError:
+        return InputError(
+            self / name,
+            "the file",
+            "another than when this work began",
+            "a folder that nobody changes meanwhile; finished blocks of the earlier design are "
+            "not used for the new one",
+        )
+
+    def _there(self, name: str) -> Iterator[str]:
+        """Files of this name, or the blocks in a folder of this name."""
+        if name.endswith("/"):
+            yield from (f"{name}{p.name}" for p in sorted((self / name).glob(BLOCKS)))
+        elif (self / name).exists():
+            yield name
 
     def json(self, name: str) -> dict[str, Any]:
         """The object in one of the folder's JSON files."""
@@ -281,71 +303,9 @@ def _partial(path: Path) -> Path:
     return path.with_name(f".{path.name}.part")
 
 
-def file_hash(name: str, content: bytes) -> str:
-    """Hash of a file as the manifest states it: a JSON file's without its object ``cost``."""
-    if name.endswith(".json"):
-        try:
-            value = json.loads(content)
-            value.pop("cost", None)
-            content = json.dumps(value, sort_keys=True).encode("ascii")
-        except (ValueError, AttributeError):
-            pass
-    return sha256(content)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """The object in a JSON file of a folder; InputError where there is none."""
-    try:
-        value = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(path, "the file", error.strerror or str(error), "JSON") from None
-    except ValueError as error:
-        raise InputError(path, "the file", str(error), "JSON") from None
-    if not isinstance(value, dict):
-        raise InputError(path, "the file", type(value).__name__, "a JSON object")
-    if value.get("format") != FORMAT:
-        raise InputError(path, "format", value.get("format"), f"{FORMAT}")
-    return value
-
-
 def is_design_folder(path: Path) -> bool:
     """Whether there is a folder with a manifest."""
     return (path / MANIFEST).is_file()
-
-
-def _read_manifest(path: Path) -> Manifest | None:
-    file = path / MANIFEST
-    if not file.is_file():
-        return None
-    if file.stat().st_size > _MAX_MANIFEST:
-        raise InputError(file, "the file", "too large a file", "a manifest")
-    value = read_json(file)
-    try:
-        if value["tool"] != "designer":
-            raise ValueError
-        stages: dict[str, Stage] = {
-            name: Stage(dict(value["stages"][name]["inputs"]), value["stages"][name]["complete"])
-            for name in STAGES
-            if name in value["stages"]
-        }
-        files = {
-            _inside(path, name): (str(said["stage"]), said["sha256"])
-            for name, said in value["files"].items()
-        }
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise InputError(file, "the file", "something else", "a manifest of this tool") from None
-    return Manifest(stages, files, value.get("provenance", {}))
-
-
-def _inside(root: Path, name: str) -> str:
-    """The name of a listed file, if it lies inside the folder: a manifest is untrusted input."""
-    pure = PurePosixPath(name)
-    if pure.is_absolute() or ".." in pure.parts or not pure.parts or name == MANIFEST:
-        raise InputError(root / MANIFEST, "files", name, "names of files inside the folder")
-    place = (root / pure).parent.resolve()
-    if not place.is_relative_to(root.resolve()):
-        raise InputError(root / MANIFEST, "files", name, "names of files inside the folder")
-    return str(pure)
 
 
 def _check_free(path: Path) -> None:

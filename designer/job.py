@@ -5,8 +5,6 @@ Nothing here prints; ``designer.commands`` does.
 
 from __future__ import annotations
 
-import os
-import shlex
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,12 +16,10 @@ from designer import (
     api,
     compare_files,
     design_files,
-    equation_check,
     simulate_plots,
     simulation,
 )
 from designer.api import RunResult, Synthesis
-from designer.blocks import BlockStore, block_names
 from designer.catalog import Catalog, load_catalog
 from designer.design_files import load
 from designer.errors import InputError
@@ -32,64 +28,22 @@ from designer.folder import (
     DESIGN,
     DESIGN_FILES,
     MODEL,
-    REPORTS,
-    TOLERANCE,
     Folder,
     StageName,
     is_design_folder,
 )
 from designer.jsonout import (
-    dumps,
     plain,
-    run_json,
     simulate_json,
-    study_json,
     synthesis_json,
 )
 from designer.measured import MEASURED
 from designer.modelfile import ModelFile, read_model_file
 from designer.opamp_model import Rung
-from designer.pipeline import Checked
-from designer.preconditions import at_least, cores, naming, need_responses, require_ngspice
+from designer.options import Options as Options
+from designer.preconditions import naming
 from designer.progress import Progress
 from designer.provenance import provenance
-from designer.selection import SOLVER
-from designer.spread import Spread
-from designer.study import SAMPLES, SEED, check, tolerance
-from designer.workers import SpicePool
-
-MOST_SAMPLES = 1_000_000
-
-
-@dataclass(frozen=True)
-class Options:
-    """What the command line says about any verb that writes."""
-
-    seed: int = SEED
-    jobs: int | None = None
-    samples: int = SAMPLES
-    overwrite: bool = False
-    resume: bool = False
-
-    def check(self) -> None:
-        """InputError for a number that cannot be."""
-        at_least("--samples", self.samples, 1)
-        if self.samples > MOST_SAMPLES:
-            raise InputError(None, "--samples", self.samples, f"at most {MOST_SAMPLES}")
-        at_least("--seed", self.seed, 0)
-        if self.jobs is not None:
-            at_least("--jobs", self.jobs, 1)
-
-    def command(self, verb: str, model: Path, out: Path | None) -> str:
-        """The command line that makes the same results again.
-
-        Files by their last names, so that no path of this machine stands in it; without options
-        that change no result.
-        """
-        said = ["designer", verb, _base(model)]
-        said += [] if out is None else ["--out", _base(out)]
-        said += ["--samples", str(self.samples), "--seed", str(self.seed)]
-        return shlex.join(said)
 
 
 @dataclass(frozen=True)
@@ -133,7 +87,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
         )
     folder = Folder(path)
     modelfile = model_file(path / MODEL)
-    if _made_from(folder).get("model") != modelfile.sha256:
+    if made_from(folder).get("model") != modelfile.sha256:
         raise InputError(
             path / MODEL,
             "its sha256",
@@ -151,7 +105,7 @@ def synthesise_into(
     options.check()
     catalog = load_catalog()
     folder = Folder(out)
-    wanted = _wanted(modelfile, catalog, options, study=False)
+    wanted = design_inputs(modelfile, catalog)
     if compare:
         wanted["comparison"] = (wanted["design"][0], list(compare_files.NAMES))
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
@@ -187,94 +141,6 @@ def compare_in_memory(modelfile: ModelFile, options: Options, progress: Progress
     design = plain(synthesis_json(modelfile, made.design, made.found, said, made.seconds))
     answer = compare_files.beside(design, plain(compared.file))
     return Outcome(answer, _all_found(answer), None, False)
-
-
-def run_into(
-    modelfile: ModelFile, out: Path, options: Options, progress: Progress, command: str
-) -> Outcome:
-    """The verbs ``run`` and ``tolerance``: design, check, study, report.
-
-    command : the command line as the report states it (``Options.command``).
-
-    Raises
-    ------
-    EnvironmentMissing : there is work to do and no ngspice.
-    """
-    options.check()
-    need_responses(modelfile)
-    catalog = load_catalog()
-    folder = Folder(out)
-    wanted = _wanted(modelfile, catalog, options, study=True)
-    made_from = _made_from(folder)
-    if (
-        folder.state("design", wanted["design"][0]) == "other"
-        and made_from.get("model") == modelfile.sha256
-        and made_from.get("measured") == wanted["design"][0].get("measured")
-        and modelfile.source == out / MODEL
-    ):
-        # A folder that came from elsewhere: its parts stand, whatever can be bought here.
-        progress.note("the catalogue or the tool is not the one this design was made with")
-        wanted["design"] = (made_from, wanted["design"][1])
-    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
-    if not todo:
-        answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
-        return Outcome(answer, _satisfied(answer), out, True)
-    jobs = cores() if options.jobs is None else options.jobs
-    began = time.perf_counter()
-    with SpicePool(jobs) as pool:
-        progress.stage("ngspice")
-        require_ngspice(pool)
-        progress.stage("responses of the model, parts")
-        if "design" in todo:
-            made = api.synthesise(modelfile, catalog)
-            with naming(modelfile):
-                files = design_files.texts(made)
-            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
-            design_files.write(folder, made, files)
-            folder.finish("design")
-        else:
-            made = load(folder, modelfile, catalog)
-            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
-        ready = time.perf_counter()
-        progress.stage("ngspice, equation check")
-        equations = equation_check.check(made.design, made.found, pool)
-        if not equations.passed:
-            progress.note(f"the netlist does not compute the model's equation: {equations.worst}")
-        checked = check(made, pool, progress)
-        if checked[0].gate is not None and checked[0].gate.passed:
-            folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
-        gated = time.perf_counter()
-        study = tolerance(
-            made,
-            samples=options.samples,
-            seed=options.seed,
-            jobs=jobs,
-            pool=pool,
-            checked=checked,
-            store=lambda plan: BlockStore.of(folder.path, plan),
-            progress=progress,
-        )
-    cost = {
-        "design_seconds": ready - began,
-        "check_seconds": gated - ready,
-        "study_seconds": time.perf_counter() - gated,
-        "jobs": float(jobs),
-    }
-    said = _study_provenance(made, checked, options)
-    result = RunResult(
-        made.modelfile, catalog, made.found, made.design, checked, study, said, cost, equations
-    )
-    folder.write(TOLERANCE, dumps(study_json(study, said, cost, equations)))
-    progress.stage("report")
-    from designer.report import write_report  # matplotlib is not needed before this
-    from designer.report_data import ReportData
-
-    write_report(ReportData.of(result, command), folder / REPORTS[0], folder / REPORTS[1])
-    assert folder.manifest is not None
-    folder.manifest.provenance = said
-    folder.finish("study")
-    answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
-    return Outcome(answer, _satisfied(answer), out, False, result)
 
 
 def simulate_answer(
@@ -328,21 +194,14 @@ def read_design(path: Path, catalog: Catalog | None = None) -> Synthesis:
     return load(Folder(path), modelfile, load_catalog() if catalog is None else catalog)
 
 
-def _base(path: Path) -> str:
-    """The last name of a path, never an option; ``.`` and ``..`` by the names they stand for."""
-    name = os.path.basename(os.path.abspath(path)) or "."
-    name = name.encode("utf-8", "replace").decode("utf-8")  # a name that is no text
-    return f"./{name}" if name.startswith("-") else name
-
-
-def _made_from(folder: Folder) -> dict[str, Any]:
+def made_from(folder: Folder) -> dict[str, Any]:
     """Inputs of the folder's design; empty where there is none."""
     made = folder.manifest.stages.get("design") if folder.manifest else None
     return {} if made is None else made.inputs
 
 
-def _wanted(
-    modelfile: ModelFile, catalog: Catalog, options: Options, *, study: bool
+def design_inputs(
+    modelfile: ModelFile, catalog: Catalog
 ) -> dict[StageName, tuple[dict[str, Any], list[str]]]:
     inputs = {
         "model": modelfile.sha256,
@@ -353,36 +212,8 @@ def _wanted(
     if modelfile.measured is not None:
         inputs["measured"] = modelfile.measured.sha256
         files.append(MEASURED)
-    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {"design": (inputs, files)}
-    if study:
-        more = {"seed": options.seed, "samples": options.samples}
-        names = [TOLERANCE, *REPORTS, *block_names(options.samples)]
-        wanted["study"] = ({**inputs, **more}, names)
-    return wanted
-
-
-def _study_provenance(
-    made: Synthesis, checked: tuple[Checked, ...], options: Options
-) -> dict[str, Any]:
-    spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
-    return provenance(
-        made.modelfile,
-        made.catalog.hash,
-        seed=options.seed,
-        settings={
-            "highs": SOLVER,
-            "ngspice": [
-                {"omega": c.model.omega, **c.gate.as_dict()} for c in checked if c.gate is not None
-            ],
-        },
-        spread=spread.as_dict(),
-    )
+    return {"design": (inputs, files)}
 
 
 def _all_found(answer: Mapping[str, Any]) -> bool:
     return all(knob["found"] for knob in answer["knobs"])
-
-
-def _satisfied(answer: Mapping[str, Any]) -> bool:
-    right = answer["equation_check"] is None or answer["equation_check"]["passed"]
-    return right and all(r["found"] and r["engines_agree"] for r in answer["responses"])

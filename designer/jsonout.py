@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,16 +14,14 @@ import numpy as np
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.design import Design
-    from designer.equation_check import EquationCheck
     from designer.modelfile import ModelFile
     from designer.orbit import Orbit
-    from designer.pipeline import Checked
     from designer.responses import ModelResponse
     from designer.simulation import Simulated
-    from designer.study import Study
-    from designer.verdict import Answer
 
 FORMAT = 1
+STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "maps")
+"""What ``run`` prints of a study beside its responses."""
 
 
 def dumps(value: object, *, indent: int | None = 2) -> str:
@@ -103,23 +100,6 @@ def synthesis_json(
     }
 
 
-def study_json(
-    study: Study,
-    provenance: Mapping[str, Any],
-    cost: Mapping[str, float],
-    equations: EquationCheck | None = None,
-) -> dict[str, Any]:
-    """What ``tolerance`` prints and ``tolerance.json`` holds."""
-    return {
-        "format": FORMAT,
-        "samples": study.plan.samples,
-        "equation_check": None if equations is None else equations.as_dict(),
-        "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
-        "provenance": provenance,
-        "cost": dict(cost),
-    }
-
-
 def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
     """The object ``cost`` of a file; empty where somebody took it out: its hash leaves it out."""
     cost = file.get("cost")
@@ -131,7 +111,7 @@ def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, A
     cost = {"design": cost_of(design), "study": cost_of(study)}
     return {
         **design,
-        "samples": study["samples"],
+        **{key: study[key] for key in STUDY_KEYS if key in study},
         "equation_check": study.get("equation_check"),
         "responses": study["responses"],
         "provenance": study["provenance"],
@@ -201,82 +181,6 @@ def orbit_json(orbit: Orbit) -> dict[str, Any]:
 def _twin_json(twin: Orbit | None) -> dict[str, Any] | None:
     """A mirror twin: what it is called and where it starts; the rest follows by the mirror."""
     return None if twin is None else {"response": twin.response, "start": twin.start}
-
-
-def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
-    model, ngspice = checked.model, checked.ngspice
-    answers = study.answers_to(index)
-    counted = study.yields[index]
-    row: dict[str, Any] = {
-        "omega": model.omega,
-        "expected": model.expected,
-        "found": model.found,
-        "model": model.orbit.response,
-        "circuit": checked.circuit.response,
-        "ngspice": None if ngspice is None else ngspice.response,
-        "ngspice_reason": "" if ngspice is None else ngspice.reason,
-        "engines_agree": checked.agrees,
-        "symmetric": model.orbit.symmetric,
-        "others": [o.response for o in model.others],
-        "yield": None,
-        "rate": None,
-        "reasons": {},
-        "agreement": _agreement(answers),
-    }
-    if counted is None:
-        row["left_out"] = study.left_out[index]
-        return row
-    low, high = counted.interval
-    row["yield"] = {
-        "ok": counted.ok,
-        "lost": counted.lost,
-        "grazing": counted.grazing,
-        "failed": counted.failed,
-        "samples": counted.samples,
-        "low": low,
-        "high": high,
-    }
-    row["rate"] = counted.rate
-    row["reasons"] = _reasons(answers)
-    return row
-
-
-def _agreement(answers: Sequence[Answer]) -> dict[str, Any]:
-    """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
-    asked = [a for a in answers if a.ngspice]
-    nominal = [a for a in answers if a.ngspice_nominal]
-    return {
-        "asked": len(asked),
-        "agreed": sum(a.agrees is True for a in asked),
-        "failed": sum(a.ngspice == "failed" for a in asked),
-        "undecided": sum(a.ngspice == "undecided" for a in asked),
-        "nominal_start": {
-            "asked": len(nominal),
-            "agreed": sum(a.agrees_from_nominal is True for a in nominal),
-            "failed": sum(a.ngspice_nominal == "failed" for a in nominal),
-            "undecided": sum(a.ngspice_nominal == "undecided" for a in nominal),
-            "too_long": sum(
-                bool(a.ngspice_nominal_reason) and not a.ngspice_nominal for a in answers
-            ),
-        },
-    }
-
-
-def _reasons(answers: Sequence[Answer]) -> dict[str, int]:
-    """Why boards do not show the response, most frequent first."""
-    met = Counter(
-        f"{a.verdict}: {_kind(a)}" if _kind(a) else str(a.verdict)
-        for a in answers
-        if a.verdict != "ok"
-    )
-    return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
-
-
-def _kind(answer: Answer) -> str:
-    """The reason without its figures, so that like ones are counted together."""
-    if answer.reason.startswith("asymmetric by"):
-        return "asymmetric"
-    return answer.reason
 
 
 def _conditions(design: Design) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from typing import Annotated, Literal, NoReturn
 
 from pydantic import BaseModel, Field
 
+from designer.bands import Bands
 from designer.circuitspec import CircuitSpec, CircuitTable
 from designer.errors import InputError
 from designer.measured import Measured, read_measured
@@ -137,6 +138,7 @@ class ModelFile:
     source: Path | None = None
     spread: SpreadSpec = BENCH_1
     measured: Measured | None = None
+    tuning: Bands = field(default_factory=Bands)
 
     @property
     def sha256(self) -> str:
@@ -213,7 +215,10 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         )
     spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
     title = tables.title or (source.stem if source is not None else "untitled")
-    return ModelFile(title, model, mechanical, responses, circuit, text, source, spread)
+    tuning = Bands(**dict(tables.tuning))
+    return ModelFile(
+        title, model, mechanical, responses, circuit, text, source, spread, tuning=tuning
+    )
 
 
 def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
@@ -334,6 +339,10 @@ def _clearance() -> Accepts:
     return Accepts(expected, check)
 
 
+def _band() -> Accepts:
+    return number("", "a number in [0, 1)", lambda value: 0.0 <= value < 1.0)
+
+
 # The tables of a file, key by key.
 
 
@@ -374,6 +383,13 @@ class _ResponseTable(BaseModel):
     b: Annotated[float | tuple[float, float] | None, _clearance()] = None
 
 
+class _TuningTable(BaseModel):
+    model_config = STRICT
+    frequency: Annotated[float, _band()] = Bands.frequency
+    amplitude: Annotated[float, _band()] = Bands.amplitude
+    offset: Annotated[float, number("", "a number >= 0", lambda value: value >= 0.0)] = Bands.offset
+
+
 class _File(BaseModel):
     model_config = STRICT
     format: Annotated[int, exactly(1, "1, the format that this version reads")]
@@ -385,3 +401,4 @@ class _File(BaseModel):
     )
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
     spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")
+    tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from designer.all_on_one import all_on_one
 from designer.bom import bill
 from designer.design import Design
+from designer.hearing import Hearing
 from designer.modelfile import ModelFile
 from designer.pipeline import Checked
-from designer.verdict import Answer, StudyPlan, Verdict, Yield
+from designer.report_layers import Layers
+from designer.verdict import Answer, StudyPlan, Yield
 
 if TYPE_CHECKING:
     from designer.api import RunResult
@@ -27,6 +29,7 @@ class ReportData:
     plan None where there was none. yields : one for each response (None where it was left out) or
     one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
     command : the command line that makes these results again. equations : the equation check.
+    heard : what ngspice said about boards of the study. layers : what else the study has.
     """
 
     modelfile: ModelFile
@@ -39,6 +42,8 @@ class ReportData:
     provenance: Mapping[str, Any]
     command: str
     equations: EquationCheck | None = None
+    heard: tuple[Hearing, ...] = ()
+    layers: Layers = field(default_factory=Layers)
 
     @classmethod
     def of(cls, result: RunResult, command: str) -> ReportData:
@@ -55,6 +60,15 @@ class ReportData:
             provenance=result.provenance,
             command=command,
             equations=result.equations,
+            heard=result.study.heard,
+            layers=Layers(
+                tuned=result.study.tuned,
+                reached=result.study.reached,
+                combined=result.study.combined,
+                recipes=result.study.recipes or (),
+                blame=result.study.blame,
+                maps=result.study.maps,
+            ),
         )
 
     @cached_property
@@ -79,6 +93,11 @@ class ReportData:
         number = self.question_of[response]
         return tuple(a for a in self.answers if number is not None and a.question == number)
 
+    def heard_of(self, response: int) -> tuple[Hearing, ...]:
+        """What ngspice said about response number ``response``, by sample."""
+        number = self.question_of[response]
+        return tuple(h for h in self.heard if number is not None and h.question == number)
+
     def yield_of(self, response: int) -> Yield | None:
         """Its yield; None where it was left out or there was no study."""
         if self.yields is None:
@@ -93,11 +112,4 @@ class ReportData:
         """Boards that show every response; None unless each was asked of each board."""
         if len(self.checked) < 2 or None in self.question_of or not self.answers:
             return None
-        boards: dict[int, set[Verdict]] = {}
-        for a in self.answers:
-            boards.setdefault(a.sample, set()).add(a.verdict)
-        order = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
-        worst = Counter(next(v for v in order if v in met) for met in boards.values())
-        return Yield(
-            worst[Verdict.OK], worst[Verdict.LOST], worst[Verdict.GRAZING], worst[Verdict.FAILED]
-        )
+        return all_on_one(self.answers)

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from designer import report_tables as tables
+from designer import report_tolerance
 from designer import report_words as words
 from designer.design import Design
 from designer.plots import EXACT
@@ -50,6 +51,7 @@ def facts(data: ReportData) -> dict[str, Any]:
         "provenance_table": tables.provenance_table(data),
         "command": data.command,
         "glossary": _GLOSSARY,
+        **report_tolerance.facts(data),
     }
 
 
@@ -74,6 +76,16 @@ _GLOSSARY = (
     ("lost", "the board settles on something else, or on nothing periodic, or an op-amp clips"),
     ("grazing", "too close to call: a contact too shallow or a miss too near to count"),
     ("failed", "no answer; such boards are not part of the yield"),
+    (
+        "tuned",
+        "some setting of the generator within the stated bands works; on the bench: the one that "
+        "the bench procedure finds works",
+    ),
+    ("reached", "switched on by the recipe, from discharged capacitors, the board ends on it"),
+    (
+        "both engines together",
+        "the yield of the exact circuit, corrected by the boards that ngspice was asked about",
+    ),
 )
 
 

@@ -8,12 +8,13 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from designer import orbit_plots, study_plots
+from designer import blame_plots, map_plots, orbit_plots, study_plots
 from designer import report_words as words
 from designer.design import Design
 from designer.pipeline import traces
 from designer.plots import EXACT, to_svg
 from designer.report_data import ReportData
+from designer.report_tolerance import blame_of
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,9 @@ def pictures(data: ReportData) -> dict[str, Any]:
         "legend": _legend(data),
         "yield_picture": _yield_picture(data),
         "margin_picture": _margin_picture(data),
+        "avoided_picture": _avoided_picture(data),
+        "index_picture": _index_picture(data),
+        "map_pictures": _map_pictures(data),
         "error_picture": _error_picture(data.design),
     }
 
@@ -116,6 +120,41 @@ def _margin_picture(data: ReportData) -> Picture | None:
         "it dies at 1. Right: its shallowest contact or nearest miss; the count of impacts changes "
         "at 0. A lost board stands where its new response has these.",
     )
+
+
+def _avoided_picture(data: ReportData) -> Picture | None:
+    blames = [blame_of(data, i) for i in range(len(data.checked))]
+    if not any(b is not None and b.subjects for b in blames):
+        return None
+    return Picture(
+        _uri(blame_plots.avoided_chart(_labels(data), blames)),
+        "Share of each response's losses that are avoided if one part or one group were exact.",
+        "Per cent of the lost boards that were asked again. Above the line groups, below it the "
+        "parts that help most.",
+    )
+
+
+def _index_picture(data: ReportData) -> Picture | None:
+    blames = [blame_of(data, i) for i in range(len(data.checked))]
+    if not any(b is not None and b.indices for b in blames):
+        return None
+    return Picture(
+        _uri(blame_plots.index_chart(_labels(data), blames)),
+        "Sobol indices of each response's margin, its largest coordinates.",
+        "First-order: what a coordinate explains alone; total: with all others.",
+    )
+
+
+def _map_pictures(data: ReportData) -> list[Picture]:
+    labels = dict(zip(data.question_of, _labels(data), strict=True))
+    return [
+        Picture(
+            _uri(map_plots.map_chart(" ".join(labels[found.question].split()), found)),
+            f"Yield over {found.over} of {' '.join(labels[found.question].split())}.",
+        )
+        for found in data.layers.maps
+        if found.question in labels
+    ]
 
 
 def _error_picture(design: Design) -> Picture | None:

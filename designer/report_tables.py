@@ -13,9 +13,9 @@ import numpy as np
 
 from designer import report_words as words
 from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
-from designer.confirmation import UNDECIDED
 from designer.design import Design
 from designer.gate import shortest_contact
+from designer.hearing import UNDECIDED, Kind
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
 from designer.plots import EXACT
@@ -182,23 +182,24 @@ def ngspice_table(data: ReportData) -> Table | None:
     """How often ngspice, asked about the same boards, said the same as the exact circuit."""
     rows = []
     for i, c in enumerate(data.checked):
-        answers = data.answers_to(i)
-        own = [(a, a.ngspice, a.ngspice_reason, a.agrees) for a in answers]
-        nominal = [
-            (a, a.ngspice_nominal, a.ngspice_nominal_reason, a.agrees_from_nominal) for a in answers
-        ]
-        for start, heard in (("its own orbit", own), ("the nominal orbit", nominal)):
-            asked = [h for h in heard if h[1]]
+        known = {a.sample: a for a in data.answers_to(i)}
+        for start, kind in (("its own orbit", Kind.OWN), ("the nominal orbit", Kind.NOMINAL)):
+            asked = [h for h in data.heard_of(i) if h.kind is kind and h.response]
             if not asked:
                 continue
-            open_ = Counter(why for _, said, why, _ in asked if said == UNDECIDED)
+            agrees = [h.agrees(known[h.sample]) for h in asked]
+            open_ = Counter(h.reason for h in asked if h.response == UNDECIDED)
             failed = Counter(
-                why or "no reason given"
-                for _, said, why, agrees in asked
-                if agrees is None and said != UNDECIDED
+                h.reason or "no reason given"
+                for h in asked
+                if not h.decided and h.response != UNDECIDED
             )
-            differ = Counter(f"{a.response} but {said}" for a, said, _, ok in asked if ok is False)
-            agreed = sum(agrees is True for _, _, _, agrees in asked)
+            differ = Counter(
+                f"{known[h.sample].response} but {h.response}"
+                for h, same in zip(asked, agrees, strict=True)
+                if same is False
+            )
+            agreed = sum(same is True for same in agrees)
             notes = [
                 f"{t} ({n})" for t, n in sorted([*differ.items(), *open_.items(), *failed.items()])
             ]

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from designer import pipeline
 from designer.bom import csv_text
 from designer.design import Design
 from designer.modelfile import ModelFile
+from designer.orbit import OrbitStatus
+from designer.recipe import Recipe
+from designer.recipe_search import find_recipes
 from designer.responses import ModelResponse
+
+if TYPE_CHECKING:
+    from designer.api import Synthesis
 
 COLUMNS = (
     "omega",
@@ -21,7 +29,7 @@ COLUMNS = (
     "start",
 )
 LOAD = "high-Z"
-START = "from the nominal orbit; how to reach it from power-up is not yet studied"
+NO_RECIPE = "none: the nominal circuit does not show the response"
 STATES = ("x1", "x1'", "x2", "x2'")
 
 
@@ -45,8 +53,11 @@ def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[Setting, .
     )
 
 
-def setup_csv(design: Design, found: Sequence[ModelResponse]) -> str:
-    """``setup.csv``."""
+def setup_csv(
+    design: Design, found: Sequence[ModelResponse], recipes: Sequence[Recipe | None]
+) -> str:
+    """``setup.csv``. recipes : how to start each response; None where the nominal circuit does not
+    show it."""
     rows = [
         {
             "omega": repr(s.omega),
@@ -56,11 +67,27 @@ def setup_csv(design: Design, found: Sequence[ModelResponse]) -> str:
             "amplitude_vpp": repr(2.0 * s.amplitude_v_peak),
             "offset_v": repr(s.offset_v),
             "load": LOAD,
-            "start": START + _coexisting(r),
+            "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
         }
-        for s, r in zip(settings(design, found), found, strict=True)
+        for s, r, recipe in zip(settings(design, found), found, recipes, strict=True)
     ]
     return csv_text(COLUMNS, rows)
+
+
+def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
+    """A start recipe for each response of a design, found on its circuit."""
+    checked = pipeline.check(made.design, made.found, None)
+    shown = [i for i, c in enumerate(checked) if c.circuit.status is OrbitStatus.PERIODIC]
+    plan = pipeline.plan_study(
+        made.modelfile,
+        made.design,
+        [checked[i] for i in shown],
+        made.catalog,
+        samples=1,  # neither this nor the seed matters to a recipe
+        seed=0,
+    )
+    known = dict(zip(shown, find_recipes(plan, jobs), strict=True))
+    return tuple(known.get(i) for i in range(len(checked)))
 
 
 def scales_csv(modelfile: ModelFile, design: Design, found: Sequence[ModelResponse]) -> str:
@@ -110,6 +137,6 @@ def _amplitudes(
 
 
 def _coexisting(response: ModelResponse) -> str:
-    """What else a start may end on."""
+    """What other starts may end on."""
     others = ", ".join(o.response for o in response.others)
-    return f"; a start may also end on {others}" if others else ""
+    return f"; other starts may end on {others}" if others else ""

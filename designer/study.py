@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-from designer import confirmation, montecarlo, pipeline
-from designer.blocks import BlockStore
+from designer import combined, layers, pipeline
+from designer.all_on_one import all_on_one
+from designer.blame import Blame
+from designer.combined import Combined
+from designer.hearing import Hearing
+from designer.layers import Runner
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
 from designer.preconditions import at_least, cores, need_responses
 from designer.progress import Progress
+from designer.reached import Reached
+from designer.recipe import Recipe
+from designer.study_work import RUNGS, RungName, Stores, Work
+from designer.tuning import Tuned
 from designer.verdict import Answer, StudyPlan, Yield, count
 from designer.workers import SpicePool
+from designer.yield_maps import Over, YieldMap
 
 if TYPE_CHECKING:
     from designer.api import Synthesis
@@ -27,7 +37,10 @@ class Study:
     """A tolerance study of the responses in ``checked``.
 
     asked : for each question of the plan, the index of its response. left_out : why a response
-    is no question, by index.
+    is no question, by index. heard : what ngspice said. until : the width that was asked for;
+    narrow : whether every interval is narrower (None where no width was asked for). tuned,
+    reached : their rows; None where they were not asked for. recipes : one for each question.
+    blame, maps : by question, where they were asked for.
     """
 
     checked: tuple[Checked, ...]
@@ -35,13 +48,30 @@ class Study:
     asked: tuple[int, ...]
     left_out: dict[int, str]
     answers: tuple[Answer, ...]
+    heard: tuple[Hearing, ...] = ()
+    until: float | None = None
+    narrow: bool | None = None
+    tuned: tuple[Tuned, ...] | None = None
+    reached: tuple[Reached, ...] | None = None
+    recipes: tuple[Recipe, ...] | None = None
+    blame: Blame | None = None
+    maps: tuple[YieldMap, ...] = ()
 
     def answers_to(self, index: int) -> tuple[Answer, ...]:
         """The answers for response number ``index``, by sample."""
-        if index not in self.asked:
-            return ()
-        question = self.asked.index(index)
-        return tuple(a for a in self.answers if a.question == question)
+        return self._answers.get(index, ())
+
+    def heard_of(self, index: int) -> tuple[Hearing, ...]:
+        """What ngspice said about response number ``index``, by sample."""
+        return tuple(h for h in self.heard if self.asked[h.question] == index)
+
+    def tuned_of(self, index: int) -> tuple[Tuned, ...]:
+        """The rows of the tuned layer of response number ``index``."""
+        return tuple(t for t in self.tuned or () if self.asked[t.question] == index)
+
+    def reached_of(self, index: int) -> tuple[Reached, ...]:
+        """The rows of the reached layer of response number ``index``."""
+        return tuple(r for r in self.reached or () if self.asked[r.question] == index)
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
@@ -49,6 +79,46 @@ class Study:
         return tuple(
             count(self.answers_to(i)) if i in self.asked else None for i in range(len(self.checked))
         )
+
+    @cached_property
+    def combined(self) -> tuple[Combined | None, ...]:
+        """For each response: both engines together; None where ngspice has no answer."""
+        return tuple(
+            combined.combine(
+                self.answers_to(i), self.heard_of(i), self.plan.questions[self.asked.index(i)]
+            )
+            if i in self.asked
+            else None
+            for i in range(len(self.checked))
+        )
+
+    @property
+    def all_on_one_board(self) -> Yield | None:
+        """Boards that show every response as built; None unless there are two at least and each
+        was asked."""
+        return self._on_one(self.answers)
+
+    @property
+    def all_tuned(self) -> Yield | None:
+        """The same with the generator free within the bands, for each response its own."""
+        return self._on_one(self.tuned)
+
+    @property
+    def all_reached(self) -> Yield | None:
+        """The same from power-up by the recipes."""
+        return self._on_one(self.reached)
+
+    def _on_one(self, rows: Sequence[Answer | Tuned | Reached] | None) -> Yield | None:
+        if not rows or len(self.asked) < max(len(self.checked), 2):
+            return None
+        return all_on_one(rows)
+
+    @cached_property
+    def _answers(self) -> dict[int, tuple[Answer, ...]]:
+        by: dict[int, list[Answer]] = {index: [] for index in self.asked}
+        for a in self.answers:
+            by[self.asked[a.question]].append(a)
+        return {index: tuple(rows) for index, rows in by.items()}
 
 
 def check(
@@ -67,17 +137,29 @@ def tolerance(
     synthesis: Synthesis,
     *,
     samples: int = SAMPLES,
+    until: float | None = None,
+    rung: RungName = "auto",
+    tuned: bool = False,
+    reached: bool = False,
+    blamed: bool = True,
+    maps: Sequence[Over] = (),
     seed: int = SEED,
     jobs: int | None = None,
     pool: SpicePool | None = None,
     checked: tuple[Checked, ...] | None = None,
-    store: Callable[[StudyPlan], BlockStore] | None = None,
+    stores: Stores | None = None,
+    runner: Runner | None = None,
     progress: Progress | None = None,
 ) -> Study:
-    """How many boards out of ``samples`` show each response, under ``bench-1``.
+    """How many boards show each response, under the spread of the model file.
 
+    samples : at least. until : width of the 95 % intervals at which the study stops growing; it
+    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``designer.hearing`` says,
+    ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted.
+    maps : settings over which the yield is wanted (``yield_maps.OVERS``).
     checked : of the same design, to save the time of the gate. pool : where ngspice runs; without
-    one ngspice is not asked. store : where blocks are read from and written to.
+    one ngspice is not asked. stores : where rows are read from and written to. runner : who
+    computes blocks; this process if None.
     """
     need_responses(synthesis.modelfile)
     said = Progress() if progress is None else progress
@@ -85,6 +167,7 @@ def tolerance(
     at_least("--samples", samples, 1)
     at_least("--seed", seed, 0)
     at_least("--jobs", jobs, 1)
+    pool = None if rung == "exact" else pool
     checked = check(synthesis, pool, said) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     asked = tuple(i for i in range(len(checked)) if i not in left_out)
@@ -96,27 +179,25 @@ def tolerance(
         samples=samples,
         seed=seed,
     )
-    blocks = None if store is None else store(plan)
-    answers: list[Answer] = []
-    steps = samples * len(asked)
-    if pool is not None:
-        heard = min(samples, confirmation.OWN_SAMPLES) + min(samples, confirmation.NOMINAL_SAMPLES)
-        steps += heard * sum(q.settings is not None for q in plan.questions)
-    step = said.stage(f"tolerance study, {samples} boards, responses: {len(asked)}", steps)
-    for block in plan.blocks() if asked else ():
-        known = None if blocks is None else blocks.read(block)
-        if known is None:
-            known = montecarlo.run_block(plan, block, pool, jobs, step)
-            if blocks is not None:
-                blocks.write(block, known)
-        else:
-            for answer in known:
-                step()
-                for said_ in (answer.ngspice, answer.ngspice_nominal):
-                    if said_:
-                        step()
-        answers += known
-    return Study(checked, plan, asked, left_out, tuple(answers))
+    study = Study(checked, plan, asked, left_out, (), until=until)
+    if not asked:
+        return study
+    work = Work(
+        jobs,
+        pool,
+        Stores() if stores is None else stores,
+        layers.Here(jobs) if runner is None else runner,
+        said,
+        rung,
+    )
+    study = work.grown(study) if until is not None else work.made(study)
+    if tuned:
+        study = work.tuned(study, synthesis.modelfile.tuning)
+    if reached:
+        study = work.reached(study)
+    if blamed:
+        study = work.blamed(study)
+    return work.mapped(study, maps) if maps else study
 
 
 def _why_not(checked: Checked) -> str:
@@ -126,3 +207,15 @@ def _why_not(checked: Checked) -> str:
     if checked.circuit.status is not OrbitStatus.PERIODIC:
         return f"the nominal circuit is {checked.circuit.response}"
     return ""
+
+
+__all__ = (
+    "RUNGS",
+    "SAMPLES",
+    "SEED",
+    "RungName",
+    "Stores",
+    "Study",
+    "check",
+    "tolerance",
+)

@@ -6,20 +6,21 @@ A verdict is decided on the exact circuit rung, started on the nominal design's 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 from scipy.stats import binomtest
 
 from designer.circuit import Circuit
-from designer.confirmation import UNDECIDED
 from designer.deck import Excitation, SolverSettings
 from designer.modelfile import Response
 from designer.orbit import Orbit, OrbitStatus
 from designer.spread import Spread
 
-BLOCK = 25
+BLOCK = 250
 """Samples in a block; block edges depend on the sample index alone."""
 
 
@@ -51,11 +52,7 @@ class Answer:
     """One sample of one response.
 
     response : n-p-q or status on the exact circuit; the margins are its, waveform among them: RMS
-    difference of the first displacement from the nominal board's, over its peak. ngspice : n-p-q
-    or status there from this sample's own orbit, "undecided" where two step sizes differ to the
-    last, "" where ngspice was not asked. ngspice_nominal : likewise from the nominal orbit, after
-    ngspice_nominal_periods drive periods; where the reason alone is given, the way was too long to
-    be asked. The remedies are those that a run needed to converge, in order.
+    difference of the first displacement from the nominal board's, over its peak.
     """
 
     sample: int
@@ -69,26 +66,6 @@ class Answer:
     asymmetry: float
     periods: int
     waveform: float = float("nan")
-    ngspice: str = ""
-    ngspice_reason: str = ""
-    ngspice_remedies: str = ""
-    ngspice_nominal: str = ""
-    ngspice_nominal_reason: str = ""
-    ngspice_nominal_remedies: str = ""
-    ngspice_nominal_periods: int = 0
-
-    @property
-    def agrees(self) -> bool | None:
-        """None where ngspice was not asked, failed or is undecided."""
-        return self._says_so(self.ngspice)
-
-    @property
-    def agrees_from_nominal(self) -> bool | None:
-        """The same of its start from the nominal orbit."""
-        return self._says_so(self.ngspice_nominal)
-
-    def _says_so(self, heard: str) -> bool | None:
-        return None if heard in ("", OrbitStatus.FAILED, UNDECIDED) else heard == self.response
 
 
 @dataclass(frozen=True)
@@ -129,15 +106,22 @@ class StudyPlan:
     samples: int
     questions: tuple[Question, ...]
 
-    def blocks(self) -> Iterator[range]:
+    def blocks(self, size: int = BLOCK) -> Iterator[range]:
         """Sample indices block by block."""
-        for first in range(0, self.samples, BLOCK):
-            yield range(first, min(first + BLOCK, self.samples))
+        for first in range(0, self.samples, size):
+            yield range(first, min(first + size, self.samples))
 
 
-def count(answers: Sequence[Answer]) -> Yield:
+class Judged(Protocol):
+    """A row with a verdict, such as an `Answer`."""
+
+    @property
+    def verdict(self) -> Verdict: ...
+
+
+def count(answers: Iterable[Judged]) -> Yield:
     """The yield of a set of answers to one question."""
-    tally = {v: sum(a.verdict is v for a in answers) for v in Verdict}
+    tally = Counter(a.verdict for a in answers)
     return Yield(
         tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
     )

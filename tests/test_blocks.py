@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
-from designer.blocks import BlockStore, block_name, block_names, study_hash
+from designer.blocks import BlockStore
 from designer.circuit import Capacitor, Circuit, Generator, Resistor, Section
 from designer.deck import Excitation, SolverSettings
+from designer.errors import InputError
+from designer.layers import Here, fill
 from designer.modelfile import Expect, Response
 from designer.orbit import Orbit, OrbitStatus
 from designer.spread import Spread
+from designer.study_hash import RULES, study_hash
 from designer.verdict import BLOCK, Answer, Question, StudyPlan, Verdict
 
 
@@ -59,75 +65,162 @@ def _answers(block: range) -> list[Answer]:
             asymmetry=5e-17,
             periods=40,
             waveform=0.01,
-            ngspice="failed",
-            ngspice_reason="singular matrix",
         )
         for i in block
     ]
 
 
+def _store(root: Path, plan: StudyPlan, **more: Any) -> BlockStore[Answer]:
+    omegas = [q.spec.omega for q in plan.questions]
+    study = study_hash(plan)
+    return BlockStore(root, "samples.parquet", Answer, study, omegas=omegas, **more)
+
+
 def test_round_trip_is_exact(tmp_path: Path, plan: StudyPlan) -> None:
-    store = BlockStore.of(tmp_path, plan)
+    store = _store(tmp_path, plan)
     for block in plan.blocks():
-        assert store.read(block) is None
-        store.write(block, _answers(block))
-        assert store.read(block) == _answers(block)
+        assert store.read(block) == []
+        store.put(block, _answers(block))
+        assert _store(tmp_path, plan).read(block) == _answers(block)
     names = sorted(p.name for p in (tmp_path / "samples.parquet").iterdir())
     assert names == ["block-000000.parquet", "block-000001.parquet"]
+    assert store.names == {f"samples.parquet/{name}" for name in names}
+    table = pq.read_table(tmp_path / "samples.parquet")
+    assert table.column("omega").to_pylist() == [0.85] * plan.samples
+
+
+class Colour(StrEnum):
+    RED = "red"
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Every kind of field that a row may have, and no question."""
+
+    sample: int
+    name: str
+    colour: Colour
+    size: float
+    good: bool
+
+
+def test_any_flat_dataclass_is_a_row(tmp_path: Path) -> None:
+    rows = [Flat(i, "ω", Colour.RED, math.nan if i else -0.0, bool(i % 2)) for i in range(3)]
+    BlockStore(tmp_path, "flat.parquet", Flat, "x", size=3).put(range(3), rows)
+    back = BlockStore(tmp_path, "flat.parquet", Flat, "x", size=3).read(range(3))
+    assert [repr(row) for row in back] == [repr(row) for row in rows]
+    assert BlockStore(tmp_path, "flat.parquet", Flat, "y", size=3).read(range(3)) == []
 
 
 def test_equal_blocks_are_equal_files(tmp_path: Path, plan: StudyPlan) -> None:
     block = next(plan.blocks())
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        BlockStore.of(tmp_path / name, plan).write(block, _answers(block))
-    one, two = ((tmp_path / name / block_name(block)).read_bytes() for name in ("one", "two"))
-    assert one == two
+        _store(tmp_path / name, plan).put(block, _answers(block))
+    name = _store(tmp_path, plan).name(block)
+    assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
-def test_names_follow_from_the_index_alone() -> None:
-    assert block_names(BLOCK) == ["samples.parquet/block-000000.parquet"]
-    assert block_names(2 * BLOCK + 1) == block_names(3 * BLOCK)
-    assert block_names(3 * BLOCK)[:2] == block_names(2 * BLOCK)
+def test_a_block_that_holds_the_same_is_left_alone(tmp_path: Path, plan: StudyPlan) -> None:
+    block = next(plan.blocks())
+    _store(tmp_path, plan).put(block, _answers(block))
+    writes: list[int] = []
+    store = _store(tmp_path, plan, guard=lambda: writes.append(1))
+    store.put(block, store.read(block))
+    assert writes == []
+    assert store.names == {store.name(block)}
+    store.put(block, store.read(block)[:-1])
+    assert writes == [1]
 
 
-def test_a_longer_study_takes_over_whole_blocks_only(tmp_path: Path, plan: StudyPlan) -> None:
-    store = BlockStore.of(tmp_path, plan)
+def test_a_longer_study_takes_over_what_is_there(tmp_path: Path, plan: StudyPlan) -> None:
+    store = _store(tmp_path, plan)
     for block in plan.blocks():
-        store.write(block, _answers(block))
+        store.put(block, _answers(block))
     longer = replace(plan, samples=3 * BLOCK)
     assert study_hash(longer) == study_hash(plan)
-    known = [BlockStore.of(tmp_path, longer).read(block) is not None for block in longer.blocks()]
-    assert known == [True, False, False]
+    known = [len(_store(tmp_path, longer).read(block)) for block in longer.blocks()]
+    assert known == [BLOCK, plan.samples - BLOCK, 0]
+    shorter = range(BLOCK, BLOCK + 1)
+    assert _store(tmp_path, plan).read(shorter) == _answers(shorter)
 
 
-def test_another_study_is_not_read(tmp_path: Path, plan: StudyPlan) -> None:
+def test_fill_computes_only_what_is_missing(tmp_path: Path, plan: StudyPlan) -> None:
+    """A study of 260 after one of 253: the last block's first three are kept; and then of 251."""
+    for samples, computed in ((plan.samples, [range(250), range(250, 253)]),
+                              (260, [range(253, 260)]), (251, [])):  # fmt: skip
+        asked: list[range] = []
+
+        def task(indices: range, asked: list[range] = asked) -> Any:
+            asked.append(indices)
+            return lambda jobs, step: _answers(indices)
+
+        study = replace(plan, samples=samples)
+        rows = fill(study, _store(tmp_path, study), BLOCK, task, Here(1), lambda: None)
+        assert asked == computed
+        assert rows == _answers(range(samples))
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    study = replace(plan, samples=251)
+    fill(study, _store(fresh, study), BLOCK, task, Here(1), lambda: None)
+    for path in (fresh / "samples.parquet").iterdir():
+        assert path.read_bytes() == (tmp_path / "samples.parquet" / path.name).read_bytes()
+
+
+def test_another_study_is_not_read(
+    tmp_path: Path, plan: StudyPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
     block = next(plan.blocks())
-    BlockStore.of(tmp_path, plan).write(block, _answers(block))
+    _store(tmp_path, plan).put(block, _answers(block))
     (question,) = plan.questions
     others = [
         replace(plan, seed=2),
         replace(plan, spread=replace(plan.spread, resistor=0.02)),
         replace(plan, circuit=replace(plan.circuit, saturation=12.0)),
-        replace(plan, questions=(replace(question, settings=None),)),
         replace(plan, questions=(replace(question, excitation=Excitation(301.0, 2.0)),)),
         replace(plan, questions=(question, question)),
     ]
     assert len({study_hash(p) for p in [plan, *others]}) == len(others) + 1
-    assert all(BlockStore.of(tmp_path, other).read(block) is None for other in others)
+    assert all(_store(tmp_path, other).read(block) == [] for other in others)
+    # ngspice's settings are no matter of the exact rung's.
+    other = replace(plan, questions=(replace(question, settings=None),))
+    assert study_hash(other) == study_hash(plan)
+    assert study_hash(other, "ngspice") != study_hash(plan, "ngspice")
+    assert study_hash(plan, "tuned", {"a": 1}) != study_hash(plan, "tuned", {"a": 2})
+    before = study_hash(plan)
+    monkeypatch.setitem(RULES, "samples", RULES["samples"] + 1)
+    assert study_hash(plan) != before
 
 
 @pytest.mark.parametrize("damage", ["cut", "other", "empty"])
-def test_a_damaged_block_is_none(tmp_path: Path, plan: StudyPlan, damage: str) -> None:
-    store, block = BlockStore.of(tmp_path, plan), next(plan.blocks())
-    store.write(block, _answers(block))
-    path = tmp_path / block_name(block)
+def test_a_damaged_block_is_nothing(tmp_path: Path, plan: StudyPlan, damage: str) -> None:
+    store, block = _store(tmp_path, plan), next(plan.blocks())
+    store.put(block, _answers(block))
+    path = tmp_path / store.name(block)
     content = path.read_bytes()
     path.write_bytes({"cut": content[:-40], "other": b"PAR1 nonsense", "empty": b""}[damage])
-    assert store.read(block) is None
+    assert _store(tmp_path, plan).read(block) == []
 
 
-def test_too_few_rows_are_none(tmp_path: Path, plan: StudyPlan) -> None:
-    store, block = BlockStore.of(tmp_path, plan), next(plan.blocks())
-    store.write(block, _answers(block)[:-1])
-    assert store.read(block) is None
+def test_a_full_disk_is_said_and_loses_nothing(
+    tmp_path: Path, plan: StudyPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The partial file is /dev/full, which answers every write with "no space left"."""
+    first, second = plan.blocks()
+    store = _store(tmp_path, plan)
+    store.put(first, _answers(first))
+    write = pq.write_table
+    monkeypatch.setattr(pq, "write_table", lambda table, path: write(table, "/dev/full"))
+    with pytest.raises(InputError, match=r"No space left on device.*--resume") as raised:
+        store.put(second, _answers(second))
+    assert raised.value.exit_status == 2
+    monkeypatch.undo()
+    assert _store(tmp_path, plan).read(first) == _answers(first)
+    assert [p.name for p in (tmp_path / "samples.parquet").iterdir()] == ["block-000000.parquet"]
+
+
+def test_a_folder_that_is_gone_is_said(tmp_path: Path, plan: StudyPlan) -> None:
+    block = next(plan.blocks())
+    with pytest.raises(InputError, match="No such file"):
+        _store(tmp_path / "gone", plan).put(block, _answers(block))
+    assert not (tmp_path / "gone").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,29 +17,28 @@ from designer.attractor import settle
 from designer.blocks import BlockStore
 from designer.confirmation import (
     MOST_PERIODS,
-    NOMINAL_SAMPLES,
-    OWN_SAMPLES,
     REMAINDER,
-    UNDECIDED,
     Query,
     confirm,
+    hear,
     periods_to_settle,
-    starts_from_nominal,
 )
 from designer.deck import SolverSettings
 from designer.flow import Flow
 from designer.gate import Subject
-from designer.montecarlo import run_block
+from designer.hearing import UNDECIDED, Ask, Hearing, Kind, Why, ask_random
+from designer.layers import Samples, listen
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import draw
+from designer.study_hash import study_hash
 from designer.system import Drive
-from designer.verdict import Answer, StudyPlan
+from designer.verdict import StudyPlan, Verdict
 from designer.waveform_orbit import Read
 from designer.workers import SpiceJob, SpicePool
 from tests.paper_cases import flow_of, subject
-from tests.test_montecarlo import plan
+from tests.test_verdict import nothing, plan
 
 
 @pytest.fixture(scope="module")
@@ -58,28 +58,6 @@ def asking(samples: int = 30) -> StudyPlan:
 
 
 # ---------------------------------------------------------------------------------------------
-# Who
-
-
-@pytest.mark.parametrize(
-    ("sample", "radius", "expected"),
-    [
-        (0, 0.1, True),
-        (NOMINAL_SAMPLES - 1, math.nan, True),
-        (NOMINAL_SAMPLES, 0.9, False),
-        (NOMINAL_SAMPLES, 0.901, True),
-        (10**6, 0.99, True),
-        (NOMINAL_SAMPLES, math.nan, False),
-    ],
-)
-def test_the_first_fifty_and_every_slow_one(sample: int, radius: float, expected: bool) -> None:
-    known = np.zeros(0, dtype=complex) if math.isnan(radius) else np.array([0.1, -radius + 0j])
-    orbit = Orbit(OrbitStatus.PERIODIC, n=1, p=1, q=1, multipliers=known)
-    assert starts_from_nominal(sample, orbit) is expected
-    assert NOMINAL_SAMPLES >= 50
-
-
-# ---------------------------------------------------------------------------------------------
 # How long
 
 
@@ -91,7 +69,7 @@ def test_the_way_is_as_long_as_the_multiplier_and_the_exact_trajectory_say(p: in
     target = settle(flow, start)
     assert target.n
     periods = periods_to_settle(flow, start, target)
-    assert periods is not None
+    assert isinstance(periods, int)
     assert periods >= target.n * 5.0 / (1.0 - target.radius)
     peak = np.abs(target.extremes).max(axis=1)
     laps = flow.run(target.start, target.n).strobes[:-1]
@@ -109,12 +87,29 @@ def test_ways_without_a_multiplier_or_an_end() -> None:
     who = subject(1)
     flow, orbit = flow_of(who), who.orbit
     assert periods_to_settle(flow, orbit.start, Orbit(OrbitStatus.APERIODIC)) == 20
-    for radius in (1.0 - 5.0 / (MOST_PERIODS + 1.0), 1.0, 1.5):
-        slow = replace(orbit, multipliers=np.array([radius + 0j]))
-        assert periods_to_settle(flow, orbit.start, slow) is None
+    slow = replace(orbit, multipliers=np.array([1.0 - 5.0 / (MOST_PERIODS + 1.0) + 0j]))
+    assert periods_to_settle(flow, orbit.start, slow) == MOST_PERIODS + 1
+    for radius in (1.0, 1.5, math.nan):
+        unstable = replace(orbit, multipliers=np.array([radius + 0j]))
+        assert periods_to_settle(flow, orbit.start, unstable) == math.inf
     # An orbit that the trajectory never reaches.
     far = replace(orbit, start=2.0 * orbit.start, multipliers=np.array([0.1 + 0j]))
-    assert periods_to_settle(flow, orbit.start, far) is None
+    assert periods_to_settle(flow, orbit.start, far) == math.inf
+
+
+def test_the_way_is_looked_at_no_longer_than_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cost of the question is that of the answer, not of the longest way there may be."""
+    who = subject(1)
+    flow, run = flow_of(who), Flow.run
+    spent: list[int] = []
+
+    def counted(self: Flow, x: Any, periods: int, **more: Any) -> Any:
+        spent.append(periods)
+        return run(self, x, periods, **more)
+
+    monkeypatch.setattr(Flow, "run", counted)
+    periods = periods_to_settle(flow, 1.2 * who.orbit.start, who.orbit)
+    assert sum(spent) <= 2 * periods + 2 * confirmation.STRETCH
 
 
 # ---------------------------------------------------------------------------------------------
@@ -142,9 +137,9 @@ def test_a_disagreement_is_asked_again_until_two_steps_say_the_same(
 ) -> None:
     who, calls = subject(1), []
     counting = Counting(pool)
-    query = Query(who, SolverSettings("trap", who.period / 400.0), expected)
+    query = Query(who, SolverSettings("trap", who.period / 400.0), expected, 3)
     progress: Callable[[], None] = lambda: calls.append(1)  # noqa: E731
-    (heard,) = confirm(counting, [query], 3, progress)  # type: ignore[arg-type]
+    (heard,) = confirm(counting, [query], progress)  # type: ignore[arg-type]
     assert heard.response == "1-1-1"
     assert heard.remedies == ""
     assert counting.jobs == runs
@@ -193,8 +188,8 @@ def test_only_two_answers_that_are_the_same_count(
     ends: tuple[int | str, ...], refinements: int, response: str, reason: str
 ) -> None:
     who, pool, calls = subject(1), Saying(*ends), []
-    query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1")
-    (heard,) = confirm(pool, [query], refinements, lambda: calls.append(1))  # type: ignore[arg-type]
+    query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", refinements)
+    (heard,) = confirm(pool, [query], lambda: calls.append(1))  # type: ignore[arg-type]
     assert (heard.response, heard.reason) == (response, reason)
     assert pool.steps == len(ends)
     assert calls == [1]
@@ -203,19 +198,39 @@ def test_only_two_answers_that_are_the_same_count(
 def test_a_run_that_fails_says_why(pool: SpicePool) -> None:
     who = subject(1)
     broken = replace(who, start=np.full(4, np.nan))
-    query = Query(broken, SolverSettings("trap", who.period / 400.0), "1-1-1")
-    (heard,) = confirm(pool, [query], 1)
+    query = Query(broken, SolverSettings("trap", who.period / 400.0), "1-1-1", 1)
+    (heard,) = confirm(pool, [query])
     assert heard.response == "failed"
     assert heard.reason
+
+
+def both(samples: range, questions: int = 2) -> list[Ask]:
+    """Every sample and question from both starts."""
+    return [
+        Ask(i, number, kind, Why.RANDOM)
+        for i in samples
+        for number in range(questions)
+        for kind in (Kind.NOMINAL, Kind.OWN)
+    ]
 
 
 def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
     """Against runs made here: from the nominal start, of 60 periods, the last six judged."""
     p = asking()
-    answers = run_block(p, range(2), pool, 2)
-    for a in answers:
-        question = p.questions[a.question]
-        reduction = Reduction(p.circuit, draw(p.circuit, p.spread, p.seed, a.sample))
+    answers = {(a.sample, a.question): a for a in Samples(p, range(2))(2, nothing)}
+    asks = both(range(2))
+    heard = hear(p, asks, pool, 2)
+    assert [(h.sample, h.question, h.kind) for h in heard] == [
+        (a.sample, a.question, a.kind) for a in asks
+    ]
+    for h in heard:
+        question, answer = p.questions[h.question], answers[h.sample, h.question]
+        assert h.agrees(answer) is True
+        assert h.survives(question) is (answer.verdict is Verdict.OK)
+        if h.kind is Kind.OWN:
+            assert h.periods == gate.DISCARD
+            continue
+        reduction = Reduction(p.circuit, draw(p.circuit, p.spread, p.seed, h.sample))
         drive = Drive(2 * np.pi * question.excitation.frequency, -question.excitation.amplitude)
         orbit = settle(Flow(reduction.system(), drive), question.start.start)
         settings = question.settings
@@ -225,28 +240,22 @@ def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
         )
         ((_, found),) = pool.map([gate.job(long, settings)])
         assert not isinstance(found, SimulationFailed)
-        assert a.ngspice_nominal == found.orbit.response == a.response
-        assert a.agrees_from_nominal is True
-        assert a.agrees is True
-        assert a.ngspice_nominal_periods >= 5.0 / (1.0 - orbit.radius)
+        assert h.response == found.orbit.response == answer.response
+        assert h.periods >= 5.0 / (1.0 - orbit.radius)
 
 
-def test_later_boards_are_asked_only_where_they_are_slow(
-    pool: SpicePool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(confirmation, "NOMINAL_SAMPLES", 0)
-    monkeypatch.setattr(confirmation, "SLOW", 1.0)
-    p = asking()
-    beyond = range(OWN_SAMPLES, OWN_SAMPLES + 3)
-    answers = run_block(p, beyond, pool, 2)
-    assert {(a.ngspice, a.ngspice_nominal, a.ngspice_nominal_periods) for a in answers} == {
-        ("", "", 0)
-    }
-    monkeypatch.setattr(confirmation, "SLOW", 0.5)
-    answers = run_block(p, beyond, pool, 2)
-    asked = [a for a in answers if a.radius > 0.5]
-    assert asked
-    assert [a for a in answers if a.ngspice_nominal] == asked
+def test_what_is_left_out_of_the_record_changes_nothing(pool: SpicePool) -> None:
+    """ngspice keeps no point of a long way; what it computes, and what is read of it, is equal."""
+    who = replace(subject(1), start=1.2 * subject(1).orbit.start, discard=30)
+    settings = SolverSettings("trap", who.period / 400.0)
+    short, whole = gate.job(who, settings), gate.job(who, settings, whole=True)
+    kept = replace(short, netlist=whole.netlist)
+    assert short.netlist != whole.netlist
+    found = dict(pool.map([short, kept]))
+    assert not isinstance(found[0], SimulationFailed)
+    assert not isinstance(found[1], SimulationFailed)
+    assert found[0].strobes.tobytes() == found[1].strobes.tobytes()
+    assert found[0].orbit.response == found[1].orbit.response
 
 
 def test_too_long_a_way_is_left_out_by_name(
@@ -254,32 +263,61 @@ def test_too_long_a_way_is_left_out_by_name(
 ) -> None:
     monkeypatch.setattr(confirmation, "MOST_PERIODS", 3)
     calls: list[int] = []
-    answers = run_block(asking(), range(1), pool, 2, lambda: calls.append(1))
-    for a in answers:
-        assert a.ngspice_nominal == ""
-        assert a.ngspice_nominal_reason == "too long a way to be asked"
-        assert a.agrees_from_nominal is None
-        assert a.agrees is True
-    assert len(calls) == 3 * len(answers)
+    p = asking()
+    heard = hear(p, both(range(1)), pool, 2, lambda: calls.append(1))
+    answers = {a.question: a for a in Samples(p, range(1))(1, nothing)}
+    for h in heard:
+        if h.kind is Kind.OWN:
+            assert h.agrees(answers[h.question]) is True
+        else:
+            assert (h.response, h.periods, h.decided) == ("", 0, False)
+            assert re.search(r"too long a way .*: \d+ drive periods, at most 3", h.reason)
+            assert h.survives(p.questions[h.question]) is None
+    assert len(calls) == len(heard) == 4
 
 
 def test_blocks_are_byte_equal_on_any_number_of_workers(pool: SpicePool, tmp_path: Path) -> None:
     p = asking(4)
+    asks = ask_random(Samples(p, range(4))(2, nothing))
+    assert len(asks) == 16
     contents, known = [], []
     with SpicePool(1) as one:
         for name, workers, jobs in (("one", one, 1), ("two", pool, 2)):
             (tmp_path / name).mkdir()
-            store = BlockStore.of(tmp_path / name, p)
-            answers: list[Answer] = run_block(p, range(4), workers, jobs)
-            store.write(range(4), answers)
-            (file,) = (tmp_path / name / "samples.parquet").iterdir()
+            heard = listen(p, asks, _store(tmp_path / name, p), workers, jobs, nothing)
+            (file,) = (tmp_path / name / "ngspice.parquet").iterdir()
             contents.append(file.read_bytes())
-            known.append(store.read(range(4)))
-            assert known[-1] is not None
-            assert [repr(a) for a in known[-1]] == [repr(a) for a in answers]
+            known.append(_store(tmp_path / name, p).read(range(10)))
+            assert known[-1] == heard
     assert contents[0] == contents[1]
-    assert known[0] is not None
-    assert all(a.ngspice_nominal for a in known[0])
+
+
+def _store(root: Path, p: StudyPlan) -> BlockStore[Hearing]:
+    return BlockStore(root, "ngspice.parquet", Hearing, study_hash(p, "ngspice"), size=10)
+
+
+def test_what_was_heard_is_not_asked_again(pool: SpicePool, tmp_path: Path) -> None:
+    """Fewer first, then more; until the last word is said nothing that is known is dropped."""
+    p = asking(4)
+    everything = both(range(3))
+    counting = Counting(pool)
+
+    def said(asks: list[Ask], **more: Any) -> list[Hearing]:
+        return listen(p, asks, _store(tmp_path, p), counting, 1, nothing, **more)  # type: ignore[arg-type]
+
+    first = said(both(range(2)))
+    runs = counting.jobs
+    assert runs >= 8
+    whole = said(everything)
+    assert counting.jobs - runs >= 4
+    runs = counting.jobs
+    assert set(first) < set(whole)
+    assert said(both(range(1)), last=False) == whole[:4]
+    assert said(everything) == whole
+    named = [replace(a, why=Why.BOUNDARY) for a in both(range(1))]
+    assert [h.why for h in said(named, known=whole)] == [Why.BOUNDARY] * 4
+    assert counting.jobs == runs
+    assert len(_store(tmp_path, p).read(range(10))) == 4
 
 
 class Broken:
@@ -290,15 +328,9 @@ class Broken:
             yield i, SimulationFailed("worker died (exit -11) twice")
 
 
-def test_a_library_that_crashes_costs_no_verdict() -> None:
-    p = asking()
-    alone = run_block(p, range(2), None, 1)
-    answers = run_block(p, range(2), Broken(), 1)  # type: ignore[arg-type]
-    assert [(a.verdict, a.response, a.radius) for a in answers] == [
-        (a.verdict, a.response, a.radius) for a in alone
-    ]
-    for a in answers:
-        assert (a.ngspice, a.ngspice_nominal) == ("failed", "failed")
-        assert a.ngspice_reason == a.ngspice_nominal_reason == "worker died (exit -11) twice"
-        assert a.agrees is None
-        assert a.agrees_from_nominal is None
+def test_a_library_that_crashes_is_said() -> None:
+    heard = hear(asking(), both(range(2)), Broken(), 1)  # type: ignore[arg-type]
+    assert len(heard) == 8
+    for h in heard:
+        assert (h.response, h.reason) == ("failed", "worker died (exit -11) twice")
+        assert not h.decided

@@ -16,9 +16,11 @@ from designer import pipeline
 from designer.api import RunResult
 from designer.bom import bill
 from designer.catalog import Catalog, load_catalog
+from designer.confirmation import hear
 from designer.errors import InputError
+from designer.hearing import Hearing, Kind, ask_random
+from designer.layers import Samples
 from designer.modelfile import Expect, parse_model_file, read_model_file
-from designer.montecarlo import run_block
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus, failed
 from designer.provenance import provenance
@@ -26,7 +28,7 @@ from designer.report import render_html, render_markdown, write_report
 from designer.report_data import ReportData
 from designer.report_tables import ngspice_table
 from designer.study import Study
-from designer.verdict import Answer, Verdict
+from designer.verdict import Verdict
 from designer.workers import SpicePool
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
@@ -48,7 +50,8 @@ def whole(catalog: Catalog) -> ReportData:
     with SpicePool(2) as pool:
         checked = pipeline.check(design, found, pool)
         plan = pipeline.plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
-        answers = [a for block in plan.blocks() for a in run_block(plan, block, pool, 2)]
+        answers = Samples(plan, range(4))(2, lambda: None)
+        heard = hear(plan, ask_random(answers), pool, 2)
     return ReportData(
         modelfile=modelfile,
         design=design,
@@ -59,6 +62,7 @@ def whole(catalog: Catalog) -> ReportData:
         bom=[line.cells() for line in bill(design.circuit, modelfile.circuit, catalog)],
         provenance=provenance(modelfile, catalog.hash, seed=1, spread=plan.spread.as_dict()),
         command="designer run model.toml --samples 4 --seed 1 --out out",
+        heard=tuple(heard),
     )
 
 
@@ -259,13 +263,15 @@ def test_lost_boards_are_counted_by_reason(whole: ReportData) -> None:
     for a in whole.answers:
         lost = a.question == 2
         reason, met = kinds[a.sample % 2]
-        answers.append(
-            replace(a, verdict=Verdict.LOST, reason=reason, response=met, ngspice="1-9-9")
-            if lost
-            else a
-        )
+        answers.append(replace(a, verdict=Verdict.LOST, reason=reason, response=met) if lost else a)
     assert whole.plan is not None
-    data = replace(whole, answers=tuple(answers), yields=pipeline.yields(whole.plan, answers))
+    heard = [replace(h, response="1-9-9") if h.question == 2 else h for h in whole.heard]
+    data = replace(
+        whole,
+        answers=tuple(answers),
+        yields=pipeline.yields(whole.plan, answers),
+        heard=tuple(heard),
+    )
     text = render_markdown(data)
     assert "lost asymmetric (2), lost to 1-3-3 (2)" in text
     assert "1-2-2 but 1-9-9 (2), 1-3-3 but 1-9-9 (2)" in text
@@ -299,18 +305,17 @@ def test_without_a_study(whole: ReportData) -> None:
 
 def test_without_ngspice(whole: ReportData) -> None:
     checked = tuple(replace(c, gate=None) for c in whole.checked)
-    answers = tuple(replace(a, ngspice="", ngspice_nominal="") for a in whole.answers)
-    text = Page(render_html(replace(whole, checked=checked, answers=answers))).text
+    text = Page(render_html(replace(whole, checked=checked, heard=()))).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text
 
 
 def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportData) -> None:
-    def said(a: Answer) -> Answer:
-        word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(a.sample, a.response)
-        return replace(a, ngspice=word, ngspice_reason=f"why {word}", ngspice_nominal="")
+    def said(h: Hearing) -> Hearing:
+        word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(h.sample, h.response)
+        return replace(h, response=word, reason=f"why {word}")
 
-    data = replace(whole, answers=tuple(map(said, whole.answers)))
+    data = replace(whole, heard=tuple(said(h) for h in whole.heard if h.kind is Kind.OWN))
     table = ngspice_table(data)
     assert table is not None
     for row in table.rows:

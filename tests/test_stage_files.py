@@ -13,10 +13,12 @@ from designer.api import Synthesis
 from designer.bom import bill
 from designer.circuit import Circuit
 from designer.coefficients import coefficient_errors
+from designer.confirmation import hear
 from designer.folder import Folder
+from designer.hearing import ask_random
 from designer.jsonout import dumps, synthesis_json
+from designer.layers import Samples
 from designer.modelfile import ModelFile, read_model_file
-from designer.montecarlo import run_block
 from designer.provenance import provenance
 from designer.report import render_html, render_markdown
 from designer.report_data import ReportData
@@ -100,12 +102,15 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
         plan = pipeline.plan_study(
             first.modelfile, first.design, checked, CATALOG, samples=2, seed=1
         )
-        answers = [a for block in plan.blocks() for a in run_block(plan, block, pool, 2)]
+        answers = Samples(plan, range(2))(2, lambda: None)
+        heard = hear(plan, ask_random(answers), pool, 2)
     for c in checked:
         assert c.gate is not None
         assert c.gate.passed
         assert c.agrees, (c.model.orbit.response, c.circuit.response)
-    assert all(a.agrees is not False for a in answers)
+    known = {(a.sample, a.question): a for a in answers}
+    assert len(heard) == 2 * len(answers)
+    assert all(h.agrees(known[h.sample, h.question]) is not False for h in heard)
     data = ReportData(
         modelfile=first.modelfile,
         design=first.design,
@@ -118,6 +123,7 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
         ],
         provenance=provenance(first.modelfile, CATALOG.hash, seed=1, spread={}),
         command="designer run model.toml",
+        heard=tuple(heard),
     )  # fmt: skip
     page = render_html(data)
     assert render_markdown(data)

@@ -16,14 +16,23 @@ from designer.circuit import Resistor, nominal_board
 from designer.coefficients import coefficient_errors
 from designer.deck import Excitation
 from designer.flow import Flow
+from designer.layers import Samples
 from designer.model import Dimensionless
 from designer.modelfile import Expect, Response
-from designer.montecarlo import run_block
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import Spread, draw
 from designer.system import Drive
-from designer.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield, count, judge
+from designer.verdict import (
+    BLOCK,
+    Answer,
+    Question,
+    StudyPlan,
+    Verdict,
+    Yield,
+    count,
+    judge,
+)
 from tests.test_coefficients import exact_for_paper
 from tests.test_reduction import circuit_of
 
@@ -37,6 +46,10 @@ def periodic(n: int, p: int, q: int, asymmetry: float = 0.0) -> Orbit:
 def wanted(text: str | None, **more: object) -> Response:
     expect = None if text is None else Expect.parse(text)
     return Response(omega=1.0, expect=expect, **more)  # type: ignore[arg-type]
+
+
+def nothing() -> None:
+    return None
 
 
 NOMINAL = periodic(1, 1, 2, 0.3)
@@ -121,15 +134,6 @@ def test_count_sorts_verdicts() -> None:
     assert (got.ok, got.lost, got.grazing, got.failed) == (4, 3, 2, 1)
 
 
-def test_agreement_with_ngspice() -> None:
-    blank = Answer(0, 0, Verdict.OK, "1-1-1", "", 0.0, 0.0, 0.0, 0.0, 0)
-    assert blank.agrees is None
-    assert replace(blank, ngspice="failed").agrees is None
-    assert replace(blank, ngspice="undecided").agrees is None
-    assert replace(blank, ngspice="1-1-1").agrees is True
-    assert replace(blank, ngspice="1-2-2").agrees is False
-
-
 # A small study on the exact rung.
 
 
@@ -151,7 +155,7 @@ def plan(samples: int = 30) -> StudyPlan:
     return StudyPlan(circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 11, samples, tuple(questions))
 
 
-@pytest.mark.parametrize("samples", [1, 24, 25, 26, 50, 73])
+@pytest.mark.parametrize("samples", [1, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK, 3 * BLOCK - 2])
 def test_blocks_cover_every_sample_once(samples: int) -> None:
     blocks = list(replace(plan(), samples=samples).blocks())
     assert [i for block in blocks for i in block] == list(range(samples))
@@ -159,17 +163,17 @@ def test_blocks_cover_every_sample_once(samples: int) -> None:
 
 
 def test_jobs_do_not_change_the_answers() -> None:
-    one = [a for block in plan().blocks() for a in run_block(plan(), block, None, 1)]
-    two = [a for block in plan().blocks() for a in run_block(plan(), block, None, 2)]
+    one = [a for block in plan().blocks() for a in Samples(plan(), block)(1, nothing)]
+    two = [a for block in plan().blocks() for a in Samples(plan(), block)(2, nothing)]
     assert [repr(a) for a in one] == [repr(a) for a in two]
     assert [(a.sample, a.question) for a in one] == [(i, q) for i in range(30) for q in range(2)]
-    longer = run_block(replace(plan(), samples=60), range(25), None, 2)
+    longer = Samples(replace(plan(), samples=60), range(25))(2, nothing)
     assert [repr(a) for a in longer] == [repr(a) for a in one[:50]]
 
 
 def test_answers_are_those_of_the_boards_one_by_one() -> None:
     p = plan()
-    answers = run_block(p, range(5, 9), None, 2)
+    answers = Samples(p, range(5, 9))(2, nothing)
     for a in answers:
         question = p.questions[a.question]
         board = draw(p.circuit, p.spread, p.seed, a.sample)
@@ -189,13 +193,13 @@ def test_answers_are_those_of_the_boards_one_by_one() -> None:
 
 def test_progress_is_called_once_an_answer() -> None:
     calls: list[int] = []
-    answers = run_block(plan(), range(4), None, 2, lambda: calls.append(1))
+    answers = Samples(plan(), range(4))(2, lambda: calls.append(1))
     assert len(calls) == len(answers) == 8
 
 
 def test_a_board_that_cannot_be_reduced_is_failed_with_its_reason() -> None:
     p = plan()
     broken = replace(p.circuit, parts=(*p.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
-    answers = run_block(replace(p, circuit=broken), range(2), None, 1)
+    answers = Samples(replace(p, circuit=broken), range(2))(1, nothing)
     assert {a.verdict for a in answers} <= {Verdict.FAILED}
     assert all(a.reason for a in answers)

@@ -1,0 +1,264 @@
+"""The exact rung and ngspice together: one yield from both, and where they differ.
+
+All N boards have the exact rung's verdict X; some have ngspice's from the nominal orbit too, Y.
+The estimate of ngspice's yield is the difference estimator (the exact rung is the control
+variate), in strata h that the exact rung defines: boards nearest to a boundary, slow ones, the
+rest::
+
+    p = mean of X over all + sum over h of (N_h/N) · mean of (Y - X) over those asked in h
+
+Given the exact answers, those asked in a stratum are a simple random sample of it (the first so
+many indices of independent draws; all of those at a boundary), so the estimate is unbiased. Its
+variance is that of two-phase sampling, S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling
+Techniques, 1977, 12.2 and 7.2; Särndal, Swensson and Wretman, 1992, 9.6). The interval joins the
+terms by the method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27,
+2008, 1693): each enters with its own Wilson limits instead of its standard error, D = +1 and
+D = -1 apart. So fifty boards without a difference do not make the exact rung's interval ngspice's:
+the disagreement may be as large as fifty boards can hide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.stats import norm
+
+from designer.hearing import BOUNDARY_SAMPLES, SLOW, Hearing, Kind, Why, distance
+from designer.orbit import OrbitStatus
+from designer.verdict import Answer, Question, Verdict
+from designer.waveform_orbit import STROBE_TOLERANCE
+
+Z = float(norm.ppf(0.975))
+LONG = 5
+"""Drive periods of an orbit from which on its period counts as long."""
+
+
+class Explanation(StrEnum):
+    """Why two engines may differ on a board."""
+
+    GRAZING = "grazing margin"
+    SLOW = "slow"
+    LONG = "long period"
+    BASIN = "another attractor from the nominal orbit"
+    CLIPPED = "clipped"
+    NONE = "unexplained"
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """One board on which ngspice says another response than the exact rung."""
+
+    sample: int
+    kind: Kind
+    why: Why
+    exact: str
+    ngspice: str
+    distance: float
+    explanation: Explanation
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share with its two-sided 95 % Wilson interval."""
+
+    count: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return wilson(float(self.count), self.of)
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """samples : N_h. asked : n_h, those with an answer. gained, lost : of these, boards that only
+    ngspice calls ok, and that only the exact rung does."""
+
+    name: str
+    samples: int
+    asked: int
+    gained: int
+    lost: int
+    could_gain: int
+    could_lose: int
+
+
+@dataclass(frozen=True)
+class Combined:
+    """The yield by both engines; low, high : 95 %. disagreement : of n-p-q, on the random subset
+    from the nominal orbit. undecided : boards that were asked and have no answer."""
+
+    estimate: float
+    low: float
+    high: float
+    disagreement: Rate
+    undecided: int
+    strata: tuple[Stratum, ...]
+    differences: tuple[Disagreement, ...]
+
+    @property
+    def width(self) -> float:
+        return self.high - self.low
+
+
+def wilson(count: float, of: int) -> tuple[float, float]:
+    """Two-sided 95 % Wilson interval of count/of; ``count`` need not be whole."""
+    if of == 0:
+        return 0.0, 1.0
+    p, n, z2 = count / of, float(of), Z * Z
+    centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
+    half = Z * math.sqrt(max(p * (1.0 - p), 0.0) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
+    return max(centre - half, 0.0), min(centre + half, 1.0)
+
+
+def combine(
+    answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
+) -> Combined | None:
+    """Both engines on one question; None where ngspice has no answer from the nominal orbit.
+
+    answers, heard : of this question, by sample.
+    """
+    mine = {a.sample: a for a in answers if a.verdict is not Verdict.FAILED}
+    theirs = {
+        h.sample: said
+        for h in heard
+        if h.kind is Kind.NOMINAL and (said := h.survives(question)) is not None
+    }
+    theirs = {sample: said for sample, said in theirs.items() if sample in mine}
+    if not theirs:
+        return None
+    strata = tuple(_strata(list(mine.values()), theirs, heard, question))
+    estimate, low, high = interval(sum(a.verdict is Verdict.OK for a in mine.values()), strata)
+    random = [h for h in heard if h.kind is Kind.NOMINAL and h.why in (Why.RANDOM, Why.ALL)]
+    known = {a.sample: a for a in answers}
+    agreed = [h.agrees(known[h.sample]) for h in random if h.sample in known]
+    return Combined(
+        estimate,
+        low,
+        high,
+        Rate(sum(a is False for a in agreed), sum(a is not None for a in agreed)),
+        sum(h.kind is Kind.NOMINAL and not h.decided for h in heard),
+        strata,
+        tuple(differences(answers, heard, question)),
+    )
+
+
+def interval(ok: int, strata: Sequence[Stratum]) -> tuple[float, float, float]:
+    """Estimate and 95 % limits, from ``ok`` boards on the exact rung and the strata."""
+    total = sum(s.samples for s in strata)
+    estimate = ok / total
+    below = above = 0.0
+    for s in strata:
+        share = s.samples / total
+        estimate += share * (s.gained - s.lost) / s.asked
+        gain_below, gain_above = _off(s.gained, s.could_gain, s)
+        loss_below, loss_above = _off(s.lost, s.could_lose, s)
+        below += share**2 * (gain_below**2 + loss_above**2)
+        above += share**2 * (gain_above**2 + loss_below**2)
+    estimate = min(max(estimate, 0.0), 1.0)
+    low, high = wilson(estimate * total, total)
+    return (
+        estimate,
+        max(estimate - math.sqrt((estimate - low) ** 2 + below), 0.0),
+        min(estimate + math.sqrt((high - estimate) ** 2 + above), 1.0),
+    )
+
+
+def _off(count: int, could: int, stratum: Stratum) -> tuple[float, float]:
+    """How far below and above its estimate a rate of differences may be in its stratum.
+
+    could : boards of the stratum that could differ this way: only an ok one can be lost.
+    """
+    if stratum.asked == stratum.samples:
+        return 0.0, 0.0
+    rate = count / stratum.asked
+    low, high = wilson(float(count), stratum.asked)
+    high = max(min(high, could / stratum.samples), rate)
+    # Of a finite number of boards; what was asked is no longer uncertain.
+    finite = math.sqrt(1.0 - stratum.asked / stratum.samples)
+    return finite * (rate - low), finite * (high - rate)
+
+
+def _strata(
+    answers: Sequence[Answer],
+    theirs: dict[int, bool],
+    heard: Iterable[Hearing],
+    question: Question,
+) -> list[Stratum]:
+    """Boundary, slow, rest; one without an answer goes with the rest, the rest with another."""
+    near = set[int]()
+    if any(h.why is Why.BOUNDARY for h in heard):
+        far = sorted((distance(a, question.start), a.sample) for a in answers)
+        near = {sample for d, sample in far[:BOUNDARY_SAMPLES] if d < math.inf}
+    groups: dict[str, list[Answer]] = {"boundary": [], "slow": [], "rest": []}
+    for a in answers:
+        name = "boundary" if a.sample in near else "slow" if a.radius > SLOW else "rest"
+        groups[name].append(a)
+    spoken = [n for n, group in groups.items() if any(a.sample in theirs for a in group)]
+    home = next(name for name in ("rest", "slow", "boundary") if name in spoken)
+    for name, group in groups.items():
+        if name not in spoken:
+            groups[home] = groups[home] + group
+    return [_stratum(name, groups[name], theirs) for name in groups if name in spoken]
+
+
+def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> Stratum:
+    ok = {a.sample: a.verdict is Verdict.OK for a in answers}
+    asked = [sample for sample in ok if sample in theirs]
+    return Stratum(
+        name,
+        len(ok),
+        len(asked),
+        sum(theirs[s] and not ok[s] for s in asked),
+        sum(ok[s] and not theirs[s] for s in asked),
+        sum(not o for o in ok.values()),
+        sum(ok.values()),
+    )
+
+
+def differences(
+    answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
+) -> list[Disagreement]:
+    """Every board on which ngspice says another n-p-q, with what may explain it."""
+    known = {a.sample: a for a in answers}
+    stayed = {
+        h.sample
+        for h in heard
+        if h.kind is Kind.OWN and h.sample in known and h.agrees(known[h.sample])
+    }
+    return [
+        Disagreement(
+            h.sample,
+            h.kind,
+            h.why,
+            known[h.sample].response,
+            h.response,
+            distance(known[h.sample], question.start),
+            _explain(known[h.sample], h, question, h.sample in stayed),
+        )
+        for h in heard
+        if h.sample in known and h.agrees(known[h.sample]) is False
+    ]
+
+
+def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) -> Explanation:
+    """The first that applies: what ngspice cannot resolve comes before what is only unlikely."""
+    extremes = question.start.extremes
+    peak = float(np.abs(extremes[0]).max()) if len(extremes) else math.nan
+    grazes = OrbitStatus.GRAZING in (answer.response, said.response)
+    if grazes or min(answer.penetration, answer.miss) < STROBE_TOLERANCE * peak:
+        return Explanation.GRAZING
+    if answer.response == OrbitStatus.CLIPPED:
+        return Explanation.CLIPPED
+    if said.kind is Kind.NOMINAL and stayed:
+        return Explanation.BASIN
+    if answer.radius > SLOW:
+        return Explanation.SLOW
+    period = answer.response.partition("-")[0]
+    if not period.isdigit() or int(period) >= LONG:
+        return Explanation.LONG
+    return Explanation.NONE

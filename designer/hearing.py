@@ -1,0 +1,177 @@
+"""What ngspice said of a sample, and which samples it is asked about.
+
+Two kinds of run (``designer.confirmation`` says how long): on the sample's *own* orbit of the
+exact circuit rung ngspice only has to stay there; from the *nominal* design's orbit it finds its
+way itself, which makes it a verdict of its own.
+
+Who is asked, for each response: boards are independent draws from (seed, index), so the first few
+are a random subset, and the same one however many samples follow. The boards nearest to losing
+the response are asked besides, since that is where two engines would differ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from designer.orbit import Orbit, OrbitStatus
+from designer.verdict import Answer, Question, Verdict
+
+OWN_SAMPLES = 40
+"""How many samples of each response ngspice repeats from their own orbit (all, where fewer)."""
+NOMINAL_SAMPLES = 50
+"""How many it starts from the nominal orbit, at least."""
+SLOW = 0.9
+"""A multiplier above this makes a sample slow."""
+SLOW_SAMPLES = 200
+"""Every slow one of so many samples starts from the nominal orbit as well."""
+BOUNDARY_SAMPLES = 10
+"""How many of the boards that are nearest to a boundary are asked, from both starts."""
+UNDECIDED = "undecided"
+"""What is heard where the last two step sizes still say different things."""
+
+
+class Kind(StrEnum):
+    """Where ngspice started."""
+
+    OWN = "own"
+    NOMINAL = "nominal"
+
+
+class Why(StrEnum):
+    """Why a sample was asked about."""
+
+    RANDOM = "random"
+    BOUNDARY = "boundary"
+    SLOW = "slow"
+    ALL = "all"
+
+
+@dataclass(frozen=True)
+class Ask:
+    """One run that ngspice is to make."""
+
+    sample: int
+    question: int
+    kind: Kind
+    why: Why
+
+
+@dataclass(frozen=True)
+class Hearing:
+    """What ngspice said about one sample of one response.
+
+    response : n-p-q or status there, "undecided" where two step sizes differ to the last, ""
+    where the way was too long to be asked; ``reason`` then says how long. remedies : those that a
+    run needed to converge, in order. periods : drive periods left out before the run was judged.
+    symmetric : whether its orbit was; False too where it has none.
+    """
+
+    sample: int
+    question: int
+    kind: Kind
+    why: Why
+    response: str
+    reason: str
+    remedies: str
+    periods: int
+    symmetric: bool
+
+    @property
+    def decided(self) -> bool:
+        """Whether ngspice gave an answer."""
+        return self.response not in ("", OrbitStatus.FAILED, UNDECIDED)
+
+    def agrees(self, answer: Answer) -> bool | None:
+        """Whether ngspice names the response that the exact rung names; None without an answer."""
+        return self.response == answer.response if self.decided else None
+
+    def survives(self, question: Question) -> bool | None:
+        """Whether the board shows the wanted response in ngspice; None without an answer."""
+        if not self.decided:
+            return None
+        parts = self.response.split("-")
+        if len(parts) != 3 or not all(part.isdigit() for part in parts):
+            return False
+        n, p, q = (int(part) for part in parts)
+        spec, nominal = question.spec, question.start
+        if spec.expect is not None:
+            wanted = spec.accepts(n, p, q)
+        else:
+            wanted = n == nominal.n and {p, q} == {nominal.p, nominal.q}
+        return wanted and (self.symmetric or not spec.symmetric)
+
+
+def distance(answer: Answer, nominal: Orbit) -> float:
+    """How far a board is from the next boundary, by the exact margins: 0 there, 1 as far as the
+    nominal board.
+
+    The least of 1 - ρ (the orbit loses its stability), the smallest penetration and the nearest
+    miss (an impact goes or comes), each over the nominal board's. inf where there is no orbit, nan
+    margins do not count.
+    """
+    pairs = (
+        (1.0 - answer.radius, 1.0 - nominal.radius),
+        (answer.penetration, nominal.penetration),
+        (answer.miss, nominal.miss),
+    )
+    shares = [
+        mine / theirs
+        for mine, theirs in pairs
+        if math.isfinite(mine) and math.isfinite(theirs) and theirs > 0.0
+    ]
+    return max(min(shares, default=math.inf), 0.0)
+
+
+def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> list[Ask]:
+    """Of the random subset: the first `OWN_SAMPLES` from their own orbit, the first ``nominal``
+    from the nominal orbit, and every slow one of the first `SLOW_SAMPLES`."""
+    asks = []
+    for a in answers:
+        if not _orbits(a):
+            continue
+        if a.sample < OWN_SAMPLES:
+            asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
+        if a.sample < nominal:
+            asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.RANDOM))
+        elif a.sample < SLOW_SAMPLES and a.radius > SLOW:
+            asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.SLOW))
+    return asks
+
+
+def ask_boundary(
+    answers: Iterable[Answer], questions: Sequence[Question], known: Iterable[Ask] = ()
+) -> list[Ask]:
+    """The `BOUNDARY_SAMPLES` boards of each response that are nearest to a boundary, from both
+    starts, without what is ``known``."""
+    near: list[list[tuple[float, int]]] = [[] for _ in questions]
+    for a in answers:
+        far = distance(a, questions[a.question].start) if _orbits(a) else math.inf
+        if far < math.inf:
+            near[a.question].append((far, a.sample))
+    have = {(k.sample, k.question, k.kind) for k in known}
+    return [
+        Ask(sample, question, kind, Why.BOUNDARY)
+        for question, boards in enumerate(near)
+        for _, sample in sorted(boards)[:BOUNDARY_SAMPLES]
+        for kind in Kind
+        if (sample, question, kind) not in have
+    ]
+
+
+def ask_all(answers: Iterable[Answer]) -> list[Ask]:
+    """Every sample from the nominal orbit; the first `OWN_SAMPLES` from their own too."""
+    asks = []
+    for a in answers:
+        if _orbits(a):
+            if a.sample < OWN_SAMPLES:
+                asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
+            asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.ALL))
+    return asks
+
+
+def _orbits(answer: Answer) -> bool:
+    """Whether the exact rung has an attractor, so that ngspice can be told how long to run."""
+    return answer.verdict is not Verdict.FAILED

@@ -1,0 +1,217 @@
+"""A setting of the generator at which a board shows a wanted response: a stated search.
+
+All settings lie inside the bands. The DC offset that centres the board comes first, by
+``designer.centring``; what is then left is a window in frequency and amplitude. In rounds, until
+one works:
+
+1. the centred board, nothing else changed;
+2. the corners and the edge midpoints of the frequency-amplitude band, centred;
+3. halfway between a setting with too few impacts and one with too many, from the nominal orbit and
+   then from the attractor of the one with too few (as on the bench, where the state carries over);
+4. eight settings that fill the band, centred, and halving again;
+5. 24 settings that fill the band of all three, from the nominal orbit, and halving again.
+
+Nothing is random, and no board is asked more than ``MOST_TRIES`` times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from designer.adjustment import AS_BUILT, Adjustment
+from designer.bands import Bands
+from designer.ensemble import Ensemble
+from designer.exact import drive_of
+from designer.orbit import Orbit
+from designer.system import Array
+from designer.verdict import Question, Verdict, judge
+
+AT_ONCE = 8
+"""Settings that are asked before the search looks at what came back, in rounds 2, 4 and 5."""
+HALVED = 4
+"""Pairs of settings halved at once."""
+APART = 0.02
+"""Of the half-bands: settings nearer than this are one."""
+MOST_TRIES = 1 + 8 + 2 * HALVED + AT_ONCE + 2 * HALVED + 3 * AT_ONCE + 2 * HALVED
+
+
+@dataclass(frozen=True)
+class Try:
+    """One setting that a board was asked at, and what it answered."""
+
+    setting: Adjustment
+    orbit: Orbit
+    verdict: Verdict
+    reason: str
+
+    @property
+    def margin(self) -> float:
+        """How far the impacts are from changing their number, in units of the displacement."""
+        return min(self.orbit.penetration, self.orbit.miss)
+
+
+@dataclass
+class Case:
+    """One board, by its place in the ensemble, and one response that it does not show as built.
+
+    centre : the DC offset that centres the board, over the amplitude.
+    """
+
+    board: int
+    question: Question
+    centre: float
+    tries: list[Try] = field(default_factory=list)
+
+    @property
+    def found(self) -> Try | None:
+        """The setting that works with the greatest margin, if any does."""
+        good = [t for t in self.tries if t.verdict is Verdict.OK]
+        return max(good, key=lambda t: t.margin) if good else None
+
+    @property
+    def wanted_rate(self) -> float:
+        """Impacts per drive period that the wanted response has."""
+        spec, nominal = self.question.spec.expect, self.question.start
+        n, p, q = (nominal.n, nominal.p, nominal.q) if spec is None else (spec.n, spec.p, spec.q)
+        return (p + q) / n
+
+    @property
+    def unanswered(self) -> int:
+        """Tries that gave no answer."""
+        return sum(t.verdict is Verdict.FAILED for t in self.tries)
+
+
+Asked = tuple[Adjustment, Array]
+"""A setting, and the state that the board starts from there."""
+
+
+def seek(
+    ensemble: Ensemble, cases: Sequence[Case], bands: Bands, *, jobs: int = 1
+) -> Sequence[Case]:
+    """Ask every case in rounds until it works or the rounds are over; fills in the tries."""
+    for propose in _rounds(bands):
+        asked = [
+            (case, setting, start)
+            for case in cases
+            if case.found is None
+            for setting, start in propose(case)
+        ]
+        if not asked:
+            continue
+        orbits = ensemble.settle(
+            [case.board for case, _, _ in asked],
+            [drive_of(setting.of(case.question.excitation)) for case, setting, _ in asked],
+            np.array([start for _, _, start in asked]),
+            jobs=jobs,
+        )
+        for (case, setting, _), orbit in zip(asked, orbits, strict=True):
+            verdict, reason = judge(orbit, case.question.spec, case.question.start)
+            case.tries.append(Try(setting, orbit, verdict, reason))
+    return cases
+
+
+Round = Callable[[Case], list[Asked]]
+
+
+def _rounds(bands: Bands) -> list[Round]:
+    def listed(points: Array, centred: bool) -> Round:
+        """Points (k, 2 or 3) of the box ± 1 as settings, from the nominal orbit."""
+
+        def propose(case: Case) -> list[Asked]:
+            settings = [
+                Adjustment(
+                    bands.frequency * float(point[0]),
+                    bands.amplitude * float(point[1]),
+                    case.centre if centred else bands.offset * float(point[2]),
+                ).within(bands)
+                for point in points
+            ]
+            start = case.question.start.start
+            return [(s, start) for s in _new(case, settings, bands)]
+
+        return propose
+
+    def halved(follow: bool) -> Round:
+        return lambda case: _halfway(case, bands, follow)
+
+    edge = (-1.0, 0.0, 1.0)
+    frame = np.array([(f, a) for a in edge for f in edge if (f, a) != (0.0, 0.0)])
+    filling, all_three = filled(AT_ONCE, 2), filled(3 * AT_ONCE, 3)
+    halving = [halved(False), halved(True)]
+    return [
+        listed(np.zeros((1, 2)), True),
+        listed(frame, True),
+        *halving,
+        listed(filling, True),
+        *halving,
+        *(listed(all_three[i : i + AT_ONCE], False) for i in range(0, 3 * AT_ONCE, AT_ONCE)),
+        *halving,
+    ]
+
+
+def filled(count: int, dimensions: int) -> Array:
+    """(count, dimensions) points that fill the box ± 1 evenly, however many are taken.
+
+    The additive recurrence with the powers of the root of x^(d+1) = x + 1 (M. Roberts, "The
+    unreasonable effectiveness of quasirandom sequences", 2018).
+    """
+    root = 1.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (dimensions + 1))
+    steps = root ** -np.arange(1.0, dimensions + 1.0)
+    return np.asarray(2.0 * ((0.5 + np.outer(np.arange(1, count + 1), steps)) % 1.0) - 1.0)
+
+
+def _halfway(case: Case, bands: Bands, follow: bool) -> list[Asked]:
+    """Between the nearest settings with too few and with too many impacts.
+
+    follow : start from the attractor of the one with too few; otherwise from the nominal orbit.
+    """
+    rated = [(t, (t.orbit.p + t.orbit.q) / t.orbit.n) for t in case.tries if t.orbit.n]
+    few = [t for t, rate in rated if rate < case.wanted_rate]
+    many = [t for t, rate in rated if rate > case.wanted_rate]
+    pairs = sorted(
+        ((_distance(f.setting, m.setting, bands), i, j) for i, f in enumerate(few)
+         for j, m in enumerate(many)),
+    )  # fmt: skip
+    chosen: list[Asked] = []
+    for _, i, j in pairs:
+        middle = _middle(few[i].setting, many[j].setting)
+        known = [setting for setting, _ in chosen]
+        if not _new(case, [*known, middle], bands)[len(known) :]:
+            continue
+        chosen.append((middle, few[i].orbit.start if follow else case.question.start.start))
+        if len(chosen) == HALVED:
+            break
+    return chosen
+
+
+def _new(case: Case, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
+    """Those that differ from what was tried, from as built and from each other."""
+    known = [AS_BUILT, *(t.setting for t in case.tries)]
+    fresh: list[Adjustment] = []
+    for setting in settings:
+        if all(_distance(setting, other, bands) > APART for other in (*known, *fresh)):
+            fresh.append(setting)
+    return fresh
+
+
+def _middle(a: Adjustment, b: Adjustment) -> Adjustment:
+    return Adjustment(
+        0.5 * (a.frequency + b.frequency),
+        0.5 * (a.amplitude + b.amplitude),
+        0.5 * (a.offset + b.offset),
+    )
+
+
+def _distance(a: Adjustment, b: Adjustment, bands: Bands) -> float:
+    """Largest difference over the half-band; a band of no width has only one value."""
+    pairs = (
+        (a.frequency - b.frequency, bands.frequency),
+        (a.amplitude - b.amplitude, bands.amplitude),
+        (a.offset - b.offset, bands.offset),
+    )
+    return max((abs(d) / width for d, width in pairs if width > 0.0), default=0.0)

@@ -1,0 +1,67 @@
+"""Which study a row on disk belongs to: a hash of everything that decides it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from designer import __version__, confirmation, hearing
+from designer.jsonout import plain
+from designer.verdict import StudyPlan
+
+RULES = {"samples": 1, "ngspice": 1, "tuned": 1, "reached": 1}
+"""Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
+the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of
+the layer, so that rows of the old rules are not taken for rows of the new ones."""
+
+
+def study_hash(
+    plan: StudyPlan, layer: str = "samples", more: Mapping[str, Any] | None = None
+) -> str:
+    """Hash of everything that decides the rows of a layer; not of how many there are.
+
+    Every layer stands on the samples; ngspice's also on its settings. more : what else decides.
+    """
+    said = _samples(plan)
+    if layer != "samples":
+        said["layer"] = [layer, RULES[layer], plain(more or {})]
+    if layer == "ngspice":
+        said["ngspice"] = {
+            "refinements": [confirmation.OWN_REFINEMENTS, confirmation.NOMINAL_REFINEMENTS],
+            "periods": [
+                confirmation.UNKNOWN_PERIODS,
+                confirmation.REMAINDER,
+                confirmation.MOST_PERIODS,
+                confirmation.STRETCH,
+            ],
+            "undecided": hearing.UNDECIDED,
+            "settings": [
+                None if q.settings is None else q.settings.as_dict() for q in plan.questions
+            ],
+        }
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode("ascii")).hexdigest()
+
+
+def _samples(plan: StudyPlan) -> dict[str, Any]:
+    circuit = plan.circuit
+    return {
+        "version": __version__,
+        "rules": RULES["samples"],
+        "parts": [[type(p).__name__, plain(asdict(p))] for p in circuit.parts],
+        "opamp": [circuit.opamp, circuit.gain, circuit.bias, circuit.supply, circuit.saturation],
+        "figures": repr(circuit.figures),
+        "spread": plain(plan.spread.as_dict()),
+        "seed": plan.seed,
+        "questions": [
+            {
+                "spec": asdict(q.spec),
+                "excitation": asdict(q.excitation),
+                "start": [float(v) for v in q.start.start],
+                "nominal": q.start.response,
+            }
+            for q in plan.questions
+        ],
+    }

@@ -1,0 +1,232 @@
+"""The study stage of a design folder: the verbs ``run`` and ``tolerance``.
+
+Nothing here prints; ``designer.commands`` does.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from designer import api, design_files, equation_check
+from designer.api import RunResult, Synthesis
+from designer.catalog import Catalog, load_catalog
+from designer.design_files import load
+from designer.folder import DESIGN, MODEL, REPORTS, TOLERANCE, Folder, StageName
+from designer.job import Outcome, design_inputs, made_from
+from designer.jsonout import dumps, run_json
+from designer.layers import Here, Runner
+from designer.modelfile import ModelFile
+from designer.options import Options
+from designer.preconditions import cores, naming, need_responses, require_ngspice
+from designer.progress import Progress
+from designer.provenance import provenance
+from designer.selection import SOLVER
+from designer.study import Study, check, tolerance
+from designer.study_folder import FolderStores, layers_of, merged, study_files, write_maps
+from designer.study_hash import RULES
+from designer.study_json import study_json
+from designer.workers import SpicePool
+
+SPICE_TIMEOUT = 900.0
+"""The longest that one run of ngspice may take in a study, s: a way of thousands of periods."""
+
+
+def run_into(
+    modelfile: ModelFile,
+    out: Path,
+    options: Options,
+    progress: Progress,
+    command: Callable[[Options], str],
+) -> Outcome:
+    """The verbs ``run`` and ``tolerance``: design, check, study, report.
+
+    command : the command line as the report states it (``Options.command``).
+
+    Raises
+    ------
+    EnvironmentMissing : there is work to do and no ngspice, or no cluster, that it needs.
+    """
+    options.check()
+    need_responses(modelfile)
+    catalog = load_catalog()
+    folder = Folder(out)
+    wanted, options = _study_wanted(folder, modelfile, catalog, options)
+    origin = made_from(folder)
+    if (
+        folder.state("design", wanted["design"][0]) == "other"
+        and origin.get("model") == modelfile.sha256
+        and origin.get("measured") == wanted["design"][0].get("measured")
+        and modelfile.source == out / MODEL
+    ):
+        # A folder that came from elsewhere: its parts stand, whatever can be bought here.
+        progress.note("the catalogue or the tool is not the one this design was made with")
+        wanted["design"] = (origin, wanted["design"][1])
+    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
+    if not todo:
+        answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
+        return Outcome(answer, _satisfied(answer), out, True)
+    began = time.perf_counter()
+    with _Help.of(options, progress) as help_:
+        progress.stage("responses of the model, parts")
+        if "design" in todo:
+            made = api.synthesise(modelfile, catalog)
+            with naming(modelfile):
+                files = design_files.texts(made)
+            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+            design_files.write(folder, made, files)
+            folder.finish("design")
+        else:
+            made = load(folder, modelfile, catalog)
+            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+        design_seconds = time.perf_counter() - began
+        result, blocks = _studied(folder, made, options, help_, progress)
+    result.cost["design_seconds"] = design_seconds
+    said = result.provenance
+    if result.study.maps:
+        write_maps(folder, result.study, said)
+    folder.write(TOLERANCE, dumps(study_json(result.study, said, result.cost, result.equations)))
+    progress.stage("report")
+    from designer.report import write_report  # matplotlib is not needed before this
+    from designer.report_data import ReportData
+
+    write_report(ReportData.of(result, command(options)), *(folder / name for name in REPORTS))
+    assert folder.manifest is not None
+    folder.manifest.provenance = said
+    folder.finish("study", blocks)
+    answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
+    return Outcome(answer, _satisfied(answer), out, False, result)
+
+
+@dataclass(frozen=True)
+class _Help:
+    """What a study is helped by. pool : None where ngspice is not asked. runner : who computes
+    blocks."""
+
+    jobs: int
+    pool: SpicePool | None
+    runner: Runner
+
+    @classmethod
+    @contextmanager
+    def of(cls, options: Options, progress: Progress) -> Iterator[_Help]:
+        """What these options need, found before anything is written.
+
+        Raises
+        ------
+        EnvironmentMissing : it is not there.
+        """
+        jobs = cores() if options.jobs is None else options.jobs
+        with ExitStack() as stack:
+            pool = None
+            if options.rung != "exact":
+                progress.stage("ngspice")
+                pool = stack.enter_context(SpicePool(jobs, timeout=SPICE_TIMEOUT))
+                require_ngspice(pool)
+            runner: Runner = Here(jobs)
+            if options.cluster is not None:
+                from designer.cluster import Cluster
+
+                progress.stage(f"cluster {options.cluster}")
+                runner = stack.enter_context(Cluster(options.cluster))
+            yield cls(jobs, pool, runner)
+
+
+def _studied(
+    folder: Folder, made: Synthesis, options: Options, help_: _Help, progress: Progress
+) -> tuple[RunResult, Iterable[str]]:
+    """Checks and study of a design in its folder, and the files of the study's blocks."""
+    ready = time.perf_counter()
+    equations = None
+    if help_.pool is not None:
+        progress.stage("ngspice, equation check")
+        equations = equation_check.check(made.design, made.found, help_.pool)
+        if not equations.passed:
+            progress.note(f"the netlist does not compute the model's equation: {equations.worst}")
+    checked = check(made, help_.pool, progress)
+    if checked[0].gate is not None and checked[0].gate.passed:
+        folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
+    gated = time.perf_counter()
+    guard = folder.watch()
+    stores = FolderStores(folder.path, guard)
+    study = tolerance(
+        made,
+        samples=options.samples,
+        until=options.until,
+        rung=options.rung,
+        tuned=options.tuned,
+        reached=options.reached,
+        maps=options.maps,
+        seed=options.seed,
+        jobs=help_.jobs,
+        pool=help_.pool,
+        checked=checked,
+        stores=stores,
+        runner=help_.runner,
+        progress=progress,
+    )
+    guard()
+    cost = {
+        "check_seconds": gated - ready,
+        "study_seconds": time.perf_counter() - gated,
+        "blame_seconds": 0.0 if study.blame is None else study.blame.seconds,
+        "maps_seconds": sum(found.seconds for found in study.maps),
+        "jobs": float(help_.jobs),
+    }
+    result = RunResult(
+        made.modelfile,
+        made.catalog,
+        made.found,
+        made.design,
+        checked,
+        study,
+        _study_provenance(made, study, options),
+        cost,
+        equations,
+    )
+    return result, stores.names
+
+
+def _study_wanted(
+    folder: Folder, modelfile: ModelFile, catalog: Catalog, options: Options
+) -> tuple[dict[StageName, tuple[dict[str, Any], list[str]]], Options]:
+    """The stages, and the options with the layers that the folder's study has already."""
+    wanted = design_inputs(modelfile, catalog)
+    inputs = {
+        **wanted["design"][0],
+        "seed": options.seed,
+        "samples": options.samples,
+        "until": options.until,
+    }
+    options = merged(folder, inputs, options)
+    files = study_files(options, len(modelfile.responses))
+    wanted["study"] = ({**inputs, "layers": layers_of(options)}, files)
+    return wanted, options
+
+
+def _study_provenance(made: Synthesis, study: Study, options: Options) -> dict[str, Any]:
+    return provenance(
+        made.modelfile,
+        made.catalog.hash,
+        seed=options.seed,
+        settings={
+            "highs": SOLVER,
+            "rules": RULES,
+            "rung": options.rung,
+            "ngspice": [
+                {"omega": c.model.omega, **c.gate.as_dict()}
+                for c in study.checked
+                if c.gate is not None
+            ],
+        },
+        spread=study.plan.spread.as_dict(),
+    )
+
+
+def _satisfied(answer: Mapping[str, Any]) -> bool:
+    right = answer["equation_check"] is None or answer["equation_check"]["passed"]
+    return right and all(r["found"] and r["engines_agree"] for r in answer["responses"])

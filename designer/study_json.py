@@ -1,0 +1,225 @@
+"""A tolerance study as a JSON object, by the keys of docs/contract.md."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from designer.combined import Combined
+from designer.equation_check import EquationCheck
+from designer.hearing import Hearing
+from designer.jsonout import FORMAT
+from designer.pipeline import Checked
+from designer.reached import Reached
+from designer.study import Study
+from designer.tuning import Tuned
+from designer.verdict import Answer, Verdict, Yield, count
+from designer.yield_maps import YieldMap
+
+MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")
+ORDER = (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED)
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+
+
+def study_json(
+    study: Study,
+    provenance: Mapping[str, Any],
+    cost: Mapping[str, float],
+    equations: EquationCheck | None = None,
+) -> dict[str, Any]:
+    """What ``tolerance`` prints and ``tolerance.json`` holds."""
+    return {
+        "format": FORMAT,
+        "samples": study.plan.samples,
+        "until": study.until,
+        "narrow": study.narrow,
+        "all_on_one_board": {
+            "built": _yield(study.all_on_one_board),
+            "tuned": _yield(study.all_tuned),
+            "reached": _yield(study.all_reached),
+        },
+        "equation_check": None if equations is None else equations.as_dict(),
+        "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
+        "maps": [_map(found) for found in study.maps],
+        "provenance": provenance,
+        "cost": dict(cost),
+    }
+
+
+def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
+    model, ngspice = checked.model, checked.ngspice
+    answers = study.answers_to(index)
+    counted = study.yields[index]
+    row: dict[str, Any] = {
+        "omega": model.omega,
+        "expected": model.expected,
+        "found": model.found,
+        "model": model.orbit.response,
+        "circuit": checked.circuit.response,
+        "ngspice": None if ngspice is None else ngspice.response,
+        "ngspice_reason": "" if ngspice is None else ngspice.reason,
+        "engines_agree": checked.agrees,
+        "symmetric": model.orbit.symmetric,
+        "others": [o.response for o in model.others],
+        "yield": _yield(counted),
+        "rate": None if counted is None else counted.rate,
+        "reasons": _reasons(answers),
+        "margins": margins(answers),
+        "agreement": _agreement(answers, study.heard_of(index)),
+        "combined": _combined(study.combined[index]),
+        "tuned": _tuned(study.tuned_of(index)),
+        "reached": _reached(study, index),
+        "blame": _blame(study, index),
+    }
+    if counted is None:
+        row["left_out"] = study.left_out[index]
+    return row
+
+
+def _yield(counted: Yield | None) -> dict[str, Any] | None:
+    if counted is None:
+        return None
+    low, high = counted.interval
+    return {
+        "ok": counted.ok,
+        "lost": counted.lost,
+        "grazing": counted.grazing,
+        "failed": counted.failed,
+        "samples": counted.samples,
+        "low": low,
+        "high": high,
+    }
+
+
+def _tuned(rows: Sequence[Tuned]) -> dict[str, Any] | None:
+    """What exists within the bands, and under ``bench`` what the bench procedure finds."""
+    if not rows:
+        return None
+    bench = Counter(r.bench_verdict for r in rows)
+    found = Yield(*(bench[verdict] for verdict in ORDER))
+    return {
+        **_counted(count(rows)),
+        "tries": sum(r.tries for r in rows),
+        "reasons": _reasons(rows),
+        "bench": {
+            **_counted(found),
+            "steps": sum(r.bench_steps for r in rows),
+            "seen_where_it_is_not": sum(r.bench_seen and r.bench_verdict != "ok" for r in rows),
+        },
+    }
+
+
+def _reached(study: Study, index: int) -> dict[str, Any] | None:
+    """From power-up by the recipe."""
+    rows = study.reached_of(index)
+    if not rows or study.recipes is None:
+        return None
+    return {
+        **_counted(count(rows)),
+        "reasons": _reasons(rows),
+        "clipped_at_start": sum(r.clipped for r in rows),
+        "recipe": study.recipes[study.asked.index(index)].as_dict(),
+    }
+
+
+def _blame(study: Study, index: int) -> dict[str, Any] | None:
+    if study.blame is None or index not in study.asked:
+        return None
+    found: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
+    return found
+
+
+def _map(found: YieldMap) -> dict[str, Any]:
+    """Without what it cost, which stands with the other costs."""
+    return {key: value for key, value in found.as_dict().items() if key != "cost"}
+
+
+def _counted(counted: Yield) -> dict[str, Any]:
+    return {**(_yield(counted) or {}), "rate": counted.rate}
+
+
+def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str, Any]:
+    """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
+    known = {a.sample: a for a in answers}
+
+    def of(kind: str) -> dict[str, Any]:
+        asked = [h for h in heard if h.kind == kind and h.response]
+        return {
+            "asked": len(asked),
+            "agreed": sum(h.agrees(known[h.sample]) is True for h in asked),
+            "failed": sum(h.response == "failed" for h in asked),
+            "undecided": sum(h.response == "undecided" for h in asked),
+        }
+
+    too_long = [h for h in heard if not h.response]
+    return {
+        **of("own"),
+        "nominal_start": {
+            **of("nominal"),
+            "too_long": len(too_long),
+            "left_out": [{"sample": h.sample, "reason": h.reason} for h in too_long],
+        },
+    }
+
+
+def _combined(both: Combined | None) -> dict[str, Any] | None:
+    if both is None:
+        return None
+    low, high = both.disagreement.interval
+    return {
+        "estimate": both.estimate,
+        "low": both.low,
+        "high": both.high,
+        "disagreement": {
+            "count": both.disagreement.count,
+            "asked": both.disagreement.of,
+            "low": low,
+            "high": high,
+        },
+        "undecided": both.undecided,
+        "strata": [
+            {
+                "name": s.name,
+                "samples": s.samples,
+                "asked": s.asked,
+                "only_ngspice_ok": s.gained,
+                "only_exact_ok": s.lost,
+            }
+            for s in both.strata
+        ],
+        "differences": [dict(d.__dict__) for d in both.differences],
+    }
+
+
+def _reasons(answers: Sequence[Answer | Tuned | Reached]) -> dict[str, int]:
+    """Why boards do not show the response, most frequent first."""
+    met = Counter(
+        f"{a.verdict}: {_kind(a)}" if _kind(a) else str(a.verdict)
+        for a in answers
+        if a.verdict != "ok"
+    )
+    return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _kind(answer: Answer | Tuned | Reached) -> str:
+    """The reason without its figures, so that like ones are counted together."""
+    if answer.reason.startswith("asymmetric by"):
+        return "asymmetric"
+    return answer.reason
+
+
+def margins(answers: Sequence[Answer]) -> dict[str, Any]:
+    """Quantiles of each margin over the boards that are ok; null where none has the margin.
+
+    penetration, miss : V of the moving state; the others are ratios.
+    """
+    ok = [a for a in answers if a.verdict is Verdict.OK]
+    out: dict[str, Any] = {"quantiles": list(QUANTILES), "boards": len(ok)}
+    for name in MARGINS:
+        values = [v for a in ok if math.isfinite(v := float(getattr(a, name)))]
+        out[name] = list(np.quantile(values, QUANTILES)) if values else None
+    return out

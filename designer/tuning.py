@@ -1,0 +1,242 @@
+"""Tuned: which boards show a response at some setting of the generator within the bands.
+
+What exists (``verdict``, by ``designer.setting_search``) and what a person with an oscilloscope
+finds (``bench_verdict``, by ``designer.bench``), for each board and response.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from designer.adjustment import AS_BUILT, Adjustment
+from designer.bands import Bands
+from designer.bench import BenchResult, find_on_bench
+from designer.centring import centring_offset
+from designer.circuit import nominal_board
+from designer.ensemble import Ensemble
+from designer.exact import drive_of
+from designer.orbit import Orbit
+from designer.reduction import FloatingCircuit, Reduction
+from designer.setting_search import MOST_TRIES, Case, seek
+from designer.spread import draw_many
+from designer.threads import parallel
+from designer.verdict import Answer, StudyPlan, Verdict, judge
+
+__all__ = ["MOST_TRIES", "Bands", "Tuned", "tuned_block"]
+
+DIGITS = 6
+"""Decimals of the centring DC offset over the amplitude."""
+_NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """One sample of one response, with the generator free within the bands.
+
+    verdict : ok where some setting works; grazing where none does and one is undecided; lost where
+    none of those tried does; failed where none gave an answer. response, reason : there, or as
+    built where nothing was found. frequency, amplitude, offset : the setting as fractions, see
+    ``Adjustment``; zeros where the board works as built and where nothing was found. tries :
+    settings asked, unanswered of them without an answer. radius, penetration, miss : margins of
+    the orbit found (nan without one).
+
+    bench_verdict : the exact circuit's, at the setting where the simulated person stopped;
+    bench_seen : whether the person saw the wanted pattern there. bench_steps : settings of the
+    generator that it took.
+    """
+
+    sample: int
+    question: int
+    verdict: Verdict
+    response: str
+    reason: str
+    frequency: float
+    amplitude: float
+    offset: float
+    tries: int
+    unanswered: int
+    radius: float
+    penetration: float
+    miss: float
+    bench_verdict: Verdict
+    bench_response: str
+    bench_seen: bool
+    bench_frequency: float
+    bench_amplitude: float
+    bench_offset: float
+    bench_steps: int
+
+    @property
+    def setting(self) -> Adjustment:
+        return Adjustment(self.frequency, self.amplitude, self.offset)
+
+    @property
+    def bench_setting(self) -> Adjustment:
+        return Adjustment(self.bench_frequency, self.bench_amplitude, self.bench_offset)
+
+
+def tuned_block(
+    plan: StudyPlan,
+    indices: range,
+    answers: Sequence[Answer],
+    bands: Bands,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Tuned]:
+    """A row for every board of the block and every question, in order.
+
+    answers : as built, of these boards (others may be among them). progress : called once a row.
+
+    Raises
+    ------
+    KeyError : the answer as built of a board is missing.
+    """
+    known = {(a.sample, a.question): a for a in answers}
+    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+    asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
+    bad = [
+        (i, number) for i, number in asked if known[indices[i], number].verdict is not Verdict.OK
+    ]
+    nominal = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
+
+    def centre(board: int, number: int) -> float:
+        try:
+            volts = centring_offset(ensemble.reduction(board).system(), nominal)
+        except FloatingCircuit:
+            return 0.0
+        return round(volts / plan.questions[number].excitation.amplitude, DIGITS)
+
+    cases = {(i, number): Case(i, plan.questions[number], centre(i, number)) for i, number in bad}
+    seek(ensemble, list(cases.values()), bands, jobs=jobs)
+    benches = _on_bench(
+        plan, indices, ensemble, [known[indices[i], number] for i, number in asked], bands, jobs
+    )
+    rows = []
+    for (i, number), (result, verdict, response) in zip(asked, benches, strict=True):
+        answer, case = known[indices[i], number], cases.get((i, number))
+        rows.append(
+            Tuned(
+                sample=indices[i],
+                question=number,
+                **_outcome(answer, case),
+                bench_verdict=verdict,
+                bench_response=response,
+                bench_seen=result.seen,
+                bench_frequency=result.setting.frequency,
+                bench_amplitude=result.setting.amplitude,
+                bench_offset=result.setting.offset,
+                bench_steps=result.steps,
+            )
+        )
+        progress()
+    return rows
+
+
+def _outcome(answer: Answer, case: Case | None) -> dict[str, Any]:
+    """The columns of what exists: the search's where there was one, else the board's as built."""
+    if case is None or case.found is None:
+        verdict, reason = answer.verdict, answer.reason
+        if case is not None:
+            verdict, reason = _not_found(answer, case)
+        works = verdict is Verdict.OK
+        return _columns(
+            AS_BUILT, case, verdict, answer.response, reason,
+            *((answer.radius, answer.penetration, answer.miss) if works else (_NAN, _NAN, _NAN)),
+        )  # fmt: skip
+    orbit = case.found.orbit
+    return _columns(
+        case.found.setting, case, Verdict.OK, orbit.response, "",
+        orbit.radius, orbit.penetration, orbit.miss,
+    )  # fmt: skip
+
+
+def _not_found(answer: Answer, case: Case) -> tuple[Verdict, str]:
+    met = {answer.verdict, *(t.verdict for t in case.tries)}
+    for verdict in (Verdict.GRAZING, Verdict.LOST):
+        if verdict in met:
+            return verdict, f"at none of {len(case.tries)} settings"
+    return Verdict.FAILED, answer.reason
+
+
+def _columns(
+    setting: Adjustment,
+    case: Case | None,
+    verdict: Verdict,
+    response: str,
+    reason: str,
+    radius: float,
+    penetration: float,
+    miss: float,
+) -> dict[str, Any]:
+    return {
+        "verdict": verdict,
+        "response": response,
+        "reason": reason,
+        "frequency": setting.frequency,
+        "amplitude": setting.amplitude,
+        "offset": setting.offset,
+        "tries": 0 if case is None else len(case.tries),
+        "unanswered": 0 if case is None else case.unanswered,
+        "radius": _kept(radius),
+        "penetration": _kept(penetration),
+        "miss": _kept(miss),
+    }
+
+
+def _on_bench(
+    plan: StudyPlan,
+    indices: range,
+    ensemble: Ensemble,
+    known: Sequence[Answer],
+    bands: Bands,
+    jobs: int,
+) -> list[tuple[BenchResult, Verdict, str]]:
+    """What the person finds on each board, and what it really is: ``known`` are the answers as
+    built, in the rows' order."""
+
+    def play(answer: Answer) -> BenchResult:
+        board = answer.sample - indices.start
+        question = plan.questions[answer.question]
+        try:
+            system = ensemble.reduction(board).system()
+            return find_on_bench(
+                system, question, bands, seed=(plan.seed, answer.sample, answer.question)
+            )
+        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError):
+            return BenchResult(AS_BUILT, question.start.start, False, 0)
+
+    results = list(parallel(play, known, jobs))
+    moved = [k for k, r in enumerate(results) if r.seen and r.setting != AS_BUILT]
+    orbits: dict[int, Orbit] = {}
+    if moved:
+        settled = ensemble.settle(
+            [known[k].sample - indices.start for k in moved],
+            [
+                drive_of(results[k].setting.of(plan.questions[known[k].question].excitation))
+                for k in moved
+            ],
+            np.array([results[k].state for k in moved]),
+            jobs=jobs,
+        )
+        orbits = dict(zip(moved, settled, strict=True))
+    out = []
+    for k, (answer, result) in enumerate(zip(known, results, strict=True)):
+        question = plan.questions[answer.question]
+        if k in orbits:
+            verdict, _ = judge(orbits[k], question.spec, question.start)
+            out.append((result, verdict, orbits[k].response))
+        elif result.seen:
+            out.append((result, answer.verdict, answer.response))
+        else:
+            gone = Verdict.FAILED if answer.verdict is Verdict.FAILED else Verdict.LOST
+            out.append((result, gone, answer.response))
+    return out
+
+
+def _kept(value: float) -> float:
+    """To nine digits, as the margins of an answer."""
+    return float(f"{value:.9g}")

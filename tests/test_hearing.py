@@ -1,0 +1,120 @@
+"""Who is asked in ngspice, and how its word is taken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from designer.deck import Excitation
+from designer.hearing import (
+    BOUNDARY_SAMPLES,
+    NOMINAL_SAMPLES,
+    OWN_SAMPLES,
+    SLOW_SAMPLES,
+    Ask,
+    Hearing,
+    Kind,
+    Why,
+    ask_all,
+    ask_boundary,
+    ask_random,
+    distance,
+)
+from designer.modelfile import Expect, Response
+from designer.orbit import Orbit, OrbitStatus
+from designer.verdict import Answer, Question, Verdict
+
+BLANK = Answer(0, 0, Verdict.OK, "1-2-2", "", 0.5, 1.0, 1.0, 0.0, 40)
+HEARD = Hearing(0, 0, Kind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
+NOMINAL = Orbit(
+    OrbitStatus.PERIODIC, n=1, p=2, q=2, multipliers=np.array([0.5 + 0j]), penetration=2.0, miss=4.0
+)
+
+
+def question(expect: str | None = "1-2-2", nominal: Orbit = NOMINAL, **more: object) -> Question:
+    wanted = None if expect is None else Expect.parse(expect)
+    spec = Response(1.0, wanted, **more)  # type: ignore[arg-type]
+    return Question(spec, Excitation(300.0, 2.0), nominal, None)
+
+
+def test_the_random_subset_and_every_slow_one() -> None:
+    """Fifty at least from the nominal orbit; of two hundred, those above 0.9 too."""
+    radii = {i: 0.95 if i % 3 == 0 else math.nan if i % 3 == 1 else 0.9 for i in range(300)}
+    answers = [replace(BLANK, sample=i, radius=r) for i, r in radii.items()]
+    asks = ask_random(answers)
+    own = [a for a in asks if a.kind is Kind.OWN]
+    assert [a.sample for a in own] == list(range(OWN_SAMPLES))
+    nominal = {a.sample: a.why for a in asks if a.kind is Kind.NOMINAL}
+    assert NOMINAL_SAMPLES >= 50
+    assert nominal == {
+        i: Why.RANDOM if i < NOMINAL_SAMPLES else Why.SLOW
+        for i in range(SLOW_SAMPLES)
+        if i < NOMINAL_SAMPLES or i % 3 == 0
+    }
+    assert ask_random(answers[:60]) == [a for a in asks if a.sample < 60]
+    assert ask_random([replace(BLANK, verdict=Verdict.FAILED)]) == []
+
+
+def test_all_are_asked_where_all_are_wanted() -> None:
+    asks = ask_all(replace(BLANK, sample=i) for i in range(300))
+    assert [a.sample for a in asks if a.kind is Kind.NOMINAL] == list(range(300))
+    assert sum(a.kind is Kind.OWN for a in asks) == OWN_SAMPLES
+
+
+@pytest.mark.parametrize(
+    ("radius", "penetration", "miss", "expected"),
+    [
+        (0.5, 2.0, 4.0, 1.0),
+        (0.9, 2.0, 4.0, 0.2),
+        (0.5, 0.2, 4.0, 0.1),
+        (0.5, 2.0, 0.4, 0.1),
+        (0.5, math.inf, math.inf, 1.0),
+        (0.1, 20.0, 40.0, 1.8),
+        (1.0, 2.0, 4.0, 0.0),
+        (math.nan, math.inf, math.inf, math.inf),
+    ],
+)
+def test_the_distance_is_the_least_margin_over_the_nominal_one(
+    radius: float, penetration: float, miss: float, expected: float
+) -> None:
+    answer = replace(BLANK, radius=radius, penetration=penetration, miss=miss)
+    assert distance(answer, NOMINAL) == pytest.approx(expected)
+
+
+def test_the_nearest_to_a_boundary_are_asked_once() -> None:
+    rng = np.random.default_rng(3)
+    gaps = rng.permutation(400) / 400.0
+    answers = [
+        replace(BLANK, sample=i // 2, question=i % 2, penetration=float(gaps[i]))
+        for i in range(400)
+    ]
+    known = [Ask(i, 0, Kind.OWN, Why.RANDOM) for i in range(200)]
+    asks = ask_boundary(answers, [question(), question()], known)
+    for number in (0, 1):
+        mine = np.argsort(gaps[number::2])[:BOUNDARY_SAMPLES].tolist()
+        for kind in Kind:
+            met = {a.sample for a in asks if a.question == number and a.kind is kind}
+            assert met == (set() if (number, kind) == (0, Kind.OWN) else set(mine))
+    assert {a.why for a in asks} == {Why.BOUNDARY}
+
+
+def test_agreement_and_survival() -> None:
+    assert HEARD.agrees(BLANK) is True
+    assert HEARD.survives(question()) is True
+    for said in ("failed", "undecided", ""):
+        assert replace(HEARD, response=said).agrees(BLANK) is None
+        assert replace(HEARD, response=said).survives(question()) is None
+    for said in ("1-1-1", "aperiodic", "grazing", "not settled"):
+        assert replace(HEARD, response=said).agrees(BLANK) is False
+        assert replace(HEARD, response=said).survives(question()) is False
+    twin = replace(HEARD, response="1-2-1")
+    assert twin.survives(question("1-1-2")) is True
+    assert twin.survives(question("1-1-2", twin="exact")) is False
+    assert twin.survives(question(None, replace(NOMINAL, p=1))) is True
+    assert twin.survives(question(None)) is False
+    wanted = question(symmetric=True)
+    assert HEARD.survives(wanted) is False
+    assert replace(HEARD, symmetric=True).survives(wanted) is True

@@ -1,0 +1,201 @@
+"""The report's part on tolerance: it says what the layers hold, and nothing where they are not."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from designer import pipeline
+from designer.blame import Blame, Corner, Index, NearLimit, ResponseBlame, Subject
+from designer.catalog import load_catalog
+from designer.exact import block
+from designer.margins import Prediction
+from designer.modelfile import read_model_file
+from designer.report import render_html, render_markdown
+from designer.report_data import ReportData
+from designer.report_layers import Layers
+from designer.report_tolerance import facts
+from designer.verdict import Verdict
+from designer.yield_maps import Axis, YieldMap
+from tests.test_report import Page
+
+EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
+HOSTILE = "<b>x</b> | `y`"
+
+
+@dataclass(frozen=True)
+class Row:
+    sample: int
+    question: int
+    verdict: Verdict
+    bench_verdict: Verdict = Verdict.OK
+
+
+@dataclass(frozen=True)
+class Share:
+    count: int = 1
+    of: int = 40
+    interval: tuple[float, float] = (0.004, 0.13)
+
+
+@dataclass(frozen=True)
+class Other:
+    sample: int = 7
+    exact: str = "1-1-1"
+    ngspice: str = "3-3-3"
+    explanation: str = "grazing margin"
+
+
+@dataclass(frozen=True)
+class Together:
+    estimate: float = 0.875
+    low: float = 0.8
+    high: float = 0.925
+    disagreement: Share = Share()
+    differences: tuple[Other, ...] = (Other(),)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    text: str = f"switch on at 500 Hz {HOSTILE}"
+
+
+@pytest.fixture(scope="module")
+def plain() -> ReportData:
+    """Two responses, three boards, no layers."""
+    catalog = load_catalog()
+    modelfile = read_model_file(EXAMPLE)
+    modelfile = replace(modelfile, responses=(modelfile.responses[0], modelfile.responses[2]))
+    found, design = pipeline.design_for(modelfile, catalog)
+    checked = pipeline.check(design, found, None)
+    plan = pipeline.plan_study(modelfile, design, checked, catalog, samples=3, seed=1)
+    answers = tuple(a for a, _ in block(plan, range(3), 2))
+    return ReportData(
+        modelfile,
+        design,
+        checked,
+        pipeline.yields(plan, answers),
+        answers,
+        plan,
+        [],
+        {},
+        "designer",
+    )
+
+
+def blamed(question: int, lost: int) -> ResponseBlame:
+    subjects = (
+        Subject("all offsets", "group", 9, 10, 1, 4),
+        Subject("U3C", "op-amp", 6, 10, 0, 4),
+        Subject("R204", "resistor", 0, 10, 0, 4),
+    )
+    return ResponseBlame(
+        question,
+        lost,
+        subjects if lost else (),
+        (Index("U3C.offset", "U3C", 0.2, 0.6), Index("R204", "R204", 0.1, 0.3)),
+        (NearLimit("stability: a fold", 1.5),),
+        Prediction(80, 20, 2, 3),
+        8,
+        1,
+        Corner(("U3C.offset",), ("high",), -1.0, Verdict.LOST, "2-2-2", 1, 2),
+        f"question {question} sentence {HOSTILE}",
+    )
+
+
+def mapped(question: int) -> YieldMap:
+    ok = np.array([0, 8, 10])
+    nothing = np.zeros_like(ok)
+    return YieldMap(
+        "omega", question, (Axis("omega", (0.8, 0.85, 0.9)),), np.array([False, True, True]), ok,
+        np.array([0, 2, 0]), nothing, nothing, 10, 1, 0.85, (0.82, 0.9), (False, True), 30, 0.1,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def full(plain: ReportData) -> ReportData:
+    tuned = [
+        Row(s, q, Verdict.LOST if (s, q) == (0, 1) else Verdict.OK)
+        for s in range(4)
+        for q in (0, 1)
+    ]
+    reached = [Row(s, 0, Verdict.OK) for s in range(4)] + [Row(9, 1, Verdict.FAILED)]
+    return replace(
+        plain,
+        layers=Layers(
+            tuned=tuned,
+            reached=reached,
+            combined=(Together(), None),
+            recipes=(Recipe(), Recipe("dwell for 2 s")),
+            blame=Blame((blamed(0, 10), blamed(1, 0)), 100, 1, 500, 300, 1.0),
+            maps=(mapped(1),),
+        ),
+    )
+
+
+def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
+    assert {k: v for k, v in facts(plain).items() if v} == {}
+    page = Page(render_html(plain))
+    text = page.text + render_markdown(plain)
+    for heading in ("Which part is to blame", "Where to sit", "As built, tuned", "How to reach"):
+        assert heading not in text
+    assert "#blame" not in {a.get("href") for a in page.named("a")}
+
+
+def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
+    table = facts(full)["kinds_table"]
+    assert table.columns == (
+        "response", "as built", "tuned", "tuned on the bench", "reached", "both engines together",
+    )  # fmt: skip
+    first, second, whole = table.rows
+    assert first[2].startswith("100 % (51 to 100)")  # Wilson's of 4 of 4
+    assert second[2].startswith("75 %")
+    assert first[5] == "87.5 % (80 to 92.5)"
+    assert second[4:] == ("–", "–")
+    assert whole[0] == "all on one board"
+    assert whole[2].startswith("75 %")
+
+
+def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
+    said = facts(full)
+    assert len(said["avoided_table"].rows) == 1
+    (_, lost, groups, parts) = said["avoided_table"].rows[0]
+    assert lost == "10"
+    assert groups == "all offsets: 9 of 10 (60 to 98 %), 1 of 4 ok boards lost"
+    assert parts == "U3C: 6 of 10 (31 to 83 %)"
+    assert said["limit_table"].rows[0][2] == "95 of 100 (2 lost boards missed, 3 false alarms)"
+    assert said["corner_table"].rows[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
+    assert "500 attractors" in said["blame_note"]
+
+
+def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:
+    row = facts(full)["map_table"].rows[0]
+    assert row[1] == "ω"
+    assert row[2] == "0.82 to 0.9 (as far as was looked)"
+    assert row[3].startswith("0.85: 80 %")
+    assert row[4].startswith("0.9: 100 %")
+
+
+def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: ReportData) -> None:
+    html, markdown = render_html(full), render_markdown(full)
+    page = Page(html)
+    assert html == render_html(full)
+    for heading in (
+        "As built, tuned, reached", "Where the engines differ", "How to reach a response",
+        "Which part is to blame", "Losses avoided", "Worst corners", "Where to sit",
+    ):  # fmt: skip
+        assert len(re.findall(rf"<h[23]>{heading}</h[23]>", html)) == 1
+        assert len(re.findall(rf"^##+ {heading}$", markdown, re.M)) == 1
+    assert {"#blame", "#maps"} <= {a.get("href") for a in page.named("a")}
+    assert "<b>x</b>" not in html
+    assert HOSTILE in page.text
+    assert "<b>" not in markdown.replace("\\<", "")
+    alts = [str(a["alt"]) for a in page.named("img")]
+    assert sum("losses" in a for a in alts) == 1
+    assert sum("Sobol" in a for a in alts) == 1
+    assert sum(a.startswith("Yield over omega") for a in alts) == 1
+    assert "board 7: 1-1-1 but 3-3-3 (grazing margin)" in page.text

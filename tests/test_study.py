@@ -1,0 +1,307 @@
+"""A study as a whole: how it grows, what it keeps, and that nothing stops it for good."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from designer import cli, layers, study_work
+from designer.errors import InputError
+from designer.folder import Folder
+from designer.hearing import Hearing, Kind, Why
+from designer.layers import Here, Samples
+from designer.progress import Progress
+from designer.study import Stores, Study
+from designer.study_work import Work
+from designer.verdict import BLOCK, Answer, Verdict
+from tests.test_verdict import plan
+
+ROOT = Path(__file__).resolve().parent.parent
+SMALL = """\
+format = 1
+[model]
+m = 0.5
+k = 0.5
+k0 = 0.95
+c = 0.5
+zeta = 0.1
+f20 = 0.0
+b = 0.25
+[[response]]
+omega = 0.85
+expect = "1-2-2"
+"""
+
+
+# ---------------------------------------------------------------------------------------------
+# Until the intervals are narrow
+
+
+class Fixed:
+    """Stands for `Samples`: board i is ok but for every ``lost``-th."""
+
+    def __init__(self, lost: int) -> None:
+        self.lost = lost
+
+    def __call__(self, _plan: Any, indices: range) -> Any:
+        return lambda jobs, step: [
+            Answer(
+                i, number, Verdict.LOST if i % self.lost == 0 else Verdict.OK,
+                "1-1-1", "", 0.5, 1.0, 1.0, 0.0, 40,
+            )
+            for i in indices
+            for number in range(2)
+        ]  # fmt: skip
+
+
+def grown(until: float, monkeypatch: pytest.MonkeyPatch, lost: int = 10) -> Study:
+    monkeypatch.setattr(layers, "Samples", Fixed(lost))
+    work = Work(1, None, Stores(), Here(1), Progress(), "exact")
+    checked: Any = (None, None)
+    return work.grown(Study(checked, plan(200), (0, 1), {}, (), until=until))
+
+
+@pytest.mark.parametrize("until", [0.2, 0.05, 0.03])
+def test_a_study_grows_to_the_first_edge_that_is_narrow(
+    until: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = grown(until, monkeypatch)
+    assert study.narrow is True
+    assert study.plan.samples % BLOCK == 0
+    assert len(study.answers) == 2 * study.plan.samples
+    assert [a.sample for a in study.answers[::2]] == list(range(study.plan.samples))
+
+    def width(n: int) -> float:
+        """Wilson's, by its closed formula."""
+        p, z = 1.0 - math.ceil(n / 10) / n, 1.959963984540054
+        half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+        return 2.0 * half / (1 + z * z / n)
+
+    assert width(study.plan.samples) < until
+    assert study.plan.samples == BLOCK or width(study.plan.samples - BLOCK) >= until
+
+
+def test_a_study_that_stays_wide_ends_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_work, "MOST_UNTIL", 3 * BLOCK)
+    study = grown(1e-3, monkeypatch)
+    assert study.narrow is False
+    assert study.plan.samples == 3 * BLOCK
+
+
+def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The combined interval counts: exact samples alone cannot make it narrow."""
+    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
+    asked: list[int] = []
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        asked.append(sum(a.kind is Kind.NOMINAL and a.why is Why.RANDOM for a in asks))
+        return [
+            Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
+        ]
+
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(200)
+    questions = tuple(
+        replace(q, spec=replace(q.spec, expect=None), settings=object())  # type: ignore[arg-type]
+        for q in (p.questions[0], p.questions[0])
+    )
+    pool: Any = object()
+    work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
+    checked: Any = (None, None)
+    study = Study(checked, replace(p, questions=questions), (0, 1), {}, (), until=0.05)
+    study = work.grown(study)
+    assert study.narrow is True
+    assert asked[0] == 100
+    assert asked == sorted(asked)
+    assert asked[-1] > 100
+    assert all(both is not None and both.width < 0.05 for both in study.combined)
+
+
+# ---------------------------------------------------------------------------------------------
+# On disk
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("study")
+    (path / "small.toml").write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def exact(home: Path) -> Path:
+    """A design folder with a study on the exact rung."""
+    out = home / "exact"
+    assert cli.status([*_words(home, out), "-q"]) == 0
+    return out
+
+
+def _words(home: Path, out: Path, *more: str) -> list[str]:
+    model = str(home / "small.toml")
+    return ["tolerance", model, "--out", str(out), "--samples", "12", "--rung", "exact", *more]
+
+
+def _files(folder: Path) -> dict[str, object]:
+    """Everything, JSON without its object ``cost``."""
+    out: dict[str, object] = {}
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        name, content = path.relative_to(folder).as_posix(), path.read_bytes()
+        out[name] = content
+        if name.endswith(".json"):
+            out[name] = {k: v for k, v in json.loads(content).items() if k != "cost"}
+    return out
+
+
+def test_the_exact_rung_needs_no_ngspice(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """No program on the path, and a library that is not there."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("NGSPICE_LIBRARY_PATH", str(tmp_path / "none.so"))
+    assert cli.status([*_words(home, tmp_path / "out"), "--json", "-q"]) == 0
+    answer = json.loads(capfd.readouterr().out)
+    (response,) = answer["responses"]
+    assert response["yield"]["samples"] == 12
+    assert response["ngspice"] is None
+    assert response["combined"] is None
+    assert answer["equation_check"] is None
+    assert answer["provenance"]["versions"]["ngspice"] is None
+    words = _words(home, tmp_path / "other")
+    assert cli.status([*words[:-1], "auto", "-q"]) == 3
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.slow
+def test_layers_are_added_and_stay(
+    exact: Path, home: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Another layer needs no --overwrite; asked with fewer, the study shows what it has."""
+    out = tmp_path / "exact"
+    shutil.copytree(exact, out)
+    block = out / "samples.parquet" / "block-000000.parquet"
+    before = block.stat().st_mtime_ns
+    words = _words(home, out)
+    assert cli.status([*words, "--reached", "--json", "-q"]) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["responses"][0]["reached"]["samples"] == 12
+    assert answer["responses"][0]["tuned"] is None
+    assert block.stat().st_mtime_ns == before
+    whole = _files(out)
+    assert "reached.parquet/block-000000.parquet" in whole
+    assert cli.status([*words, "--json", "-q"]) == 0
+    assert json.loads(capfd.readouterr().out) == answer
+    assert _files(out) == whole
+    # At once or one after the other: the same files.
+    once = tmp_path / "once" / "exact"
+    assert cli.status([*_words(home, once), "--reached", "-q"]) == 0
+    assert _files(once) == whole
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--samples", "0"], "--samples"),
+        (["--until", "0"], "--until"),
+        (["--until", "nan"], "--until"),
+        (["--rung", "ideal"], "--rung"),
+        (["--map", "zeta"], "--map"),
+        (["--cluster", "localhost:8786"], "--cluster"),
+        (["--seed", "2"], "seed 1"),
+        (["--samples", "13"], "samples 12"),
+        (["--until", "0.5"], "until None"),
+    ],
+)
+def test_bad_input_writes_nothing(
+    exact: Path, home: Path, words: list[str], said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = _files(exact)
+    assert cli.status([*_words(home, exact), *words, "-q"]) == 2
+    assert said in capfd.readouterr().err
+    assert _files(exact) == before
+
+
+@pytest.mark.parametrize("change", ["gone", "design", "model", "manifest"])
+def test_a_folder_that_changes_under_a_study_is_noticed(
+    exact: Path, tmp_path: Path, change: str
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(exact, out)
+    look = Folder(out).watch()
+    look()
+    if change == "gone":
+        out.rename(tmp_path / "elsewhere")
+    elif change == "manifest":
+        said = json.loads((out / "manifest.json").read_text())
+        said["stages"]["study"]["inputs"]["seed"] = 7
+        (out / "manifest.json").write_text(json.dumps(said))
+    else:
+        path = out / {"design": "design.json", "model": "model.toml"}[change]
+        path.write_text(path.read_text().replace("0.95", "0.96"))
+    expected = {"gone": "No such file", "design": r"design\.json", "model": r"model\.toml"}
+    with pytest.raises(InputError, match=expected.get(change, r"manifest\.json")):
+        look()
+
+
+def test_a_deleted_folder_is_said_at_the_next_block(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    call = Samples.__call__
+
+    def deleted(self: Samples, jobs: int, progress: Any) -> Any:
+        rows = call(self, jobs, progress)
+        shutil.rmtree(out)
+        return rows
+
+    monkeypatch.setattr(Samples, "__call__", deleted)
+    assert cli.status([*_words(home, out), "-q"]) == 2
+    assert "the folder" in capfd.readouterr().err
+    assert not out.exists()
+
+
+# ---------------------------------------------------------------------------------------------
+# Killed
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_a_study_ends_the_same(home: Path, tmp_path: Path) -> None:
+    """All layers, killed six times at random moments, resumed; beside one that nobody disturbed."""
+    more = ["--rung", "auto", "--tuned", "--reached", "--map", "grade", "--jobs", "1"]
+    whole, out = tmp_path / "whole" / "out", tmp_path / "killed" / "out"
+    began = time.monotonic()
+    assert _process(home, whole, *more).wait() == 0
+    took = time.monotonic() - began
+    chance = random.Random(11)
+    kills = 0
+    for _ in range(6):
+        process = _process(home, out, *more, "--resume")
+        try:
+            process.wait(chance.uniform(0.1, 0.5) * took)
+        except subprocess.TimeoutExpired:
+            kills += 1
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    assert kills >= 2
+    assert _process(home, out, *more, "--resume").wait() == 0
+    assert _files(out) == _files(whole)
+    assert not list(out.rglob("*.part"))
+
+
+def _process(home: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "designer", *_words(home, out), *more, "-q"],
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )

@@ -1,0 +1,174 @@
+"""Yield maps against direct settling at single points, and their choices against small tables."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from designer.attractor import settle
+from designer.circuit import nominal_board
+from designer.errors import InputError
+from designer.exact import drive_of
+from designer.flow import Flow
+from designer.map_files import files
+from designer.modelfile import Expect, Response
+from designer.reduction import Reduction
+from designer.spread import Spread, draw
+from designer.verdict import Question, StudyPlan, Verdict, judge
+from designer.yield_maps import SEED_SHIFT, Axis, Over, YieldMap, yield_map
+from tests import paper_cases
+
+B = 0.25
+
+
+@cache
+def plan(p: int = 2) -> StudyPlan:
+    subject = paper_cases.subject(p)
+    spec = Response(omega=paper_cases.OMEGA[p], expect=Expect(1, p, p))
+    question = Question(spec, subject.excitation, subject.orbit, None)
+    spread = Spread(0.01, 0.01, 1e-3, 4e-3)
+    return StudyPlan(subject.reduction.circuit, spread, 3, 10, (question,))
+
+
+@cache
+def over_omega() -> YieldMap:
+    return yield_map(plan(), 0, "omega", B, samples=8, points=4, jobs=2)
+
+
+def made(counts: list[list[int]] | list[int], over: Over = "omega") -> YieldMap:
+    """A map with these numbers of ok boards."""
+    ok, samples = np.array(counts), 10
+    names = {"omega": ("omega",), "b": ("b",), "grade": ("grade",)}.get(over, ("omega", "grade"))
+    axes = tuple(
+        Axis(name, tuple(0.01 * (k + 1) if name == "grade" else 1.0 + 0.1 * k for k in range(n)))
+        for name, n in zip(names, ok.shape, strict=True)
+    )
+    nothing = np.zeros_like(ok)
+    return YieldMap(
+        over, 0, axes, ok >= 0, np.maximum(ok, 0), samples - ok, nothing, nothing, samples, 1, 1.0,
+        None, (False, False), 0, 0.0,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_point_is_what_its_boards_do_from_the_nominal_orbit_there() -> None:
+    found, study = over_omega(), plan()
+    question = study.questions[0]
+    omega = found.axes[0].values
+    assert question.spec.omega in omega
+    assert list(omega) == sorted(omega)
+    for i in (0, len(omega) - 1):
+        ratio = omega[i] / question.spec.omega
+        drive = drive_of(
+            replace(question.excitation, frequency=question.excitation.frequency * ratio)
+        )
+        system = Reduction(study.circuit, nominal_board(study.circuit)).system()
+        start = question.start
+        for at in np.linspace(1.0, ratio, 12)[1:]:
+            between = replace(drive, omega=drive.omega * at / ratio)
+            start = settle(Flow(system, between), start.start)
+        tally = dict.fromkeys(Verdict, 0)
+        for k in range(found.samples):
+            board = draw(study.circuit, study.spread, study.seed + SEED_SHIFT, k)
+            flow = Flow(Reduction(study.circuit, board).system(), drive)
+            tally[judge(settle(flow, start.start), question.spec, question.start)[0]] += 1
+        counted = found.at(i)
+        assert found.there[i]
+        assert (counted.ok, counted.lost) == (tally[Verdict.OK], tally[Verdict.LOST])
+
+
+def test_the_window_ends_where_the_nominal_circuit_loses_the_response() -> None:
+    found, study = over_omega(), plan()
+    assert found.window is not None
+    question = study.questions[0]
+    system = Reduction(study.circuit, nominal_board(study.circuit)).system()
+    for edge, sign, open_ in zip(found.window, (-1.0, 1.0), found.open, strict=True):
+        assert not open_
+        verdicts = []
+        for omega in (edge, edge + sign * 1e-3 * found.used):
+            e = question.excitation
+            drive = drive_of(replace(e, frequency=e.frequency * omega / found.used))
+            orbit = question.start
+            for at in np.linspace(found.used, omega, 40)[1:]:
+                flow = Flow(system, replace(drive, omega=drive.omega * at / omega))
+                orbit = settle(flow, orbit.start) if len(orbit.start) else orbit
+            verdicts.append(judge(orbit, question.spec, question.start)[0] is Verdict.OK)
+        assert verdicts == [True, False]
+
+
+def test_outside_the_window_the_response_is_not_there_and_the_yield_is_0() -> None:
+    found = yield_map(plan(), 0, "omega", B, values=[0.85, 1.3], samples=3)
+    assert found.there.tolist() == [True, False]
+    assert found.window is None
+    assert found.rate[1] == found.low[1] == found.high[1] == 0.0
+    assert (found.ok[1], found.lost[1]) == (0, 0)
+
+
+def test_over_b_the_amplitude_goes_as_its_inverse() -> None:
+    """At b a linear amplitude change: the same as a study whose generator is set so."""
+    study = plan()
+    found = yield_map(study, 0, "b", B, values=[0.24], samples=5)
+    question = study.questions[0]
+    e = question.excitation
+    louder = replace(question, excitation=replace(e, amplitude=e.amplitude * 0.25 / 0.24))
+    system = Reduction(study.circuit, nominal_board(study.circuit)).system()
+    start = settle(Flow(system, drive_of(louder.excitation)), question.start.start)
+    again = yield_map(
+        replace(study, questions=(replace(louder, start=start),)), 0, "b", 0.24, values=[0.24],
+        samples=5,
+    )  # fmt: skip
+    assert found.at(0) == again.at(0)
+
+
+def test_over_the_grade_the_same_numbers_are_drawn() -> None:
+    study = plan()
+    found = yield_map(study, 0, "grade", B, grades=(1e-6, 0.01), samples=6)
+    exact = replace(study, spread=replace(study.spread, resistor=0.01, capacitor=0.01))
+    same = yield_map(exact, 0, "omega", B, values=[found.used], samples=6)
+    assert found.at(1) == same.at(0)
+    both = yield_map(study, 0, "omega-grade", B, values=[0.85], grades=(1e-6, 0.01), samples=6)
+    assert both.ok.shape == (1, 2)
+    assert (both.ok[0] == found.ok).all()
+
+
+def test_the_recommended_setting_is_the_middle_of_the_best() -> None:
+    def chosen(counts: list[list[int]] | list[int], over: Over = "omega") -> list[float]:
+        return [round(v, 9) for v in made(counts, over).recommended]
+
+    assert chosen([3, 10, 10, 10, 4, 10]) == [1.2]
+    assert chosen([3, 5, 9, 4]) == [1.2]
+    assert chosen([10, 10, 8], "grade") == [0.02]
+    assert chosen([[9, 10, 3], [10, 10, 3], [2, 10, 1]], "omega-grade") == [1.1, 0.02]
+
+
+def test_files_hold_what_the_maps_say() -> None:
+    found = [over_omega(), made([10, 8, 2], "grade")]
+    out = files(found, ["ω = 0.85   1-2-2"], {"versions": {"designer": "x"}})
+    assert set(out) == {"maps.json", "map-omega-1.png", "map-grade-1.png"}
+    said = json.loads(out["maps.json"])
+    assert said["format"] == 1
+    assert said["versions"] == {"designer": "x"}
+    assert said["maps"][0]["ok"] == found[0].ok.tolist()
+    assert said["maps"][0]["recommended"] == list(found[0].recommended)
+    assert all(content[:4] == b"\x89PNG" for name, content in out.items() if name.endswith("png"))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"over": "voltage"},
+        {"samples": 0},
+        {"values": []},
+        {"values": [-1.0]},
+        {"over": "grade", "grades": [0.0]},
+        {"points": 0},
+    ],
+)
+def test_what_cannot_be_mapped_is_refused(wrong: dict[str, object]) -> None:
+    asked: dict[str, object] = {"over": "omega", **wrong}
+    with pytest.raises(InputError):
+        yield_map(plan(), 0, b=B, **asked)  # type: ignore[arg-type]
