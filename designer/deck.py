@@ -101,7 +101,6 @@ def write(
 def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, float]) -> list[str]:
     """One element line for each section, the supplies that the model uses, and the model."""
     gain = 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
-    vendors = rung == "full" and circuit.figures is not None and circuit.figures.spice is not None
     lines = [
         opamp_model.instance(
             s.name,
@@ -111,7 +110,6 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
             ib=board.bias.get(s.name, 0.0),
             rails=board.rails[s.name],
             start=outputs.get(s.name, 0.0),
-            gbw=None if vendors else board.gain_bandwidth.get(s.name),
         )
         for s in circuit.sections
     ]

@@ -149,19 +149,16 @@ def instance(
     ib: float,
     rails: tuple[float, float],
     start: float = 0.0,
-    gbw: float | None = None,
     supplies: tuple[str, str] = ("vcc", "vee"),
 ) -> str:
     """The element line of one op-amp.
 
     nets : noninverting input, inverting input, output. rails : output limits [V]. start : output
-    voltage at the start of a transient [V]; ``ideal`` has no memory and takes none. gbw : this
-    section's gain-bandwidth [Hz], for a model of ours with a bandwidth; None: the subcircuit's.
+    voltage at the start of a transient [V]; ``ideal`` has no memory and takes none.
     """
     given = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
     if rung != "ideal":
         given["start"] = start
-        given |= {} if gbw is None else {"gbw": gbw}
     words = " ".join(f"{key}={_n(value)}" for key, value in given.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 

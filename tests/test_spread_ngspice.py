@@ -7,16 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from designer import deck, gate
-from designer.catalog import load_catalog
-from designer.circuit import nominal_board
-from designer.deck import Excitation, SolverSettings
+from designer import gate
+from designer.deck import SolverSettings
 from designer.flow import Flow
 from designer.laws import Uniform
 from designer.ngspice import open_simulator
-from designer.opamp_model import Parameters, Rung, instance, subcircuit
 from designer.orbit import OrbitStatus
-from designer.spice_batch import BatchNgspice
 from designer.spread import Group, Spread, draw
 from tests.stages import stage
 from tests.test_rectifier_ngspice import SCALED, drive_of, subject
@@ -54,48 +50,3 @@ def test_ngspice_runs_the_board_that_the_reduction_solves(index: int) -> None:
         want = asked.reduction.output(circuit.rest, net, exact, u)
         got = np.interp(grid, waves.time, waves.signals[net])
         assert np.abs(got - want)[1:].max() < 2e-3 * np.abs(want).max(), net
-
-
-@pytest.mark.parametrize("rung", ["dynamic", "full"])
-@pytest.mark.parametrize("gbw", [1e6, 3e6, 4.5e6])
-def test_a_section_has_the_gain_bandwidth_of_its_board(rung: Rung, gbw: float) -> None:
-    """A gain of 11 over frequency from ngspice's .ac: 1/(1/11 + j(f/gbw)(1 + jf/f2)), where only
-    ``full`` has the second pole f2."""
-    parameters = Parameters.of(load_catalog().opamp("TL074C"))
-    section = instance(
-        "U1A", ("inp", "inn", "out"), rung=rung, vos=0.0, ib=0.0, rails=(-13.0, 13.0), gbw=gbw
-    )
-    text = "\n".join([
-        "* a gain of eleven", "VCC vcc 0 15", "VEE vee 0 -15", "VIN inp 0 DC 0 AC 1", section,
-        *subcircuit(rung, parameters), "RF out inn 100k", "RG inn 0 10k",
-        ".ac dec 20 1k 3meg", ".end",
-    ])  # fmt: skip
-    phasors = BatchNgspice().analyse(text)[-1].phasors
-    f = phasors["frequency"].real
-    pole = 1.0 + 1j * f / parameters.second_pole if rung == "full" else 1.0
-    wanted = np.abs(1.0 / (1.0 / 11.0 + 1j * f / gbw * pole))
-    assert np.abs(phasors["out"]) == pytest.approx(wanted, rel=0.01, abs=0.01)
-
-
-def test_the_deck_has_each_section_s_own_bandwidth() -> None:
-    circuit = stage("rectifier", "both", SCALED)
-    spread = replace(VARIED, gain_bandwidth=Uniform(2e6, 4e6))
-    board = draw(circuit, spread, 11, 0)
-
-    def element(name: str, rung: Rung) -> str:
-        text = deck.write(
-            circuit, board, Excitation(100.0, 1.0), SolverSettings("trap", 1e-6),
-            title="a board", stop_time=1e-2, rung=rung,
-        )  # fmt: skip
-        return next(line for line in text.splitlines() if line.startswith(f"X{name} "))
-
-    for section in circuit.sections:
-        said = f"gbw={board.gain_bandwidth[section.name]!r}"
-        assert said in element(section.name, "dynamic")
-        assert said in element(section.name, "full")
-        assert "gbw" not in element(section.name, "ideal")
-    nominal = deck.write(
-        circuit, nominal_board(circuit), Excitation(100.0, 1.0), SolverSettings("trap", 1e-6),
-        title="nominal", stop_time=1e-2, rung="dynamic",
-    )  # fmt: skip
-    assert "gbw=" not in "".join(x for x in nominal.splitlines() if x.startswith("XU1A "))
