@@ -147,7 +147,8 @@ class _Rules:
     def shape(self, part: Part, rule: PartRule | None) -> Shape:
         if rule is not None and rule.law is not None:
             return rule.law
-        if isinstance(part, Reference):
+        exact = rule is not None and rule.grade == 0.0  # whatever the others are
+        if exact or isinstance(part, Reference):
             return Shape()
         return self.rules.resistors if isinstance(part, Resistor) else self.rules.capacitors
 

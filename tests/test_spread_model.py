@@ -320,6 +320,15 @@ share = 0.8
         assert part in words_of(spread, SOLD), part
 
 
+def test_an_exact_part_among_picked_ones() -> None:
+    picked = 'resistors = { law = "binned", inner = 0.002 }\n'
+    spread = of(f'{picked}[[spread.part]]\nnames = "R203"\ngrade = 0.0')
+    boards = draw_many(CIRCUIT, spread, 1, range(50))
+    assert set(boards.values["R203"]) == {CIRCUIT.values["R203"]}
+    off = np.abs(boards.values["R204"] / CIRCUIT.values["R204"] - 1.0)
+    assert (off >= 0.002 * (1.0 - 1e-9)).all()
+
+
 def test_ageing_by_the_catalogue() -> None:
     """Thick film at 1 %: 1 % in the endurance test; the C0G capacitors' drift is in no sheet."""
     given_ = '[[spread.part]]\nnames = "capacitors"\nageing = 0.003'

@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from designer import deck, gate
-from designer.circuit import nominal_board
-from designer.deck import Excitation, SolverSettings
+from designer import gate
+from designer.deck import SolverSettings
 from designer.flow import Flow
 from designer.laws import Uniform
 from designer.ngspice import open_simulator
-from designer.opamp_model import Rung
 from designer.orbit import OrbitStatus
 from designer.spread import Group, Spread, draw
 from tests.stages import stage
@@ -52,27 +50,3 @@ def test_ngspice_runs_the_board_that_the_reduction_solves(index: int) -> None:
         want = asked.reduction.output(circuit.rest, net, exact, u)
         got = np.interp(grid, waves.time, waves.signals[net])
         assert np.abs(got - want)[1:].max() < 2e-3 * np.abs(want).max(), net
-
-
-def test_the_deck_has_each_section_s_own_bandwidth() -> None:
-    circuit = stage("rectifier", "both", SCALED)
-    spread = replace(VARIED, gain_bandwidth=Uniform(2e6, 4e6))
-    board = draw(circuit, spread, 11, 0)
-
-    def element(name: str, rung: Rung) -> str:
-        text = deck.write(
-            circuit, board, Excitation(100.0, 1.0), SolverSettings("trap", 1e-6),
-            title="a board", stop_time=1e-2, rung=rung,
-        )  # fmt: skip
-        return next(line for line in text.splitlines() if line.startswith(f"X{name} "))
-
-    for section in circuit.sections:
-        said = f"gbw={board.gain_bandwidth[section.name]!r}"
-        assert said in element(section.name, "dynamic")
-        assert said in element(section.name, "full")
-        assert "gbw" not in element(section.name, "ideal")
-    nominal = deck.write(
-        circuit, nominal_board(circuit), Excitation(100.0, 1.0), SolverSettings("trap", 1e-6),
-        title="nominal", stop_time=1e-2, rung="dynamic",
-    )  # fmt: skip
-    assert "gbw=" not in "".join(x for x in nominal.splitlines() if x.startswith("XU1A "))
