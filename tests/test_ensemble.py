@@ -113,7 +113,7 @@ def test_the_compiled_way_is_the_general_one(kind: str, p: int) -> None:
         assert np.abs(a.impact_velocities - b.impact_velocities).max() < 1e-6 * speed
         assert np.abs(got.trace - want.trace).max() < 1e-9 * peak[0]
         compiled += 1
-    assert compiled >= 6, "the test wants periodic answers"
+    assert compiled >= 4, "the test wants periodic answers"
 
 
 @pytest.mark.parametrize("kind", sorted(STAGES))
