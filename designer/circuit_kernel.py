@@ -516,7 +516,8 @@ def _crossing(table: Float, r: int, k: int, m4: float, work: Float, graze: Float
             return _newton(table, r, o, work)
         if max(max(da, db), middle) + slack < 0.0:
             continue
-        if w < FINEST * h or top + 2 >= ROOM:
+        nothing = max(max(abs(fa), abs(b1)), max(abs(b2), abs(fb))) + rest < TANGENCY
+        if w < FINEST * h or nothing or top + 2 >= ROOM:
             if abs(fa) < TANGENCY:
                 graze[2] += 1.0
             continue

@@ -15,7 +15,7 @@ from types import FrameType
 from typing import Any
 
 CALLS_BACK = "llvmlite.binding.executionengine"
-TEXT = "compiling the exact engine (first use, about 10 s)…"
+TEXT = "compiling the exact engine (first use, up to half a minute)…"
 
 
 @contextmanager

@@ -3,7 +3,8 @@
 The general engine: any number of states and modes, constant terms, guards that see the drive. Each
 step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
 absent or found (see ``designer.flow_kernel``). Four states with one stop pair take the modal fast
-path (``designer.modal``) where only strobes, impact counts and tangents are asked for.
+path (``designer.modal``) where only strobes, impact counts and tangents are asked for; a circuit
+that keeps to its working modes takes that of ``designer.circuit_kernel``.
 """
 
 from __future__ import annotations
@@ -91,6 +92,13 @@ class Flow:
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
+
+    @property
+    def kernel(self) -> str:
+        """Which kernel carries it as long as all is usual: "modal", "circuit" or "general"."""
+        if self._modal is not None:
+            return "modal"
+        return "general" if self._working is None else "circuit"
 
     def run(
         self,

@@ -31,6 +31,8 @@ ORDER = 18
 DONE, UNKNOWN_MODE, TOO_MANY_EVENTS, DIVERGED = 0, 1, 2, 3
 """Return codes of ``advance``."""
 FINEST = 1e-10
+TANGENCY = 1e-13
+"""Of a guard's unit: below it a value is not told from zero."""
 
 
 class Tables(NamedTuple):
@@ -144,8 +146,9 @@ def _first_rise(c: Float, end: float, graze: Float) -> float:
             return a if _value(c, a) > 0.0 else _root(c, a, b)
         if d + bound * r < 0.0:
             continue
-        if r < FINEST:
-            if abs(p) < 1e-13:
+        # A guard that is nothing but rounding over an interval is not cut to its last pieces.
+        if r < FINEST or abs(p) + abs(d) * r + 0.5 * bound * r * r < TANGENCY:
+            if abs(p) < TANGENCY:
                 graze[2] += 1.0
             continue
         left[top], right[top] = m, b

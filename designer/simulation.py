@@ -215,7 +215,7 @@ def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
     nearer than this, in units of x1, count as grazing."""
     peak = float(np.abs(orbit.extremes[0]).max()) if len(orbit.extremes) else float("nan")
     return {
-        "kernel": "general" if flow._modal is None else "modal",
+        "kernel": flow.kernel,
         "undecided_below": attractor.ENGINE_ERROR * peak / unit,
     }
 

@@ -172,3 +172,15 @@ def test_ideal_op_amps_do_without_the_fast_path() -> None:
     one = replace(nominal_board(RECTIFIER), inverse_gain=0.0)
     _, good = working.of_boards(Boards.of(RECTIFIER, [nominal_board(RECTIFIER), one]))
     assert good.tolist() == [True, False]
+
+
+def test_an_ideal_board_that_clips_comes_back() -> None:
+    """At a limit an ideal op-amp's way out is nothing but rounding: it is not cut for ever."""
+    flow = Flow(
+        Reduction(SATURATION, nominal_board(SATURATION, ideal=True)).system(),
+        Drive(2.0 * np.pi * 300.0, 40.0),
+    )
+    run = flow.run(np.zeros(4), 2, measure=True)
+    assert run.clipped_time > 0.0
+    assert run.status in (FlowStatus.DONE, FlowStatus.CHATTER)
+    assert flow.run(np.zeros(4), 2, max_events=10).status is FlowStatus.CHATTER
