@@ -144,7 +144,7 @@ def basins(made: Basins) -> Figure:
         colours = _attractor_colours(made)
         grid = np.array([c.attractor for c in made.cells]).reshape(len(plan.ys), len(plan.xs))
         _cells(axes, plan.xs, plan.ys, grid, colours)
-        handles = []
+        handles: list[Any] = []
         column = (plan.subject.states.index(plan.x), plan.subject.states.index(plan.y))
         flow = plan.subject.settings([plan.changes])[0].flow()
         for a, colour in zip(made.attractors, colours, strict=True):

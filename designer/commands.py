@@ -20,7 +20,9 @@ from designer.progress import Progress, progress_for
 if TYPE_CHECKING:
     from designer.job import Outcome
 
-VERBS = ("run", "synthesise", "synthesize", "simulate", "tolerance", "catalog", "new")
+VERBS = tuple(
+    "run synthesise synthesize simulate bifurcation tolerance reproduce catalog new".split()
+)
 
 app = typer.Typer(
     name="designer",
@@ -374,3 +376,7 @@ def _print_json(answer: object) -> None:
 
     sys.stdout.write(dumps(answer))
     sys.stdout.flush()
+
+
+# The verbs that stand in files of their own register themselves.
+from designer import commands_bifurcation, commands_reproduce  # noqa: E402, F401

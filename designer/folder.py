@@ -30,8 +30,8 @@ REPORTS = ("report.html", "report.md")
 COMPARISON, COMPARISON_PICTURES = "compare.json", ("compare.svg", "compare.png")
 DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "bom.csv", "setup.csv", "scales.csv")
 
-StageName = Literal["design", "study", "comparison"]
-STAGES: tuple[StageName, ...] = ("design", "study", "comparison")
+StageName = Literal["design", "study", "comparison", "sweep", "map", "basins"]
+STAGES: tuple[StageName, ...] = ("design", "study", "comparison", "sweep", "map", "basins")
 OF_DESIGN: tuple[StageName, ...] = ("study", "comparison")
 """Stages that depend on the design, and on it alone."""
 State = Literal["new", "same", "unfinished", "other"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -24,35 +24,17 @@ from designer.system import Array, Drive, PiecewiseLinearSystem
 MODEL_PARAMETERS = ("omega", "b", "k0", "zeta", "m", "k", "c", "f20")
 BOARD_SETTINGS = ("frequency", "omega", "amplitude", "offset")
 """Of the generator: Hz, dimensionless by the design's time scale, V peak, V."""
-
-
-class Subject(Protocol):
-    """What can be swept.
-
-    parameters : names. states : names of the states. units : by parameter, and by "x", "v", "λ",
-    for axes; "" where dimensionless.
-    """
-
-    parameters: tuple[str, ...]
-    states: tuple[str, ...]
-    units: Mapping[str, str]
-
-    def check(self, option: str, name: str, value: float) -> None:
-        """InputError unless the parameter may have this value."""
-
-    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
-        """One for each set of parameters, the others as they stand."""
-
-    def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
-        """(states,) size of the states that starts are drawn from: the same for all changes."""
-
-    def as_dict(self) -> dict[str, object]:
-        """What decides the flow, for hashes and provenance."""
+UNITS = {"frequency": "Hz", "amplitude": "V", "offset": "V", "x": "V", "v": "V", "λ": "1/s"}
+"""Of a board, by parameter, and of the two axes and the exponent of a diagram."""
 
 
 @dataclass
 class ModelSubject:
-    """A model at drive frequency omega (None: it has to be among the changes)."""
+    """A model at drive frequency omega (None: it has to be among the changes).
+
+    parameters : names of what can be swept. states : names. units : by parameter, and by "x", "v"
+    and "λ" for the axes of a diagram; none where dimensionless.
+    """
 
     model: Dimensionless
     omega: float | None = None
@@ -62,6 +44,7 @@ class ModelSubject:
     _batch: ModalBatch = field(default_factory=ModalBatch, repr=False)
 
     def check(self, option: str, name: str, value: float) -> None:
+        """InputError that names the option, unless the parameter may have this value."""
         if name not in self.parameters:
             raise InputError(None, option, name, one_of(name, self.parameters))
         if name == "omega":
@@ -73,6 +56,7 @@ class ModelSubject:
             raise InputError(None, option, value, f"{name}: {error.expected}") from None
 
     def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+        """One for each set of changes, the others as they stand."""
         models, omegas = [], []
         for change in changes:
             models.append(_changed(self.model, change))
@@ -86,6 +70,7 @@ class ModelSubject:
         ]
 
     def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
+        """(states,) size of the states that starts are drawn from: one for all changes."""
         out = np.zeros(4)
         for change in changes:
             omega = change.get("omega", self.omega)
@@ -94,6 +79,7 @@ class ModelSubject:
         return out
 
     def as_dict(self) -> dict[str, object]:
+        """What decides the flow, for hashes and provenance."""
         return {"model": dict(self.model.__dict__), "omega": self.omega}
 
 
@@ -119,16 +105,10 @@ class BoardSubject:
         self.offset = offset
         self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
         self.states = ("v1", "v2", "v3", "v4")
-        self.units: Mapping[str, str] = {
-            "frequency": "Hz",
-            "amplitude": "V",
-            "offset": "V",
-            "x": "V",
-            "v": "V",
-            "λ": "1/s",
-        }
+        self.units: Mapping[str, str] = UNITS
 
     def check(self, option: str, name: str, value: float) -> None:
+        """InputError that names the option, unless the parameter may have this value."""
         if name not in self.parameters:
             raise InputError(None, option, name, one_of(name, self.parameters))
         if not np.isfinite(value):
@@ -146,18 +126,20 @@ class BoardSubject:
             raise InputError(None, option, value, "an amplitude > 0 V")
 
     def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+        """One for each set of changes, the others as they stand."""
         out = []
         for change in changes:
-            drive = drive_of(self._excitation(change))
+            drive = drive_of(self.excitation(change))
             out.append(
                 Setting(lambda d=drive: Flow(self.system, d), drive.period)  # type: ignore[misc]
             )
         return out
 
     def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
+        """(states,) size of the states that starts are drawn from: one for all changes."""
         out = np.zeros(4)
         for change in changes:
-            e = self._excitation(change)
+            e = self.excitation(change)
             b = self.design.model.b * self.design.amplitude() / e.amplitude
             omega = 2.0 * np.pi * e.frequency * self.design.errors.scales.seconds
             model = replace(self.design.model, b=b)
@@ -165,6 +147,7 @@ class BoardSubject:
         return out
 
     def as_dict(self) -> dict[str, object]:
+        """What decides the flow, for hashes and provenance."""
         values = self.design.circuit.values
         return {
             "board": "nominal",
@@ -174,7 +157,8 @@ class BoardSubject:
             "offset": self.offset,
         }
 
-    def _excitation(self, change: Mapping[str, float]) -> Excitation:
+    def excitation(self, change: Mapping[str, float]) -> Excitation:
+        """The generator's setting with these changes."""
         frequency = change.get("frequency", self.frequency)
         if "omega" in change:
             frequency = self.design.errors.scales.frequency(change["omega"])
@@ -184,6 +168,9 @@ class BoardSubject:
             float(change.get("amplitude", self.amplitude)),
             offset=float(change.get("offset", self.offset)),
         )
+
+
+Subject = ModelSubject | BoardSubject
 
 
 def _flow(model: Dimensionless, omega: float) -> Flow:
