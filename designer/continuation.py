@@ -170,7 +170,11 @@ def follow(
         here = points[-1]
         new, solved = None, _step(curve, here.solved, tangent, step)
         if solved is not None and not low <= solved.value <= high:
-            last = _onto(curve, here.solved, solved, low if solved.value < low else high)
+            edge = low if solved.value < low else high
+            if here.value == edge:
+                end = End.LIMIT
+                break
+            last = _onto(curve, here.solved, solved, edge)
             if last is not None and (point := at(curve, last)) is not None:
                 points += [*_between(curve, here, point), point]
                 end = End.LIMIT

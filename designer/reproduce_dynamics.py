@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from designer import bifurcation_plots, dynamics_pictures, family, provenance, sweep
 from designer.attractor import coexisting, settle, starts, twin
 from designer.cascade import Cascade
+from designer.continuation import End
 from designer.dynamics_pictures import Portrait
 from designer.errors import InputError
 from designer.model import Dimensionless
@@ -308,9 +309,18 @@ def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
                 f"| {w.response} {'S' if w.symmetric else 'AS'} | {w.low.value:.6f} | {w.low.why} "
                 f"| {w.high.value:.6f} | {w.high.why} |"
             )
+    lost = sum(b.ends.count(End.LOST) for b in dynamics.found.branches)
     lines += ["", "## Pictures", ""]
+    lines.append(
+        f"{len(dynamics.found.branches)} branches were followed, {sum(_lengths(dynamics))} orbits "
+        f"in all; {lost} of their ends are for want of convergence.\n"
+    )
     lines += [f"![{_CAPTIONS[name]}]({name}.png)\n\n{_CAPTIONS[name]}\n" for name in pictures]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _lengths(dynamics: Dynamics) -> list[int]:
+    return [len(branch.points) for branch in dynamics.found.branches]
 
 
 _CAPTIONS = {

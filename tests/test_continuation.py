@@ -84,6 +84,7 @@ def test_every_parameter_leads_to_the_orbit_that_is_reached_there(parameter: str
     assert branch.parameter == parameter
     last = branch.points[-1]
     assert last.value == far
+    assert len({p.value for p in branch.points}) == len(branch.points)
     names: dict[str, float] = {parameter: far}
     there = replace(TWO_MASSES, **names)  # type: ignore[arg-type]
     reached = settle(flow_at(there, 1.6), np.zeros(4))
