@@ -23,12 +23,14 @@ from enum import StrEnum
 import numpy as np
 from scipy.optimize import brentq
 
-from designer.continuation import Branch, BranchPoint, apart, at
+from designer.continuation import Branch, BranchPoint, at, joined
 from designer.curve import Curve
 from designer.extrema import heights
 
 ROUNDING = 1e-11
 """Of the parameter's size: no error is stated below it; orbits converge to 1e-12 of their peak."""
+ZERO = 1e-3
+"""Of its values on either side: a test function that is more than this at its root jumped."""
 
 
 class Kind(StrEnum):
@@ -49,8 +51,8 @@ class Bifurcation:
     interval of the parameter that was seen to hold the point: the test function has different signs
     (for grazing: the counts of impacts differ) at its ends. point : the orbit there. before,
     after : the branch's responses on either side, in its own order; stable : whether stable there.
-    position : where along the branch: whole part, the number of the point before it. branch : number
-    of the branch among those it was found with.
+    position : where along the branch: whole part, the number of the point before it. branch :
+    number of the branch among those it was found with.
     """
 
     parameter: str
@@ -100,7 +102,7 @@ Test = Callable[[BranchPoint], float]
 
 def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[Kind, Test]]:
     """The test functions that change sign between two points of a branch."""
-    if not curve.symmetric and apart(curve, a) @ apart(curve, b) < 0.0:
+    if joined(curve, a, b):
         return []  # the branch joined its parent: that is where the point is located
     chord = (b.solved.y - a.solved.y) / curve.scale
     eye = np.eye(len(chord) - 1)
@@ -172,6 +174,8 @@ def _locate(
         else:
             return None
         middle = point(root)
+        if kind is not Kind.GRAZING and abs(test(middle)) > ZERO * max(abs(test(a)), abs(test(b))):
+            return None  # a jump over zero: two complex multipliers that became real
         error = _width(point, left, root, float(curve.scale[-1]))
     except ArithmeticError:
         return None

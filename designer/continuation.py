@@ -32,6 +32,8 @@ NEAREST = 1e-9
 """Arclength to which a grazing point is closed in on."""
 FINEST = 2e-5
 """Arclength below which a jump of the multipliers is left as it is."""
+SAME = 1e-7
+"""Of the peak: an orbit no farther than this from its mirror image is symmetric."""
 POINTS = 4000
 """Most steps of one branch in one direction."""
 
@@ -100,18 +102,18 @@ class Branch:
 def start(family: Family, orbit: Orbit, value: float, *, symmetric: bool | None = None) -> Branch:
     """The branch of a single point: an orbit known at a value, solved for anew.
 
-    symmetric : follow by the half-period map; None: if the orbit is symmetric.
+    symmetric : follow by the half-period map; None: if the orbit solved for is symmetric.
 
     Raises
     ------
     ArithmeticError : no orbit is found there.
     """
-    if symmetric is None:
-        has_mirror = family.flow(value).system.mirror is not None
-        symmetric = has_mirror and bool(orbit.symmetric)
-    curve = Curve.through(family, orbit.start, value, orbit.n, symmetric)
+    curve = Curve.through(family, orbit.start, value, orbit.n, bool(symmetric))
     solved = curve.near(orbit.start, value)
     point = None if solved is None else at(curve, solved)
+    odd = orbit.n % 2 == 1 and family.flow(value).system.mirror is not None
+    if symmetric is None and odd and point is not None and point.orbit.asymmetry < SAME:
+        return start(family, point.orbit, value, symmetric=True)
     if point is None:
         raise ArithmeticError(f"no {orbit.response} orbit at {family.parameter} = {value:g}")
     return Branch(curve, (point,), (End.STOPPED, End.STOPPED))
@@ -182,7 +184,7 @@ def follow(
                 end = End.LOST
                 break
             continue
-        if _joined(curve, here, new):
+        if joined(curve, here, new):
             end = End.JOINED
             points.append(new)
             break
@@ -263,8 +265,9 @@ def apart(curve: Curve, point: BranchPoint) -> Array:
     return np.asarray((partner - point.solved.x) / curve.scale[:-1])
 
 
-def _joined(curve: Curve, a: BranchPoint, b: BranchPoint) -> bool:
+def joined(curve: Curve, a: BranchPoint, b: BranchPoint) -> bool:
     """Whether an orbit and its partner changed places between two points."""
     if curve.symmetric:
         return False
-    return bool(apart(curve, a) @ apart(curve, b) < 0.0)
+    one, other = apart(curve, a), apart(curve, b)
+    return bool(one @ other < 0.0 and min(np.abs(one).max(), np.abs(other).max()) > SAME)

@@ -25,8 +25,11 @@ NEWTON = 10
 CONVERGED, STALLED = 1e-12, 1e-9
 """Of the peak: how far the map moves a converged point; where rounding, magnified by the flow,
 stops Newton's method earlier, up to the second."""
-DIFFERENCE = 1e-6
-"""Of the parameter's size: step of the central difference for ∂P/∂λ."""
+SETTLED = 1e-7
+"""Of the peak: nearer than this to the curve ∂P/∂λ is not computed anew."""
+DIFFERENCE = 3e-8
+"""Of the parameter's size: step of the central difference for ∂P/∂λ; wider ones reach across
+grazing points that lie near, narrower ones drown in rounding."""
 
 
 @dataclass(frozen=True)
@@ -117,16 +120,20 @@ class Curve:
         y, last = np.array(y0, dtype=float), np.inf
         centre = np.array(y0 if centre is None else centre, dtype=float)
         size, scale = len(y) - 1, self.scale
+        slope: Array | None = None
         for iteration in range(1, NEWTON + 1):
             if not np.all(np.isfinite(y)) or np.abs(y / scale)[:size].max() > 1e3:
                 return None
             if not self.family.contains(float(y[-1])):
                 return None
             image = self.image(y[:-1], float(y[-1]))
-            slope = self.slope(y[:-1], float(y[-1]))
-            if image is None or slope is None:
+            if image is None:
                 return None
             gap = (image[0] - y[:-1]) / scale[:-1]
+            if slope is None or float(np.abs(gap).max()) > SETTLED:
+                slope = self.slope(y[:-1], float(y[-1]))
+            if slope is None:
+                return None
             matrix = np.zeros((size + 1, size + 1))
             scaled = image[1] * scale[:-1] / scale[:-1, None]
             matrix[:size, :size] = scaled - np.eye(size)

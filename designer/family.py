@@ -19,21 +19,24 @@ from designer.model import Dimensionless
 from designer.responses import FASTEST, SLOWEST
 from designer.system import Drive, PiecewiseLinearSystem
 
+SMALLEST = math.nextafter(0.0, 1.0)
+BELOW_ONE = math.nextafter(1.0, 0.0)
+GREATEST = math.nextafter(math.inf, 0.0)
 DOMAINS = {
     "omega": (SLOWEST, FASTEST),
-    "b": (0.0, math.inf),
-    "k0": (0.0, 1.0),
-    "zeta": (0.0, math.inf),
-    "m": (0.0, 1.0),
-    "k": (0.0, 1.0),
-    "c": (0.0, 1.0),
+    "b": (SMALLEST, GREATEST),
+    "k0": (0.0, BELOW_ONE),
+    "zeta": (SMALLEST, GREATEST),
+    "m": (SMALLEST, BELOW_ONE),
+    "k": (SMALLEST, BELOW_ONE),
+    "c": (0.0, BELOW_ONE),
     "f20": (0.0, 1.0),
 }
-"""Open intervals in which a model's parameter can be followed."""
+"""Closed intervals in which a model's parameter can be followed (``model.Dimensionless``)."""
 SETTINGS = {
-    "frequency": (0.0, math.inf),
-    "amplitude": (0.0, math.inf),
-    "offset": (-math.inf, math.inf),
+    "frequency": (SMALLEST, GREATEST),
+    "amplitude": (0.0, GREATEST),
+    "offset": (-GREATEST, GREATEST),
 }
 """The same for the generator of a board: Hz, V peak, V."""
 KEPT = 8
@@ -44,7 +47,7 @@ KEPT = 8
 class Family:
     """One flow for each value of a parameter.
 
-    parameter : its name. low, high : ends of its open domain. build : makes the flow at a value.
+    parameter : its name. low, high : ends of its domain. build : makes the flow at a value.
     """
 
     parameter: str
@@ -73,7 +76,7 @@ class Family:
 
     def contains(self, value: float) -> bool:
         """Whether the value lies inside the domain."""
-        return self.low < value < self.high
+        return self.low <= value <= self.high
 
 
 def of_model(model: Dimensionless, omega: float, parameter: str) -> Family:

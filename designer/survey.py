@@ -9,7 +9,7 @@ import numpy as np
 
 from designer.attractor import mirrored_strobes
 from designer.bifurcations import Bifurcation, Kind, locate
-from designer.continuation import Branch, End, start, trace
+from designer.continuation import Branch, start, trace
 from designer.curve import Curve
 from designer.family import Family
 from designer.orbit import Orbit, OrbitStatus
@@ -18,8 +18,6 @@ from designer.system import Array
 
 DEPTH = 2
 """Branch switches in a row: a twin's period-doubled orbits, from a symmetric branch."""
-MEETING = 1e-6
-"""Of the parameter's size: two points of a kind nearer than this are one."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +79,8 @@ def survey(
             if deep == depth:
                 continue
             for where in [p for p in points if p.branch == number]:
-                if not _leads(where) or _met(where, branches, parents, number):
-                    continue
-                child = switch(branches[number], where, low, high)
-                if child is not None:
+                child = switch(branches[number], where, low, high) if _leads(where) else None
+                if child is not None and not _known(branches, child):
                     queue.append((add(child, number), deep + 1))
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
@@ -121,13 +117,7 @@ def _leads(where: Bifurcation) -> bool:
     return where.kind in (Kind.PITCHFORK, Kind.DOUBLING) and where.stable[0] != where.stable[1]
 
 
-def _met(where: Bifurcation, branches: list[Branch], parents: list[int], parent: int) -> bool:
-    """Whether a branch that left this parent elsewhere came back to it here."""
-    close = MEETING**0.5 * float(branches[parent].curve.scale[-1])
-    n = (2 if where.kind is Kind.DOUBLING else 1) * branches[parent].curve.n
-    for child, origin in zip(branches, parents, strict=True):
-        if origin != parent or child.ends[1] is not End.JOINED or child.curve.n != n:
-            continue
-        if abs(child.points[-1].value - where.value) < close:
-            return True
-    return False
+def _known(branches: list[Branch], child: Branch) -> bool:
+    """Whether a branch was followed before, from its other end."""
+    middle = child.points[len(child.points) // 2]
+    return any(passes(b, middle.value, middle.orbit) for b in branches)

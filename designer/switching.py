@@ -10,7 +10,7 @@ from designer.curve import Curve
 from designer.orbit import MAX_PERIOD
 from designer.system import Array
 
-ASIDE = (3e-3, 1e-3, 1e-2, 3e-4, 3e-2)
+ASIDE = (3e-3, 1e-3, 1e-2, 3e-4, 3e-2, 1e-4, 3e-5, 1e-5)
 """Arclengths, in scaled units, at which the other branch is looked for, in this order."""
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.attractor import settle
-from designer.bifurcations import Bifurcation, locate
-from designer.continuation import Branch, BranchPoint, start, trace
+from designer.bifurcations import Bifurcation, Kind, locate
+from designer.continuation import Branch, BranchPoint, End, start, trace
 from designer.family import Family
 from designer.orbit import Orbit
+from designer.survey import Survey
 
 OUTSIDE = 5e-4
 """Of the parameter's size: how far past the end of a window its orbit is let go."""
+MEETING = 2e-3
+"""Of the parameter: how far from its parent's bifurcation point a branch's last orbit may be."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,36 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
         symmetric = branch.curve.symmetric
         out.append(Window(branch.parameter, inside[0].response, symmetric, low, high, number))
     return out
+
+
+def all_windows(found: Survey) -> list[Window]:
+    """The windows on every branch; one that reaches to the parent branch ends at its point."""
+    out: list[Window] = []
+    for number, branch in enumerate(found.branches):
+        above = found.parents[number]
+        meetings = [] if above < 0 else _meetings(branch, found.branches[above], found.on(above))
+        out += [
+            replace(w, low=_met(w.low, meetings), high=_met(w.high, meetings))
+            for w in windows(branch, found.on(number), number)
+        ]
+    return sorted(out, key=lambda w: w.low.value)
+
+
+def _meetings(branch: Branch, parent: Branch, points: Sequence[Bifurcation]) -> list[Bifurcation]:
+    """Where branches of this one's period may leave the parent."""
+    kind = Kind.PITCHFORK if branch.curve.n == parent.curve.n else Kind.DOUBLING
+    return [p for p in points if p.kind is kind]
+
+
+def _met(end: WindowEnd, meetings: Sequence[Bifurcation]) -> WindowEnd:
+    """The parent's bifurcation point, for an end where a branch joins its parent."""
+    if end.why != End.JOINED:
+        return end
+    for p in sorted(meetings, key=lambda p: abs(p.value - end.value)):
+        if abs(p.value - end.value) < MEETING * abs(p.value):
+            return WindowEnd(p.value, p.error, str(p.kind), p, p.point.orbit)
+        break
+    return end
 
 
 def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> Window:

@@ -1,0 +1,206 @@
+"""What the paper says of the model's dynamics, against what is found.
+
+Each statement is judged by the branches and windows that were followed, not by figures written
+down here; only the paper's own words and figures are.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from designer.bifurcations import Bifurcation, Kind
+from designer.cascade import Cascade, cascade
+from designer.orbit import Orbit
+from designer.survey import Survey
+from designer.windows import Window
+
+AGREES, IN_PART, DISAGREES = "agrees", "in part", "disagrees"
+PITCHFORK = 1.47
+"""Of the symmetric 1-1-1, as the paper gives it."""
+SWEEP = "designer bifurcation examples/paper.toml"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """paper : what it says, and where. found : here. verdict : "agrees", "in part" or "disagrees".
+    command : that shows it."""
+
+    paper: str
+    found: str
+    verdict: str
+    command: str
+
+    def as_dict(self) -> dict[str, object]:
+        return dict(self.__dict__)
+
+
+def main_windows(windows: Sequence[Window], p: int) -> tuple[Window | None, Window | None]:
+    """The widest symmetric window of 1-p-p, and the widest of its twins."""
+    name = f"1-{p}-{p}"
+    out = []
+    for symmetric in (True, False):
+        own = [w for w in windows if w.response == name and w.symmetric is symmetric]
+        out.append(max(own, key=lambda w: w.width, default=None))
+    return out[0], out[1]
+
+
+def statements(
+    found: Survey, windows: Sequence[Window], chatter: Sequence[tuple[float, Orbit]]
+) -> list[Statement]:
+    """Every statement, in the paper's order.
+
+    chatter : frequencies with the orbit reached from rest there, highest first.
+    """
+    symmetric, twins = main_windows(windows, 1)
+    assert symmetric is not None
+    assert twins is not None
+    out = [_pitchfork(symmetric), _first_end(found, windows, twins)]
+    out += [_doublings(windows), _second(windows), _twins(windows), _order(windows)]
+    out.append(_chattering(windows, chatter))
+    return out
+
+
+def _pitchfork(symmetric: Window) -> Statement:
+    end = symmetric.low
+    same = end.why == Kind.PITCHFORK
+    close = abs(end.value - PITCHFORK) < 0.005
+    return Statement(
+        f"Sec. 4: as ω falls 1-1-1 loses its symmetry in a pitchfork at ω = {PITCHFORK}, where the "
+        "largest exponent is 0",
+        f"A {end.why} at ω = {end.value:.6f}; the multiplier is 1 there, so the exponent is 0. The "
+        f"paper's figure is {abs(PITCHFORK / end.value - 1.0):.1%} off",
+        (AGREES if close else IN_PART) if same else DISAGREES,
+        f"{SWEEP} --from 1.4 --to 1.6 --steps 201 --down --out out/pitchfork",
+    )
+
+
+def _first_end(found: Survey, windows: Sequence[Window], twins: Window) -> Statement:
+    way = cascade(windows, twins)
+    touch = _grazing(found, twins)
+    grazed = ""
+    if touch is not None:
+        state = "stable" if touch.stable[0] and touch.stable[1] else "unstable"
+        grazed = (
+            f". The 1-1-1AS orbit itself touches the stop only at ω = {touch.value:.5f}, "
+            f"{state} by then"
+        )
+    return Statement(
+        "Sec. 4: grazing turns 1-1-1AS into 1-1-2, whose period doublings lead to chaos",
+        f"A {twins.low.why} at ω = {twins.low.value:.5f} ends 1-1-1AS. Going on down: "
+        f"{way.describe()}{grazed}",
+        AGREES if twins.low.why == Kind.GRAZING else DISAGREES,
+        f"{SWEEP} --from 1.28 --to 1.4 --steps 601 --down --out out/first-cascade",
+    )
+
+
+def _grazing(found: Survey, twins: Window) -> Bifurcation | None:
+    """Where the orbits beyond a window's lower end first touch a stop once more."""
+    end = twins.low.point
+    if end is None:
+        return None
+    touches = [p for p in found.on(twins.branch) if p.kind is Kind.GRAZING]
+    return min(touches, key=lambda p: abs(p.position - end.position), default=None)
+
+
+def _doublings(windows: Sequence[Window]) -> Statement:
+    own = [w for w in windows if w.response in ("1-1-2", "1-2-1")]
+    if not own:
+        return Statement("1-1-2", "No stable 1-1-2 was met", DISAGREES, SWEEP)
+    main = max(own, key=lambda w: w.width)
+    way = cascade(windows, main)
+    names = [w.response for w in way.steps]
+    fine = len(names) > 1 and names[1] in ("2-2-4", "2-4-2")
+    return Statement(
+        "Sec. 4: 1-1-2 → 2-2-4 → 4-4-8 → … → chaos by period doublings",
+        f"1-1-2 is stable from ω = {main.low.value:.5f} to {main.high.value:.5f}, and begins in a "
+        f"{main.high.why}: it coexists with the other responses and does not come out of 1-1-1AS. "
+        f"Down from there: {way.describe()}",
+        (AGREES if main.high.why == Kind.GRAZING else IN_PART) if fine else DISAGREES,
+        f"{SWEEP} --from 1.28 --to 1.4 --steps 601 --starts 8 --out out/second-attractor",
+    )
+
+
+def _second(windows: Sequence[Window]) -> Statement:
+    symmetric, twins = main_windows(windows, 2)
+    if symmetric is None:
+        return Statement("1-2-2", "No stable 1-2-2 was met", DISAGREES, SWEEP)
+    way = cascade(windows, symmetric)
+    names = [w.response for w in way.steps]
+    fine = twins is not None and "2-4-4" in names
+    only = names[:2] == ["1-2-2", "2-4-4"]
+    return Statement(
+        "Sec. 4: chaos gives way to 1-2-2, which doubles its period to 2-4-4, 4-8-8, … to chaos",
+        f"1-2-2 begins in a {symmetric.high.why} at ω = {symmetric.high.value:.5f}. Down from "
+        f"there: {way.describe()}. The loss of symmetry before the first doubling is not in the "
+        "paper's chain, though its Fig. 3 shows the twins",
+        AGREES if only else IN_PART if fine else DISAGREES,
+        f"{SWEEP} --from 0.6 --to 0.95 --steps 701 --down --out out/second-window",
+    )
+
+
+def _twins(windows: Sequence[Window]) -> Statement:
+    having: list[int] = []
+    lacking: list[int] = []
+    for p in range(2, 9):
+        (lacking if main_windows(windows, p)[1] is None else having).append(p)
+    words = f"Stable 1-p-p twins were found for p = {_list(having)}"
+    if lacking:
+        words += f"; none for p = {_list(lacking)}"
+    return Statement(
+        "Sec. 4 and Fig. 3: for p ≥ 2 as well two antisymmetric trajectories appear, by the start",
+        words,
+        AGREES if not lacking else IN_PART if having else DISAGREES,
+        "designer reproduce dynamics --out out/paper-dynamics",
+    )
+
+
+def _order(windows: Sequence[Window]) -> Statement:
+    tops = [(p, main_windows(windows, p)[0]) for p in range(1, 9)]
+    there = [(p, w) for p, w in tops if w is not None]
+    falling = all(a[1].high.value > b[1].high.value for a, b in itertools.pairwise(there))
+    gaps = all(a[1].low.value > b[1].high.value for a, b in itertools.pairwise(there))
+    complete = len(there) == len(tops)
+    return Statement(
+        "Sec. 4: 1-1-1, chaos, 1-2-2, chaos, … 1-p-p in turn as ω falls",
+        f"Symmetric windows of p = {_list([p for p, _ in there])}, "
+        + ("each below the one before" if falling else "not in this order")
+        + ("; their main windows do not overlap" if gaps else "; some overlap")
+        + ". What begins each of them from above: "
+        + ", ".join(f"{p}: {w.high.why}" for p, w in there),
+        AGREES if complete and falling and gaps else IN_PART,
+        f"{SWEEP} --from 0.1 --to 1.8 --steps 1801 --down --out out/fig2",
+    )
+
+
+def _chattering(windows: Sequence[Window], chatter: Sequence[tuple[float, Orbit]]) -> Statement:
+    shown = ", ".join(f"{orbit.response} at {w:g}" for w, orbit in chatter)
+    most = max((w for w in windows if w.symmetric), key=lambda w: int(w.response.split("-")[1]))
+    lowest, orbit = chatter[-1]
+    speeds = orbit.impact_velocities[orbit.impact_sides > 0.0]
+    grows = orbit.p >= int(most.response.split("-")[1])
+    return Statement(
+        "Sec. 4: as ω falls further p grows until the impacts become chattering",
+        f"The most impacts of a symmetric response are those of {most.response} (ω = "
+        f"{most.low.value:.4f} to {most.high.value:.4f}). From rest: {shown}. At ω = {lowest:g} "
+        f"contact with the upper stop begins with the speeds "
+        f"{', '.join(f'{abs(v):.2g}' for v in speeds)}: bounces that die out, finite in number, as "
+        "they must be on a soft stop, after which the mass stays on it until the force turns",
+        AGREES if grows else IN_PART,
+        f"designer simulate examples/paper.toml --omega {lowest:g}",
+    )
+
+
+def _list(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers)) if numbers else "none"
+
+
+def main_cascades(windows: Sequence[Window]) -> dict[int, Cascade]:
+    """For each p what 1-p-p goes over into as ω falls, from its main symmetric window on."""
+    out = {}
+    for p in range(1, 9):
+        first = main_windows(windows, p)[0]
+        if first is not None:
+            out[p] = cascade(windows, first)
+    return out
