@@ -187,10 +187,10 @@ def test_goes_on_after_a_kill(model: Path, tmp_path: Path, tracks: list[str]) ->
         "--steps",
         "450",
     ]
-    words += ["--periods", "200", "--no-points", *tracks]
+    words += ["--periods", "400", "--no-points", *tracks]
     assert _finished(*words, "--out", whole)[0] == 0
     blocks = len(list((whole / "sweep.parquet").iterdir()))
-    for number, (count, how) in enumerate(((2, signal.SIGKILL), (5, signal.SIGINT))):
+    for number, (count, how) in enumerate(((2, signal.SIGKILL), (9, signal.SIGINT))):
         process = _process(*words, "--out", out, *(["--resume"] if number else []))
         while process.poll() is None:
             if len(list((out / "sweep.parquet").glob("*-0*.parquet"))) >= count:
