@@ -182,7 +182,8 @@ class PartFamily:
     """Parts of one kind, grade and case that differ in their value.
 
     ``values`` [Ω or F] are those that can be bought, ascending; temperature_coefficient [1/K] is a
-    magnitude; ``assumed`` says in words what could not be compared with a data sheet.
+    magnitude; ``assumed`` says in words what could not be compared with a data sheet. drift : most
+    that a value changes in the data sheet's endurance test, a fraction; None where not known.
     """
 
     name: str
@@ -200,6 +201,7 @@ class PartFamily:
     sources: tuple[str, ...]
     assumed: tuple[str, ...]
     values: tuple[float, ...] = field(repr=False)
+    drift: float | None = None
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def _cell(key: str, cell: str) -> object:
         return {word.partition("=")[0]: word.partition("=")[2] for word in cell.split()}
     if key == "price":
         return int(cell) if cell.isdecimal() and cell.isascii() else cell
-    if key in ("grade", "temperature_coefficient"):
+    if key in ("grade", "temperature_coefficient", "drift"):
         try:
             return parse_quantity(cell, "")
         except ValueError:
@@ -161,6 +161,7 @@ def _family(table: FamilyTable, file: str, place: str) -> PartFamily:
         sources=table.sources,
         assumed=table.assumed,
         values=values,
+        drift=table.drift,
     )
 
 

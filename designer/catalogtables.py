@@ -172,6 +172,9 @@ class FamilyTable(BaseModel):
     temperature_coefficient: Annotated[
         float, number("", "a number >= 0, per kelvin: 100e-6", lambda value: value >= 0.0)
     ]
+    drift: Annotated[
+        float | None, number("", "a fraction in [0, 1): 0.005 is 0.5 %", lambda v: 0.0 <= v < 1.0)
+    ] = None
     rating: RatingTable = Field(RatingTable(), description="a table of power and voltage")
     footprint: Annotated[str, _footprint()]
     dielectric: Annotated[str, line("text of one line: what it is made of")]

@@ -6,6 +6,7 @@ the term of Eq. (10) that they realise.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -197,6 +198,11 @@ class Circuit:
         if len(set(names)) != len(names):
             twice = sorted({n for n in names if names.count(n) > 1})
             raise InputError(None, "circuit.parts", ", ".join(twice), "each reference once")
+
+    @property
+    def gain_bandwidth(self) -> float:
+        """Typical gain-bandwidth of the op-amp [Hz]; nan where its figures are not known."""
+        return self.figures.gbw.nominal if self.figures is not None else math.nan
 
     @property
     def resistors(self) -> tuple[Resistor, ...]:

@@ -19,6 +19,7 @@ from designer.design import Certificate, Check, Design
 from designer.errors import InputError
 from designer.folder import DESIGN, MODEL, Folder
 from designer.jsonout import dumps, synthesis_json
+from designer.measured import MEASURED
 from designer.modelfile import ModelFile, Response
 from designer.pipeline import Checked, nominal_reduction
 from designer.preconditions import cores, naming
@@ -46,6 +47,8 @@ def texts(made: Synthesis) -> dict[str, str]:
 def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str, Any]:
     for name, text in files.items():
         folder.write(name, text)
+    if made.modelfile.measured is not None:
+        folder.write(MEASURED, made.modelfile.measured.content)
     folder.write(
         DESIGN,
         dumps(

@@ -37,6 +37,7 @@ from designer.jsonout import (
     simulate_json,
     synthesis_json,
 )
+from designer.measured import MEASURED
 from designer.modelfile import ModelFile, read_model_file
 from designer.opamp_model import Rung
 from designer.options import Options as Options
@@ -60,6 +61,12 @@ class Outcome:
     result: RunResult | None = None
 
 
+def model_file(path: Path) -> ModelFile:
+    """Read a model file; a design folder's has its measured values from the folder's own copy."""
+    inside = path.name == MODEL and is_design_folder(path.parent)
+    return read_model_file(path, measured=path.parent / MEASURED if inside else None)
+
+
 def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
     """The model file of a verb's argument (a model file or a design folder), and where to write.
 
@@ -68,7 +75,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
     InputError : neither, or a model file without ``out``.
     """
     if not path.is_dir():
-        modelfile = read_model_file(path)
+        modelfile = model_file(path)
         if out is None:
             raise InputError(
                 None, "--out", "nothing", "a folder to write into: this verb writes a design folder"
@@ -79,7 +86,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
             path, "the folder", "no manifest.json", "a model file (TOML) or a design folder"
         )
     folder = Folder(path)
-    modelfile = read_model_file(path / MODEL)
+    modelfile = model_file(path / MODEL)
     if made_from(folder).get("model") != modelfile.sha256:
         raise InputError(
             path / MODEL,
@@ -158,7 +165,7 @@ def simulate_answer(
         if engine != "model":
             made = load(Folder(path), modelfile, catalog)
     else:
-        modelfile = read_model_file(path)
+        modelfile = model_file(path)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
     names = simulate_plots.names([w for w in wanted if w is not None])
     if plots is not None:
@@ -201,7 +208,11 @@ def design_inputs(
         "catalogue": catalog.hash,
         "version": __version__,
     }
-    return {"design": (inputs, list(DESIGN_FILES))}
+    files = list(DESIGN_FILES)
+    if modelfile.measured is not None:
+        inputs["measured"] = modelfile.measured.sha256
+        files.append(MEASURED)
+    return {"design": (inputs, files)}
 
 
 def _all_found(answer: Mapping[str, Any]) -> bool:

@@ -20,7 +20,7 @@ import hashlib
 import math
 import re
 import stat
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
@@ -29,7 +29,9 @@ from pydantic import BaseModel, Field
 from designer.bands import Bands
 from designer.circuitspec import CircuitSpec, CircuitTable
 from designer.errors import InputError
+from designer.measured import Measured, read_measured
 from designer.model import Dimensionless, Mechanical, Sides
+from designer.paths import inside
 from designer.schema import (
     STRICT,
     Accepts,
@@ -44,6 +46,7 @@ from designer.schema import (
     shown,
     span,
 )
+from designer.spreadspec import BENCH_1, SpreadSpec, SpreadTable
 
 __all__ = [
     "MAX_BYTES",
@@ -52,6 +55,7 @@ __all__ = [
     "Expect",
     "ModelFile",
     "Response",
+    "SpreadSpec",
     "Twin",
     "parse_model_file",
     "read_model_file",
@@ -122,7 +126,7 @@ class ModelFile:
     """A model file that has passed every check.
 
     ``model`` is always filled, from ``mechanical`` where that is what the file gives; ``text`` is
-    the file word for word.
+    the file word for word. measured : the list that ``spread.measured`` names; read with the file.
     """
 
     title: str
@@ -132,6 +136,8 @@ class ModelFile:
     circuit: CircuitSpec
     text: str = field(repr=False)
     source: Path | None = None
+    spread: SpreadSpec = BENCH_1
+    measured: Measured | None = None
     tuning: Bands = field(default_factory=Bands)
 
     @property
@@ -140,8 +146,10 @@ class ModelFile:
         return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
 
 
-def read_model_file(path: Path) -> ModelFile:
-    """Read and check a model file.
+def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
+    """Read and check a model file, and the list of measured values that it names, if any.
+
+    measured : where that list lies, if not where the file says.
 
     Raises
     ------
@@ -172,7 +180,15 @@ def read_model_file(path: Path) -> ModelFile:
         raise InputError(
             path, f"line {row}", f"byte 0x{content[error.start]:02x}", "text in UTF-8"
         ) from None
-    return parse_model_file(text, path)
+    modelfile = parse_model_file(text, path)
+    named = modelfile.spread.measured
+    if named is None:
+        return modelfile
+    try:
+        place = measured or inside(path.parent, named, "spread.measured")
+    except InputError as error:
+        raise InputError(path, error.field, error.found, error.expected) from None
+    return replace(modelfile, measured=read_measured(place))
 
 
 def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
@@ -197,9 +213,12 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
             circuit.saturation,
             f"a voltage within the supply of {circuit.supply:g} V",
         )
+    spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
     title = tables.title or (source.stem if source is not None else "untitled")
     tuning = Bands(**dict(tables.tuning))
-    return ModelFile(title, model, mechanical, responses, circuit, text, source, tuning)
+    return ModelFile(
+        title, model, mechanical, responses, circuit, text, source, spread, tuning=tuning
+    )
 
 
 def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
@@ -382,3 +401,4 @@ class _File(BaseModel):
     )
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
     tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
+    spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")

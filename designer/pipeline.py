@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer import gate
+from designer.attempt import zone_of_spec
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.deck import Excitation
@@ -21,9 +22,11 @@ from designer.gate import GateResult
 from designer.modelfile import ModelFile
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
+from designer.partnames import parts_of
 from designer.reduction import Reduction
 from designer.responses import ModelResponse, circuit_flow, find, on_circuit, peaks
 from designer.spread import Spread
+from designer.spreadrules import check_names
 from designer.synthesis import check_choices, synthesise
 from designer.system import Array, Drive
 from designer.verdict import Answer, Question, StudyPlan, Yield, count
@@ -92,10 +95,14 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     InputError, Unreachable : see ``responses.find`` and ``synthesis.synthesise``.
     """
     check_choices(modelfile.model, modelfile.circuit, catalog)
+    choice = modelfile.model, modelfile.circuit, catalog
+    check_names(modelfile, parts_of(*choice, zone_of_spec(*choice)))
     found = find(modelfile.model, modelfile.responses)
-    return found, synthesise(
+    design = synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found
     )
+    Spread.of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
+    return found, design
 
 
 def nominal_reduction(design: Design) -> Reduction:
@@ -140,15 +147,14 @@ def plan_study(
     samples: int,
     seed: int,
 ) -> StudyPlan:
-    """The Monte Carlo study of these responses under ``bench-1``.
+    """The Monte Carlo study of these responses, boards as the model file says.
 
     Every one of ``checked`` is a question; who calls leaves out what the nominal circuit does not
     show periodically (``study.tolerance``), since there is no nominal orbit to start from.
     """
-    spec = modelfile.circuit
     return StudyPlan(
         circuit=design.circuit,
-        spread=Spread.bench_1(catalog.opamp(spec.opamp), spec.resistor_grade, spec.capacitor_grade),
+        spread=Spread.of(modelfile, design.circuit, catalog),
         seed=seed,
         samples=samples,
         questions=tuple(

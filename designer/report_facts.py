@@ -11,6 +11,7 @@ from designer import report_words as words
 from designer.design import Design
 from designer.plots import EXACT
 from designer.report_data import ReportData
+from designer.spreadwords import words_of
 from designer.verdict import Yield
 
 FORMAT = 1
@@ -197,25 +198,12 @@ def _tiles(data: ReportData) -> list[tuple[str, str]]:
 def _study_note(data: ReportData) -> str:
     if data.plan is None:
         return "No tolerance study was made."
-    s = data.plan.spread
+    varies = words_of(data.plan.spread, data.design.circuit)
     return (
-        f"{words.plural(data.plan.samples, 'board')}, seed {data.plan.seed}: resistors uniform "
-        f"within ± {100 * s.resistor:g} %, capacitors within ± {100 * s.capacitor:g} %, op-amp "
-        f"offset normal with σ = {words.quantity(s.offset_sigma, 'V')}, cut at "
-        f"{words.quantity(s.offset_limit, 'V')}, saturation uniform within "
-        f"± {100 * s.saturation:g} %, each section and rail its own{_references(data)}. Boards run "
-        "as built: the "
-        "generator stays at the settings above. Verdicts are those of the exact circuit. "
-        "Intervals are Wilson's, at 95 %."
+        f"{words.plural(data.plan.samples, 'board')}, seed {data.plan.seed}: {varies}. "
+        "Boards run as built: the generator stays at the settings above. Verdicts are those of "
+        "the exact circuit. Intervals are Wilson's, at 95 %."
     )
-
-
-def _references(data: ReportData) -> str:
-    references = data.design.circuit.references
-    if not references or data.plan is None:
-        return ""
-    grade = data.plan.spread.reference * max(r.grade for r in references)
-    return f", references uniform within ± {100 * grade:g} %, diodes exact"
 
 
 def _parts_note(data: ReportData) -> str:

@@ -11,16 +11,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from designer import samples
 from designer.boards import Boards
-from designer.catalog import OpAmp
+from designer.catalog import Catalog, OpAmp
 from designer.circuit import Board, Capacitor, Circuit, Reference, Resistor
 from designer.laws import Law, Normal, Uniform
+from designer.measured import Measured
 from designer.system import Array
+
+if TYPE_CHECKING:
+    from designer.modelfile import ModelFile
 
 NAME = "bench-1"
 SATURATION_SPREAD = 0.05
@@ -31,13 +35,13 @@ EVEN = Uniform(-1.0, 1.0)
 """Anywhere within the grade."""
 
 Passive = Resistor | Capacitor
-TEMPERATURE = "temperature"
+BOARD, TEMPERATURE = "board", "temperature"
 _WHAT = ("offset", "low", "high", "bias", "gbw", "tempco", "ageing")
 
 
 @dataclass(frozen=True)
 class Group:
-    """Parts that vary together, of one network or one reel.
+    """Parts that vary together, of one network or (``reel``) one reel.
 
     share : in [0, 1], of a part's deviation that it has in common with the others; the rest is its
     own. So the total stays within the grade, and two parts correlate by s²/(s² + (1 − s)²).
@@ -46,6 +50,7 @@ class Group:
     name: str
     parts: tuple[str, ...]
     share: float
+    reel: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,9 +61,9 @@ class Spread:
     offset_sigma, offset_limit [V]. saturation : half-width as a fraction. reference : half-width
     over the grade of each reference. bias [A], gain_bandwidth [Hz] : of each section; None: the
     circuit's, which is the typical figure. supply : half-width as a fraction, each rail its own.
-    laws : relative deviation of parts with a grade of their own. temperature : range [°C] of the
-    board. tempco [1/K], ageing (relative) : by part; tempco counts where there is a temperature.
-    groups : parts that track.
+    grades, shapes : of the parts that have their own. temperature : range [°C] of the board.
+    tempco [1/K], ageing (relative) : by part; tempco counts where there is a temperature.
+    groups : parts that track. measured : a bench's list, which goes before anything drawn.
     """
 
     resistor: float
@@ -72,11 +77,25 @@ class Spread:
     bias: Law | None = None
     gain_bandwidth: Law | None = None
     supply: float = 0.0
-    laws: Mapping[str, Law] = field(default_factory=dict)
+    grades: Mapping[str, float] = field(default_factory=dict)
+    shapes: Mapping[str, Law] = field(default_factory=dict)
     temperature: tuple[float, float] | None = None
     tempco: Mapping[str, Law] = field(default_factory=dict)
     ageing: Mapping[str, Law] = field(default_factory=dict)
     groups: tuple[Group, ...] = ()
+    measured: Measured | None = None
+
+    @classmethod
+    def of(cls, modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Spread:
+        """What a model file says about the boards of a circuit; ``bench-1`` where it says nothing.
+
+        Raises
+        ------
+        InputError : see ``spreadrules.spread_of``.
+        """
+        from designer.spreadrules import spread_of  # which makes what is defined here
+
+        return spread_of(modelfile, circuit, catalog)
 
     @classmethod
     def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:
@@ -109,13 +128,16 @@ class Spread:
         A part's own deviation has the part's name; an op-amp section has ``U1A.offset``,
         ``U1A.low``, ``U1A.high`` and, where they are spread, ``U1A.bias`` and ``U1A.gbw``; then
         ``R1.tempco``, ``R1.ageing``, ``VCC``, ``VEE``, ``temperature``, and a group's common
-        ``network:1`` or ``reel:R:10k``, with ``.tempco`` and ``.ageing`` as a part has them.
+        ``network:1`` or ``reel:R:10k``, with ``.tempco`` and ``.ageing`` as a part has them;
+        ``board`` where several were measured. A measured quantity's is that of its tolerance.
         """
         parts = _varying(circuit)
         names = [p.name for p in parts]
-        names += [f"{s.name}.{what}" for s in circuit.sections for what in self._of_a_section]
-        if self.supply > 0.0:
-            names += [rail.name for rail in circuit.rails]
+        for s in circuit.sections:
+            names += [f"{s.name}.{what}" for what in ("offset", "low", "high")]
+            names += [f"{s.name}.bias"] * self._known(self.bias, f"{s.name}.bias")
+            names += [f"{s.name}.gbw"] * self._known(self.gain_bandwidth, f"{s.name}.gbw")
+        names += [r.name for r in circuit.rails if self._known(self.supply, r.name)]
         if self.temperature is not None:
             names.append(TEMPERATURE)
         for suffix, laws in self._slow:
@@ -123,6 +145,8 @@ class Spread:
         for group in self.groups:
             names.append(group.name)
             names += [group.name + suffix for suffix, _ in self._slow]
+        if self.measured is not None and len(self.measured.boards) > 1:
+            names.append(BOARD)
         return tuple(names)
 
     def from_cube(self, circuit: Circuit, cube: Array) -> Boards:
@@ -137,10 +161,9 @@ class Spread:
             raise ValueError(f"a cube of {cube.shape}; this circuit has {len(names)} coordinates")
         return _Draw(self, circuit, dict(zip(names, cube.T, strict=True)), len(cube)).boards()
 
-    @property
-    def _of_a_section(self) -> tuple[str, ...]:
-        more = [("bias", self.bias), ("gbw", self.gain_bandwidth)]
-        return ("offset", "low", "high", *(name for name, law in more if law is not None))
+    def _known(self, spread: Law | float | None, name: str) -> bool:
+        """Whether this quantity of a board is drawn or was measured."""
+        return bool(spread) or (self.measured is not None and name in self.measured.values)
 
     @property
     def _slow(self) -> tuple[tuple[str, Mapping[str, Law]], ...]:
@@ -150,14 +173,18 @@ class Spread:
             found.insert(0, (".tempco", self.tempco))
         return tuple(found)
 
-    def law_of(self, part: Passive | Reference) -> Law:
-        """Of a part's relative deviation over its grade; the grade is ``grade_of``'s."""
+    def shape_of(self, part: Passive | Reference) -> Law:
+        """Of a part's relative deviation over its grade."""
+        if part.name in self.shapes:
+            return self.shapes[part.name]
         if isinstance(part, Reference):
             return EVEN
         return self.resistor_shape if isinstance(part, Resistor) else self.capacitor_shape
 
     def grade_of(self, part: Passive | Reference) -> float:
-        """The grade that the part has by its kind."""
+        """The grade of a part: its own, or that of its kind."""
+        if part.name in self.grades:
+            return self.grades[part.name]
         if isinstance(part, Reference):
             return self.reference * part.grade
         return self.resistor if isinstance(part, Resistor) else self.capacitor
@@ -171,7 +198,11 @@ def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
 def draw_many(circuit: Circuit, spread: Spread, seed: int, indices: range) -> Boards:
     """The boards of these numbers of the study with this seed."""
     names = spread.coordinates(circuit)
-    return spread.from_cube(circuit, samples.cube(seed, names, indices))
+    cube = samples.cube(seed, names, indices)
+    if BOARD in names and spread.measured is not None:  # in turn: they are what there is
+        count = len(spread.measured.boards)
+        cube[:, names.index(BOARD)] = (np.asarray(indices) % count + 0.5) / count
+    return spread.from_cube(circuit, cube)
 
 
 def part_of(coordinate: str) -> str:
@@ -188,51 +219,63 @@ class _Draw:
     ) -> None:
         self.spread, self.circuit, self.u, self.count = spread, circuit, u, count
         self.group = {name: group for group in spread.groups for name in group.parts}
+        self.measured = spread.measured
+        if spread.measured is not None:
+            boards = len(spread.measured.boards)
+            which = u.get(BOARD, np.zeros(count))
+            self.which = np.minimum((which * boards).astype(np.intp), boards - 1)
 
     def boards(self) -> Boards:
-        c, spread, u = self.circuit, self.spread, self.u
+        c, spread = self.circuit, self.spread
         sections = [s.name for s in c.sections]
         offset = Normal(spread.offset_sigma, spread.offset_limit)
         supply = self.supply()
         low, high = self.limits(supply)
-        bias = gain_bandwidth = None
-        if spread.bias is not None:
-            bias = {s: spread.bias.ppf(u[f"{s}.bias"]) for s in sections}
-        if spread.gain_bandwidth is not None:
-            gain_bandwidth = {s: spread.gain_bandwidth.ppf(u[f"{s}.gbw"]) for s in sections}
         return Boards(
             circuit=c,
-            values={p.name: p.value * self.factor(p) for p in _passives(c)},
-            offset={s: offset.ppf(u[f"{s}.offset"]) for s in sections},
+            values={p.name: self.value(p, p.value) for p in _passives(c)},
+            offset={s: self.drawn(f"{s}.offset", offset, 0.0) for s in sections},
             low=low,
             high=high,
-            bias={s: self.same(c.bias) for s in sections} if bias is None else bias,
-            reference={r.name: r.volts * self.factor(r) for r in c.references},
+            bias={s: self.drawn(f"{s}.bias", spread.bias, c.bias) for s in sections},
+            reference={r.name: self.value(r, r.volts) for r in c.references},
             drop={d.name: self.same(d.model.drop) for d in c.diodes},
             supply=supply,
-            gain_bandwidth={} if gain_bandwidth is None else gain_bandwidth,
+            gain_bandwidth={
+                s: self.drawn(f"{s}.gbw", spread.gain_bandwidth, c.gain_bandwidth)
+                for s in sections
+                if f"{s}.gbw" in self.u
+            },
             inverse_gain=self.same(1.0 / c.gain),
         )
 
     def same(self, value: float) -> Array:
         return np.full(self.count, value)
 
-    def factor(self, part: Passive | Reference) -> Array:
-        """A part's value over the one it is sold for."""
+    def drawn(self, name: str, law: Law | None, typical: float) -> Array:
+        """What a section has of its own, unless it was measured."""
+        return self.known(name, self.same(typical) if law is None else law.ppf(self.u[name]))
+
+    def known(self, name: str, drawn: Array) -> Array:
+        """The measured value, within its tolerance, where there is one."""
+        if self.measured is None or name not in self.measured.values:
+            return drawn
+        value = np.array(self.measured.values[name])[self.which]
+        width = np.array(self.measured.tolerances[name])[self.which]
+        return np.where(np.isnan(value), drawn, value + width * (2.0 * self.u[name] - 1.0))
+
+    def value(self, part: Passive | Reference, sold: float) -> Array:
+        """A part's value on the day: as made or measured, aged, at the board's temperature."""
         spread, name = self.spread, part.name
-        own = spread.laws.get(name)
-        if own is None:
-            grade = spread.grade_of(part)
-            factor = 1.0 + grade * self.shared(name, "", spread.law_of(part))
-        else:
-            factor = 1.0 + self.shared(name, "", own)
+        off = spread.grade_of(part) * self.shared(name, "", spread.shape_of(part))
+        value = self.known(name, sold * (1.0 + off))
         if name in spread.ageing:
-            factor = factor * (1.0 + self.shared(name, ".ageing", spread.ageing[name]))
+            value = value * (1.0 + self.shared(name, ".ageing", spread.ageing[name]))
         if spread.temperature is not None and name in spread.tempco:
             warmer = Uniform(*spread.temperature).ppf(self.u[TEMPERATURE]) - ROOM
             tempco = self.shared(name, ".tempco", spread.tempco[name])
-            factor = factor * (1.0 + tempco * warmer)
-        return factor
+            value = value * (1.0 + tempco * warmer)
+        return value
 
     def shared(self, name: str, what: str, law: Law) -> Array:
         """A part's own draw; in a group mixed with the common one."""
@@ -244,28 +287,28 @@ class _Draw:
         return group.share * common + (1.0 - group.share) * own
 
     def supply(self) -> dict[str, Array]:
-        """By rail; empty where the supply is exact."""
-        width = self.spread.supply
-        if width == 0.0:
-            return {}
-        law = Uniform(-width, width)
-        return {r.name: r.volts * (1.0 + law.ppf(self.u[r.name])) for r in self.circuit.rails}
+        """By rail; without those that are exact."""
+        law = Uniform(-self.spread.supply, self.spread.supply)
+        return {
+            r.name: self.known(r.name, r.volts * (1.0 + law.ppf(self.u[r.name])))
+            for r in self.circuit.rails
+            if r.name in self.u
+        }
 
     def limits(self, supply: Mapping[str, Array]) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lowest and highest output of each section: its distance to the rail stays when the rail
         moves, and no output passes its rail."""
         c = self.circuit
-        width = self.spread.saturation
-        law = Uniform(-width, width)
+        law = Uniform(-self.spread.saturation, self.spread.saturation)
         exact = self.same(c.supply)
         above, below = supply.get("VCC", exact), -supply.get("VEE", -exact)  # of ground
 
-        def limit(number: str, rail: Array) -> Array:
-            wanted = c.saturation * (1.0 + law.ppf(self.u[number]))
-            return np.minimum(wanted + (rail - c.supply), rail)
+        def limit(name: str, rail: Array, sign: float) -> Array:
+            wanted = c.saturation * (1.0 + law.ppf(self.u[name])) + (rail - c.supply)
+            return self.known(name, sign * np.minimum(wanted, rail))
 
-        low = {s.name: -limit(f"{s.name}.low", below) for s in c.sections}
-        high = {s.name: limit(f"{s.name}.high", above) for s in c.sections}
+        low = {s.name: limit(f"{s.name}.low", below, -1.0) for s in c.sections}
+        high = {s.name: limit(f"{s.name}.high", above, 1.0) for s in c.sections}
         return low, high
 
 

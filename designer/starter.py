@@ -56,4 +56,12 @@ side_conditions = true          # false: the match alone; or a list of those to 
 # preferred = ["10k", "10n"]    # values that do not count as further ones
 # most_values = 12              # at most so many distinct values
 # slack = 1e-4                  # what the error may exceed its least, for fewer distinct values
+
+# How the boards of a tolerance study differ; without it as the reference spread says. More keys:
+# docs/spread.md
+# [spread]
+# resistors = "normal"          # within their grade; or "uniform"
+# temperature = [10, 40]        # °C
+# supply = 0.02                 # each rail within ± 2 %
+# measured = "measured.csv"     # part,value[,tolerance][,board]
 """

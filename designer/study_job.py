@@ -60,6 +60,7 @@ def run_into(
     if (
         folder.state("design", wanted["design"][0]) == "other"
         and origin.get("model") == modelfile.sha256
+        and origin.get("measured") == wanted["design"][0].get("measured")
         and modelfile.source == out / MODEL
     ):
         # A folder that came from elsewhere: its parts stand, whatever can be bought here.

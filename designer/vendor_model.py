@@ -21,6 +21,7 @@ from pathlib import Path
 
 from designer.errors import InputError
 from designer.ngspice import check_netlist
+from designer.paths import inside
 
 PINS = ("inp", "inn", "out", "vcc", "vee")
 ELEMENTS = "BCDEFGHIJKLMQRSVWX"
@@ -76,7 +77,7 @@ def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path)
         read, is too large, or holds a line that is refused; the subcircuit or its pins are not
         what was said.
     """
-    path = _inside(folder, name)
+    path = inside(folder, name, "spice.file")
     try:
         with path.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
@@ -126,20 +127,6 @@ class _Block:
     def text(self, blocks: Mapping[str, _Block]) -> list[str]:
         head = f".subckt {_prefixed(self.name)} {' '.join(self.nodes)} {self.rest}".rstrip()
         return [head, *(_renamed(s, blocks) for s in self.inside), f".ends {_prefixed(self.name)}"]
-
-
-def _inside(folder: Path, name: str) -> Path:
-    expected = f"a file inside {folder}, no symbolic link"
-    relative = Path(name)
-    if relative.is_absolute() or not relative.parts or ".." in relative.parts:
-        raise InputError(None, "spice.file", name, expected)
-    root = folder.resolve()
-    path = root / relative
-    if path.resolve() != path:
-        raise InputError(None, "spice.file", name, expected)
-    if not path.is_file():
-        raise InputError(None, "spice.file", name, expected)
-    return path
 
 
 def _statements(text: str, path: Path) -> list[_Statement]:

@@ -277,7 +277,7 @@ WRONG = [
     ("[model]", "[modle]", "modle", "unknown key 'modle'", 'did you mean "model"?'),
     ("[model]", "[[model]]", "model", "[{", "a table [model]"),
     ("\n[model]", "\nresponse = 3\n[model]", "line", "[[response]]", "valid TOML"),
-    ("[circuit]", "[spread]\nx = 1\n[circuit]", "spread", "unknown key 'spread'", "one of"),
+    ("[circuit]", "[yield]\nx = 1\n[circuit]", "yield", "unknown key 'yield'", "one of"),
     ('title = "Soft', 'title = "\\nSoft', "title", '"?Soft', "line breaks"),
     ("title = ", "title = 3 #", "title", "3", "text"),
     # [model]
@@ -548,8 +548,12 @@ def test_any_unknown_key_is_named(key: str) -> None:
 def test_what_the_starter_shows_in_comments_is_valid() -> None:
     """Every key of [circuit] stands in it; a comment's mark taken away leaves a valid line."""
     assert parse_model_file(TEXT).circuit == CircuitSpec(saturation=13.0)
-    table = TEXT[TEXT.index("[circuit]") :]
+    table, _, spread = TEXT[TEXT.index("[circuit]") :].partition("\n\n")
     shown = [line.removeprefix("# ").partition("  #")[0] for line in table.splitlines()[1:]]
     assert {line.partition(" =")[0] for line in shown} == {f.name for f in fields(CircuitSpec)}
     for line in shown:
         parse_model_file(SMALL + "[circuit]\n" + line)
+    lines = [line.removeprefix("# ") for line in spread.splitlines()]
+    read = parse_model_file(SMALL + "\n".join(lines[lines.index("[spread]") :])).spread
+    assert (read.resistors.law, read.temperature, read.supply) == ("normal", (10.0, 40.0), 0.02)
+    assert read.measured == "measured.csv"
