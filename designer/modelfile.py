@@ -400,5 +400,5 @@ class _File(BaseModel):
         (), strict=False, description="one table [[response]] for each response"
     )
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
-    spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")
     tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
+    spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")

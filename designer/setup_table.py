@@ -29,7 +29,7 @@ COLUMNS = (
     "start",
 )
 LOAD = "high-Z"
-NO_RECIPE = "none: the nominal circuit does not show the response"
+NO_RECIPE = "none: the nominal circuit does not show the wanted response"
 STATES = ("x1", "x1'", "x2", "x2'")
 
 
@@ -75,9 +75,14 @@ def setup_csv(
 
 
 def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
-    """A start recipe for each response of a design, found on its circuit."""
+    """A start recipe for each response of a design, found on its circuit; None where the model or
+    the nominal circuit does not show it."""
     checked = pipeline.check(made.design, made.found, None)
-    shown = [i for i, c in enumerate(checked) if c.circuit.status is OrbitStatus.PERIODIC]
+    shown = [
+        i
+        for i, c in enumerate(checked)
+        if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
+    ]
     plan = pipeline.plan_study(
         made.modelfile,
         made.design,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,6 +95,48 @@ def tolerance(answer: Mapping[str, Any]) -> None:
             *counted,
         )
     console.print(table)
+    _further(console, answer)
+
+
+def _further(console: Console, answer: Mapping[str, Any]) -> None:
+    """The yields beside those as built, where there are any."""
+    kinds: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+        "tuned": lambda r: r.get("tuned"),
+        "on the bench": lambda r: (r.get("tuned") or {}).get("bench"),
+        "reached": lambda r: r.get("reached"),
+    }
+    shown = [k for k, of in kinds.items() if any(of(r) for r in answer["responses"])]
+    both = any(r.get("combined") for r in answer["responses"])
+    if not shown and not both:
+        return
+    heads = [*(f"{kind} %" for kind in shown), *(["both engines %", "95 %", "differ"] * both)]
+    table = _table("Further yields", "ω", "expected", *heads, gap=1)
+    for r in answer["responses"]:
+        cells = [_percent((kinds[kind](r) or {}).get("rate")) for kind in shown]
+        c = r.get("combined")
+        if both and c is None:
+            cells += ["-", "", ""]
+        elif both:
+            differ = c["disagreement"]
+            cells += [
+                _percent(c["estimate"]),
+                f"{100 * c['low']:.0f}–{100 * c['high']:.0f}",
+                f"{differ['count']} of {differ['asked']}",
+            ]
+        _row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
+    console.print(table)
+    whole = answer.get("all_on_one_board") or {}
+    said = [
+        f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
+        for kind, y in whole.items()
+        if y is not None
+    ]
+    if said:
+        _line(console, f"All on one board: {', '.join(said)}")
+
+
+def _percent(rate: float | None) -> str:
+    return "-" if rate is None else f"{100 * rate:.1f}"
 
 
 def simulated(answer: Mapping[str, Any]) -> None:

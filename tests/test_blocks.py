@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -205,12 +207,16 @@ def test_a_damaged_block_is_nothing(tmp_path: Path, plan: StudyPlan, damage: str
 def test_a_full_disk_is_said_and_loses_nothing(
     tmp_path: Path, plan: StudyPlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The partial file is /dev/full, which answers every write with "no space left"."""
+    """The write fails half-way as on a full disk: some bytes are there, then ENOSPC."""
     first, second = plan.blocks()
     store = _store(tmp_path, plan)
     store.put(first, _answers(first))
-    write = pq.write_table
-    monkeypatch.setattr(pq, "write_table", lambda table, path: write(table, "/dev/full"))
+
+    def full(table: object, path: Path) -> None:
+        path.write_bytes(b"PAR1")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(pq, "write_table", full)
     with pytest.raises(InputError, match=r"No space left on device.*--resume") as raised:
         store.put(second, _answers(second))
     assert raised.value.exit_status == 2
