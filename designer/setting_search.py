@@ -6,8 +6,9 @@ one works:
 
 1. the centred board, nothing else changed;
 2. the corners and the edge midpoints of the frequency-amplitude band, centred;
-3. halfway between a setting with too few impacts and one with too many, from the nominal orbit and
-   then from the attractor of the one with too few (as on the bench, where the state carries over);
+3. halfway between two settings of which one has too few impacts on a stop and the other not, from
+   the nominal orbit and then from the attractor of the better one (as on the bench, where the
+   state carries over);
 4. eight settings that fill the band, centred, and halving again;
 5. 24 settings that fill the band of all three, from the nominal orbit, and halving again.
 
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
@@ -72,11 +74,10 @@ class Case:
         return max(good, key=lambda t: t.margin) if good else None
 
     @property
-    def wanted_rate(self) -> float:
-        """Impacts per drive period that the wanted response has."""
+    def wanted(self) -> tuple[int, int, int]:
+        """n, p and q."""
         spec, nominal = self.question.spec.expect, self.question.start
-        n, p, q = (nominal.n, nominal.p, nominal.q) if spec is None else (spec.n, spec.p, spec.q)
-        return (p + q) / n
+        return (nominal.n, nominal.p, nominal.q) if spec is None else (spec.n, spec.p, spec.q)
 
     @property
     def unanswered(self) -> int:
@@ -166,27 +167,46 @@ def filled(count: int, dimensions: int) -> Array:
 
 
 def _halfway(case: Case, bands: Bands, follow: bool) -> list[Asked]:
-    """Between the nearest settings with too few and with too many impacts.
+    """Between pairs of settings that leave the wanted counts between them, the best pair first.
 
-    follow : start from the attractor of the one with too few; otherwise from the nominal orbit.
+    follow : start from the attractor of the better one; otherwise from the nominal orbit.
     """
-    rated = [(t, (t.orbit.p + t.orbit.q) / t.orbit.n) for t in case.tries if t.orbit.n]
-    few = [t for t, rate in rated if rate < case.wanted_rate]
-    many = [t for t, rate in rated if rate > case.wanted_rate]
-    pairs = sorted(
-        ((_distance(f.setting, m.setting, bands), i, j) for i, f in enumerate(few)
-         for j, m in enumerate(many)),
-    )  # fmt: skip
     chosen: list[Asked] = []
-    for _, i, j in pairs:
-        middle = _middle(few[i].setting, many[j].setting)
+    for better, worse in _brackets(case, bands):
+        middle = _middle(better.setting, worse.setting)
         known = [setting for setting, _ in chosen]
         if not _new(case, [*known, middle], bands)[len(known) :]:
             continue
-        chosen.append((middle, few[i].orbit.start if follow else case.question.start.start))
+        chosen.append((middle, better.orbit.start if follow else case.question.start.start))
         if len(chosen) == HALVED:
             break
     return chosen
+
+
+def _brackets(case: Case, bands: Bands) -> list[tuple[Try, Try]]:
+    """Pairs of tries, the better one of each first, by how far their counts are off and then by
+    their distance. A pair leaves the wanted count of a stop between it if not both have too many
+    impacts there, or both too few; one stop of which that holds is enough, two are better."""
+    n, p, q = case.wanted
+    counted = [t for t in case.tries if t.orbit.n]
+    found = []
+    for wanted in {(p, q), (q, p)}:
+        off = [
+            (t.orbit.p / t.orbit.n - wanted[0] / n, t.orbit.q / t.orbit.n - wanted[1] / n)
+            for t in counted
+        ]
+        # The right counts over the wrong period are wrong too.
+        cost = [
+            abs(a) + abs(b) + 0.5 * (t.orbit.n != n) for (a, b), t in zip(off, counted, strict=True)
+        ]
+        for i, j in combinations(range(len(counted)), 2):
+            outside = sum(a * b > 0.0 for a, b in zip(off[i], off[j], strict=True))
+            if outside == 2 or off[i] == off[j]:
+                continue
+            i, j = (i, j) if cost[i] <= cost[j] else (j, i)
+            apart = _distance(counted[i].setting, counted[j].setting, bands)
+            found.append((cost[i] + cost[j] + outside, apart, i, j))
+    return [(counted[i], counted[j]) for _, _, i, j in sorted(found)]
 
 
 def _new(case: Case, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:

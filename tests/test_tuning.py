@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -176,36 +177,29 @@ def test_all_on_one_takes_the_worst_of_each_board() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("p", "sigma", "boards"), [(4, 1e-3, 3), (8, 3e-4, 3)])
-def test_the_search_finds_what_a_dense_grid_finds(p: int, sigma: float, boards: int) -> None:
-    """Every board that works somewhere on an 11 x 11 x 11 grid over the bands, from the nominal
-    orbit, is found with a hundredth of the questions."""
+@pytest.mark.parametrize(("p", "sigma"), [(4, 1e-3), (8, 3e-4)])
+def test_what_the_search_does_not_find_a_dense_grid_does_not_find(p: int, sigma: float) -> None:
+    """Of the boards that the search gives up, with at most 65 questions, none works anywhere on an
+    11 x 11 x 11 grid over the bands. Of 12 boards, the first three that are given up."""
     of = plan(p, spread=Spread(0.01, 0.01, sigma, 4 * sigma), seed=5)
-    built = answers(of, range(12))
-    lost = [a.sample for a in built if a.verdict is not Verdict.OK][:boards]
-    assert lost
     asked, bands = of.questions[0], Bands()
-    ten = np.linspace(-1.0, 1.0, 11)
-    grid = [
-        Adjustment(f * bands.frequency, a * bands.amplitude, d * bands.offset)
-        for f in ten
-        for a in ten
-        for d in ten
-    ]
-    for sample in lost:
-        (row,) = tuned_block(of, range(sample, sample + 1), built, bands, 2)
-        boards_ = ensemble([draw(of.circuit, of.spread, of.seed, sample)], p)
-        found = False
-        for first in range(0, len(grid), 121):
-            part = grid[first : first + 121]
-            orbits = boards_.settle(
-                [0] * len(part),
-                [drive_of(s.of(asked.excitation)) for s in part],
-                np.tile(asked.start.start, (len(part), 1)),
+    rows = tuned_block(of, range(12), answers(of, range(12)), bands, 2)
+    given_up = [r.sample for r in rows if r.verdict is not Verdict.OK][:3]
+    assert given_up
+    assert any(r.tries > 0 and r.verdict is Verdict.OK for r in rows)
+    eleven = np.linspace(-1.0, 1.0, 11)
+    for sample in given_up:
+        board = ensemble([draw(of.circuit, of.spread, of.seed, sample)], p)
+        for f, a in product(eleven, eleven):
+            grid = [
+                Adjustment(f * bands.frequency, a * bands.amplitude, d * bands.offset)
+                for d in eleven
+            ]
+            orbits = board.settle(
+                [0] * len(grid),
+                [drive_of(setting.of(asked.excitation)) for setting in grid],
+                np.tile(asked.start.start, (len(grid), 1)),
                 jobs=2,
             )
-            met = [judge(o, asked.spec, asked.start)[0] for o in orbits]
-            if Verdict.OK in met:
-                found = True
-                break
-        assert row.verdict is Verdict.OK or not found
+            works = [judge(o, asked.spec, asked.start)[0] is Verdict.OK for o in orbits]
+            assert not any(works), (sample, grid[works.index(True)])
