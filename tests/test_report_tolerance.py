@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from designer import pipeline
-from designer.blame import Blame, Corner, Index, NearLimit, ResponseBlame, Subject
+from designer.blame import Blame, NearLimit, ResponseBlame, Subject
 from designer.catalog import load_catalog
+from designer.corners import Corner
 from designer.exact import block
+from designer.margin_indices import Index
 from designer.margins import Prediction
 from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
