@@ -41,6 +41,8 @@ FREQUENCY_STEPS = 5
 """Steps from the middle of the frequency band to its edge."""
 AMPLITUDES = (0.0, -0.5, 0.5, -1.0, 1.0)
 """Of the half-band: amplitudes at which the frequency is swept, in order."""
+MOST_STEPS = 1 + CENTRING_STEPS + 2 * FREQUENCY_STEPS + 4 * (2 * FREQUENCY_STEPS + 1)
+"""Settings of the generator after which the person gives up."""
 DIGITS = 4
 """Decimals of the DC offset over the amplitude that the generator is set to."""
 TAG = 0xBE7C

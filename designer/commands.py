@@ -29,6 +29,7 @@ STUDY_KEYS = (
     "all_on_one_board",
     "equation_check",
     "responses",
+    "maps",
     "provenance",
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
@@ -59,6 +60,15 @@ class RungName(StrEnum):
     IDEAL = "ideal"
     DYNAMIC = "dynamic"
     FULL = "full"
+
+
+class MapOver(StrEnum):
+    """What a yield is mapped over."""
+
+    OMEGA = "omega"
+    B = "b"
+    GRADE = "grade"
+    OMEGA_GRADE = "omega-grade"
 
 
 class StudyRung(StrEnum):
@@ -188,6 +198,16 @@ def tolerance(
         StudyRung,
         typer.Option("--rung", help="exact: no ngspice; ngspice: every board in ngspice too."),
     ] = StudyRung.AUTO,
+    tuned: Annotated[
+        bool, typer.Option("--tuned", help="Also with the generator free within its bands.")
+    ] = False,
+    reached: Annotated[
+        bool, typer.Option("--reached", help="Also from power-up, by the start recipe.")
+    ] = False,
+    map_: Annotated[
+        list[MapOver] | None,
+        typer.Option("--map", help="Also the yield over this setting; may be repeated."),
+    ] = None,
     cluster: Annotated[
         str | None,
         typer.Option("--cluster", metavar="tcp://…", help="A Dask scheduler that shares the work."),
@@ -207,7 +227,17 @@ def tolerance(
         from designer.options import Options
 
         options = Options(
-            seed, jobs, samples, overwrite, resume, until=until, rung=rung.value, cluster=cluster
+            seed,
+            jobs,
+            samples,
+            overwrite,
+            resume,
+            until=until,
+            rung=rung.value,
+            tuned=tuned,
+            reached=reached,
+            maps=tuple(dict.fromkeys(over.value for over in map_ or ())),
+            cluster=cluster,
         )
         options.check()
         modelfile, folder = job.source(model, out)

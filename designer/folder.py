@@ -189,7 +189,11 @@ class Folder:
         """
         manifest = self.manifest
         assert manifest is not None
-        folders = [n for n, (owner, _) in manifest.files.items() if n.endswith("/")]
+        folders = [
+            name
+            for name, (owner, _) in manifest.files.items()
+            if name.endswith("/") and owner in (stage, "replaced")
+        ]
         manifest.files |= dict.fromkeys(blocks, (stage, None))
         for name, (owner, _) in list(manifest.files.items()):
             if owner != stage or name in folders:
@@ -201,8 +205,8 @@ class Folder:
         manifest.stages[stage].complete = True
         gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
         for name in folders:
-            if manifest.files.pop(name)[0] in (stage, "replaced"):
-                gone += [n for n in self._there(name) if n not in manifest.files]
+            del manifest.files[name]
+            gone += [n for n in self._there(name) if n not in manifest.files]
         for name in gone:
             if not name.endswith("/"):
                 (self / name).unlink(missing_ok=True)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.simulation import Simulated
 
 FORMAT = 1
+STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "maps")
+"""What ``run`` prints of a study beside its responses."""
 
 
 def dumps(value: object, *, indent: int | None = 2) -> str:
@@ -109,7 +111,7 @@ def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, A
     cost = {"design": cost_of(design), "study": cost_of(study)}
     return {
         **design,
-        **{k: study[k] for k in ("samples", "until", "narrow", "all_on_one_board") if k in study},
+        **{key: study[key] for key in STUDY_KEYS if key in study},
         "equation_check": study.get("equation_check"),
         "responses": study["responses"],
         "provenance": study["provenance"],

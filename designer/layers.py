@@ -11,13 +11,19 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from designer import confirmation, exact
+from designer.bands import Bands
 from designer.blocks import BlockStore, Row
 from designer.hearing import Ask, Hearing
+from designer.reached import Reached, reached_block
+from designer.recipe import Recipe
+from designer.tuning import Tuned, tuned_block
 from designer.verdict import Answer, StudyPlan
 from designer.workers import SpicePool
 
 CHUNK = 10
 """Samples of a block of ngspice's runs: they take seconds each."""
+SEARCH = 25
+"""Samples of a block of the tuned and the reached layer: each takes many settings or a long way."""
 Task = Callable[[int, Callable[[], None]], Sequence[Any]]
 """Makes the rows of a block: (jobs, progress) → rows. It pickles."""
 Step = Callable[[], None]
@@ -49,6 +55,30 @@ class Samples:
 
     def __call__(self, jobs: int, progress: Step) -> list[Answer]:
         return [answer for answer, _ in exact.block(self.plan, self.indices, jobs, progress)]
+
+
+class Tunings:
+    """Task of the tuned layer. answers : all of the study's, by sample and question."""
+
+    def __init__(
+        self, plan: StudyPlan, answers: Sequence[Answer], bands: Bands, indices: range
+    ) -> None:
+        count = len(plan.questions)
+        self.plan, self.bands, self.indices = plan, bands, indices
+        self.answers = tuple(answers[indices.start * count : indices.stop * count])
+
+    def __call__(self, jobs: int, progress: Step) -> list[Tuned]:
+        return tuned_block(self.plan, self.indices, self.answers, self.bands, jobs, progress)
+
+
+class PowerUps:
+    """Task of the reached layer."""
+
+    def __init__(self, plan: StudyPlan, recipes: Sequence[Recipe], indices: range) -> None:
+        self.plan, self.recipes, self.indices = plan, tuple(recipes), indices
+
+    def __call__(self, jobs: int, progress: Step) -> list[Reached]:
+        return reached_block(self.plan, self.indices, self.recipes, jobs, progress)
 
 
 def fill(

@@ -10,6 +10,7 @@ from pathlib import Path
 from designer.errors import InputError
 from designer.preconditions import at_least
 from designer.study import SAMPLES, SEED, RungName
+from designer.yield_maps import Over
 
 MOST_SAMPLES = 1_000_000
 
@@ -18,7 +19,8 @@ MOST_SAMPLES = 1_000_000
 class Options:
     """Options of the verbs that write.
 
-    until, rung : as ``study.tolerance``. cluster : address of a Dask scheduler, or None.
+    until, rung, tuned, reached, maps : as ``study.tolerance``. cluster : address of a Dask
+    scheduler, or None.
     """
 
     seed: int = SEED
@@ -28,6 +30,9 @@ class Options:
     resume: bool = False
     until: float | None = None
     rung: RungName = "auto"
+    tuned: bool = False
+    reached: bool = False
+    maps: tuple[Over, ...] = ()
     cluster: str | None = None
 
     def check(self) -> None:
@@ -53,6 +58,9 @@ class Options:
         if verb == "tolerance":
             said += [] if self.until is None else ["--until", f"{self.until:g}"]
             said += [] if self.rung == "auto" else ["--rung", self.rung]
+            said += ["--tuned"] if self.tuned else []
+            said += ["--reached"] if self.reached else []
+            said += [word for over in self.maps for word in ("--map", over)]
         return shlex.join(said)
 
 

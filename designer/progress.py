@@ -1,12 +1,15 @@
 """What a run says while it works, on standard error only.
 
-On a terminal a bar for each stage; elsewhere one line for each; with ``-q`` nothing.
+On a terminal a bar for each stage, with rate and time left; elsewhere a line for each, and one
+more from time to time while it lasts; with ``-q`` nothing.
 """
 
 from __future__ import annotations
 
 import logging
 import sys
+import threading
+import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -41,12 +44,38 @@ class Progress:
         return None
 
 
+EVERY = 20.0
+"""s between two lines about one stage."""
+
+
 class Lines(Progress):
-    """One line for each stage."""
+    """One line for each stage, and one every `EVERY` seconds about how far it is.
+
+    clock : seconds, for tests.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         print(f"{text} …", file=sys.stderr, flush=True)
-        return super().stage(text, total)
+        super().stage(text, total)
+        if not total:
+            return _nothing
+        began = said = self._clock()
+        done, lock = 0, threading.Lock()
+
+        def step() -> None:
+            nonlocal done, said
+            with lock:
+                done += 1
+                now = self._clock()
+                if now - said < EVERY or done >= total:
+                    return
+                said = now
+                print(f"  {how_far(done, total, now - began)}", file=sys.stderr, flush=True)
+
+        return step
 
     def note(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -64,6 +93,7 @@ class Terminal(Progress):
             SpinnerColumn,
             TextColumn,
             TimeElapsedColumn,
+            TimeRemainingColumn,
         )
         from rich.progress import Progress as Bars
 
@@ -73,6 +103,8 @@ class Terminal(Progress):
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(elapsed_when_finished=False),
             console=Console(stderr=True),
         )
         self._open: list[Callable[[], None]] = []
@@ -80,14 +112,21 @@ class Terminal(Progress):
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         super().stage(text, total)
         self._finish()
-        bars, task = self._bars, self._bars.add_task(text, total=total)
+        bars, task = self._bars, self._bars.add_task(text, total=total, rate="")
 
         def finish() -> None:
             steps = next(t.completed for t in bars.tasks if t.id == task)
             bars.update(task, total=total or 1, completed=total or max(steps, 1))
 
         self._open.append(finish)
-        return lambda: bars.advance(task)
+
+        def step() -> None:
+            bars.advance(task)
+            now = next(t for t in bars.tasks if t.id == task)
+            if now.speed:
+                bars.update(task, rate=f"{rate(now.speed)}, left:")
+
+        return step
 
     def note(self, text: str) -> None:
         super().note(text)
@@ -110,6 +149,19 @@ class Terminal(Progress):
     def _finish(self) -> None:
         while self._open:
             self._open.pop()()
+
+
+def how_far(done: int, total: int, seconds: float) -> str:
+    """Steps, rate and time left, at the rate so far."""
+    speed = done / seconds
+    left = round((total - done) / speed)
+    hours, minutes = divmod(left // 60, 60)
+    return f"{done}/{total}, {rate(speed)}, {hours}:{minutes:02d}:{left % 60:02d} left"
+
+
+def rate(speed: float) -> str:
+    """Steps per second, or per minute where that is less than one."""
+    return f"{speed:.3g}/s" if speed >= 1.0 else f"{60.0 * speed:.3g}/min"
 
 
 def progress_for(quiet: bool) -> Progress:

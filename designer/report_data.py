@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from designer.all_on_one import all_on_one
 from designer.bom import bill
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
 from designer.pipeline import Checked
 from designer.report_layers import Layers
-from designer.verdict import Answer, StudyPlan, Yield, all_on_one
+from designer.verdict import Answer, StudyPlan, Yield
 
 if TYPE_CHECKING:
     from designer.api import RunResult
@@ -60,7 +61,14 @@ class ReportData:
             command=command,
             equations=result.equations,
             heard=result.study.heard,
-            layers=Layers(combined=result.study.combined),
+            layers=Layers(
+                tuned=result.study.tuned,
+                reached=result.study.reached,
+                combined=result.study.combined,
+                recipes=result.study.recipes or (),
+                blame=result.study.blame,
+                maps=result.study.maps,
+            ),
         )
 
     @cached_property
@@ -104,4 +112,4 @@ class ReportData:
         """Boards that show every response; None unless each was asked of each board."""
         if len(self.checked) < 2 or None in self.question_of or not self.answers:
             return None
-        return all_on_one(((a.sample, a.verdict) for a in self.answers), len(self.checked))
+        return all_on_one(self.answers)

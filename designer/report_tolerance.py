@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from designer import report_words as words
+from designer.all_on_one import all_on_one
 from designer.blame import Blame, ResponseBlame, Subject
 from designer.report_data import ReportData
 from designer.report_layers import Benched, Both, Judged
 from designer.report_tables import Table
-from designer.verdict import Verdict, Yield, all_on_one, count
+from designer.verdict import Verdict, Yield, count
 
 PARTS_SHOWN = 4
 DIFFERENCES_SHOWN = 20
@@ -95,7 +96,7 @@ def _whole(data: ReportData) -> dict[str, str]:
     out = {"as built": _share(data.all_on_one_board)}
 
     def whole(rows: Iterable[Judged]) -> str:
-        return _share(all_on_one(((r.sample, r.verdict) for r in rows), len(data.checked)))
+        return _share(all_on_one(rows))
 
     if data.layers.tuned is not None:
         out["tuned"] = whole(data.layers.tuned)

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from designer.bands import Bands
 from designer.blocks import BlockStore
 from designer.folder import REPORTS, TOLERANCE, Folder
 from designer.hearing import Hearing
-from designer.layers import CHUNK
-from designer.study import Stores
+from designer.layers import CHUNK, SEARCH
+from designer.reached import Reached
+from designer.recipe import Recipe
+from designer.study import Stores, Study
 from designer.study_hash import study_hash
+from designer.tuning import MOST_TRIES, Tuned
 from designer.verdict import BLOCK, Answer, StudyPlan
+from designer.yield_maps import OVERS
 
 if TYPE_CHECKING:
     from designer.options import Options
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
+TUNED, REACHED = "tuned.parquet", "reached.parquet"
+MAPS, MAP = "maps.json", "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
 
 
@@ -29,6 +36,9 @@ def layers_of(options: Options) -> list[str]:
         names.add("ngspice")
     if options.rung == "ngspice":
         names.add(ALL_IN_NGSPICE)
+    names |= {f"{MAP}{over}" for over in options.maps}
+    names |= {"tuned"} if options.tuned else set()
+    names |= {"reached"} if options.reached else set()
     return sorted(names)
 
 
@@ -43,15 +53,19 @@ def merged(folder: Folder, inputs: Mapping[str, Any], options: Options) -> Optio
     rung = options.rung
     if "ngspice" in names:
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
-    return replace(options, rung=rung)
+    maps = tuple(over for over in OVERS if f"{MAP}{over}" in names)
+    tuned, reached = "tuned" in names, "reached" in names
+    return replace(options, rung=rung, tuned=tuned, reached=reached, maps=maps)
 
 
-def study_files(options: Options) -> list[str]:
+def study_files(options: Options, responses: int) -> list[str]:
     """What the stage writes; a name that ends in "/" is a folder of blocks."""
-    folders = [f"{SAMPLES}/"]
-    if "ngspice" in layers_of(options):
-        folders.append(f"{NGSPICE}/")
-    return [TOLERANCE, *REPORTS, *folders]
+    maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
+    maps += [MAPS] if maps else []
+    names = layers_of(options)
+    folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "reached": REACHED}
+    places = [f"{place}/" for name, place in folders.items() if name in names]
+    return [TOLERANCE, *REPORTS, *maps, *places]
 
 
 class FolderStores(Stores):
@@ -66,6 +80,14 @@ class FolderStores(Stores):
 
     def ngspice(self, plan: StudyPlan) -> BlockStore[Hearing]:
         return self._store(plan, NGSPICE, Hearing, "ngspice", CHUNK)
+
+    def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned]:
+        more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
+        return self._store(plan, TUNED, Tuned, "tuned", SEARCH, more)
+
+    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached]:
+        more = {"recipes": [r.as_dict() for r in recipes]}
+        return self._store(plan, REACHED, Reached, "reached", SEARCH, more)
 
     @property
     def names(self) -> Iterable[str]:
@@ -92,3 +114,15 @@ class FolderStores(Stores):
                 guard=self._guard,
             )
         return self._stores[folder]
+
+
+def write_maps(folder: Folder, study: Study, provenance: Mapping[str, Any]) -> None:
+    """``maps.json`` and a picture of each map; times are in ``tolerance.json``."""
+    from designer.map_files import files  # Matplotlib takes a while to import
+
+    labels = [
+        f"ω = {q.spec.omega:g} {q.spec.expect or q.start.response}" for q in study.plan.questions
+    ]
+    timeless = [replace(found, seconds=0.0) for found in study.maps]
+    for name, content in files(timeless, labels, {"provenance": provenance}).items():
+        folder.write(name, content)

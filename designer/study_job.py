@@ -27,7 +27,7 @@ from designer.progress import Progress
 from designer.provenance import provenance
 from designer.selection import SOLVER
 from designer.study import Study, check, tolerance
-from designer.study_folder import FolderStores, layers_of, merged, study_files
+from designer.study_folder import FolderStores, layers_of, merged, study_files, write_maps
 from designer.study_hash import RULES
 from designer.study_json import study_json
 from designer.workers import SpicePool
@@ -86,6 +86,8 @@ def run_into(
         result, blocks = _studied(folder, made, options, help_, progress)
     result.cost["design_seconds"] = design_seconds
     said = result.provenance
+    if result.study.maps:
+        write_maps(folder, result.study, said)
     folder.write(TOLERANCE, dumps(study_json(result.study, said, result.cost, result.equations)))
     progress.stage("report")
     from designer.report import write_report  # matplotlib is not needed before this
@@ -155,6 +157,9 @@ def _studied(
         samples=options.samples,
         until=options.until,
         rung=options.rung,
+        tuned=options.tuned,
+        reached=options.reached,
+        maps=options.maps,
         seed=options.seed,
         jobs=help_.jobs,
         pool=help_.pool,
@@ -167,6 +172,8 @@ def _studied(
     cost = {
         "check_seconds": gated - ready,
         "study_seconds": time.perf_counter() - gated,
+        "blame_seconds": 0.0 if study.blame is None else study.blame.seconds,
+        "maps_seconds": sum(found.seconds for found in study.maps),
         "jobs": float(help_.jobs),
     }
     result = RunResult(
@@ -195,7 +202,8 @@ def _study_wanted(
         "until": options.until,
     }
     options = merged(folder, inputs, options)
-    wanted["study"] = ({**inputs, "layers": layers_of(options)}, study_files(options))
+    files = study_files(options, len(modelfile.responses))
+    wanted["study"] = ({**inputs, "layers": layers_of(options)}, files)
     return wanted, options
 
 

@@ -14,10 +14,14 @@ from designer.equation_check import EquationCheck
 from designer.hearing import Hearing
 from designer.jsonout import FORMAT
 from designer.pipeline import Checked
+from designer.reached import Reached
 from designer.study import Study
-from designer.verdict import Answer, Verdict, Yield
+from designer.tuning import Tuned
+from designer.verdict import Answer, Verdict, Yield, count
+from designer.yield_maps import YieldMap
 
 MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")
+ORDER = (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED)
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
@@ -33,9 +37,14 @@ def study_json(
         "samples": study.plan.samples,
         "until": study.until,
         "narrow": study.narrow,
-        "all_on_one_board": _yield(study.all_on_one_board),
+        "all_on_one_board": {
+            "built": _yield(study.all_on_one_board),
+            "tuned": _yield(study.all_tuned),
+            "reached": _yield(study.all_reached),
+        },
         "equation_check": None if equations is None else equations.as_dict(),
         "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
+        "maps": [_map(found) for found in study.maps],
         "provenance": provenance,
         "cost": dict(cost),
     }
@@ -62,6 +71,9 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "margins": margins(answers),
         "agreement": _agreement(answers, study.heard_of(index)),
         "combined": _combined(study.combined[index]),
+        "tuned": _tuned(study.tuned_of(index)),
+        "reached": _reached(study, index),
+        "blame": _blame(study, index),
     }
     if counted is None:
         row["left_out"] = study.left_out[index]
@@ -81,6 +93,53 @@ def _yield(counted: Yield | None) -> dict[str, Any] | None:
         "low": low,
         "high": high,
     }
+
+
+def _tuned(rows: Sequence[Tuned]) -> dict[str, Any] | None:
+    """What exists within the bands, and under ``bench`` what the bench procedure finds."""
+    if not rows:
+        return None
+    bench = Counter(r.bench_verdict for r in rows)
+    found = Yield(*(bench[verdict] for verdict in ORDER))
+    return {
+        **_counted(count(rows)),
+        "tries": sum(r.tries for r in rows),
+        "reasons": _reasons(rows),
+        "bench": {
+            **_counted(found),
+            "steps": sum(r.bench_steps for r in rows),
+            "seen_where_it_is_not": sum(r.bench_seen and r.bench_verdict != "ok" for r in rows),
+        },
+    }
+
+
+def _reached(study: Study, index: int) -> dict[str, Any] | None:
+    """From power-up by the recipe."""
+    rows = study.reached_of(index)
+    if not rows or study.recipes is None:
+        return None
+    return {
+        **_counted(count(rows)),
+        "reasons": _reasons(rows),
+        "clipped_at_start": sum(r.clipped for r in rows),
+        "recipe": study.recipes[study.asked.index(index)].as_dict(),
+    }
+
+
+def _blame(study: Study, index: int) -> dict[str, Any] | None:
+    if study.blame is None or index not in study.asked:
+        return None
+    found: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
+    return found
+
+
+def _map(found: YieldMap) -> dict[str, Any]:
+    """Without what it cost, which stands with the other costs."""
+    return {key: value for key, value in found.as_dict().items() if key != "cost"}
+
+
+def _counted(counted: Yield) -> dict[str, Any]:
+    return {**(_yield(counted) or {}), "rate": counted.rate}
 
 
 def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str, Any]:
@@ -136,7 +195,7 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
     }
 
 
-def _reasons(answers: Sequence[Answer]) -> dict[str, int]:
+def _reasons(answers: Sequence[Answer | Tuned | Reached]) -> dict[str, int]:
     """Why boards do not show the response, most frequent first."""
     met = Counter(
         f"{a.verdict}: {_kind(a)}" if _kind(a) else str(a.verdict)
@@ -146,7 +205,7 @@ def _reasons(answers: Sequence[Answer]) -> dict[str, int]:
     return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
 
 
-def _kind(answer: Answer) -> str:
+def _kind(answer: Answer | Tuned | Reached) -> str:
     """The reason without its figures, so that like ones are counted together."""
     if answer.reason.startswith("asymmetric by"):
         return "asymmetric"

@@ -19,6 +19,7 @@ from designer.centring import centring_offset
 from designer.circuit import nominal_board
 from designer.ensemble import Ensemble
 from designer.exact import drive_of
+from designer.orbit import Orbit
 from designer.reduction import FloatingCircuit, Reduction
 from designer.setting_search import MOST_TRIES, Case, seek
 from designer.spread import draw_many
@@ -210,16 +211,18 @@ def _on_bench(
 
     results = list(parallel(play, known, jobs))
     moved = [k for k, r in enumerate(results) if r.seen and r.setting != AS_BUILT]
-    settled = ensemble.settle(
-        [known[k].sample - indices.start for k in moved],
-        [
-            drive_of(results[k].setting.of(plan.questions[known[k].question].excitation))
-            for k in moved
-        ],
-        np.array([results[k].state for k in moved]).reshape(len(moved), -1),
-        jobs=jobs,
-    )
-    orbits = dict(zip(moved, settled, strict=True))
+    orbits: dict[int, Orbit] = {}
+    if moved:
+        settled = ensemble.settle(
+            [known[k].sample - indices.start for k in moved],
+            [
+                drive_of(results[k].setting.of(plan.questions[known[k].question].excitation))
+                for k in moved
+            ],
+            np.array([results[k].state for k in moved]),
+            jobs=jobs,
+        )
+        orbits = dict(zip(moved, settled, strict=True))
     out = []
     for k, (answer, result) in enumerate(zip(known, results, strict=True)):
         question = plan.questions[answer.question]

@@ -127,23 +127,6 @@ def count(answers: Iterable[Judged]) -> Yield:
     )
 
 
-def all_on_one(rows: Iterable[tuple[int, Verdict]], questions: int) -> Yield | None:
-    """Boards that show every response: the worst verdict of each, lost before grazing before
-    failed. rows : (sample, verdict); None unless each board was asked every one of at least two
-    questions.
-    """
-    boards: dict[int, list[Verdict]] = {}
-    for sample, verdict in rows:
-        boards.setdefault(sample, []).append(verdict)
-    if questions < 2 or not boards or any(len(met) != questions for met in boards.values()):
-        return None
-    order = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
-    worst = Counter(next(v for v in order if v in met) for met in boards.values())
-    return Yield(
-        worst[Verdict.OK], worst[Verdict.LOST], worst[Verdict.GRAZING], worst[Verdict.FAILED]
-    )
-
-
 def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
     """Verdict and reason. Without an expectation the nominal circuit's own response is wanted."""
     if orbit.status is OrbitStatus.GRAZING:

@@ -30,7 +30,6 @@ from designer.verdict import (
     StudyPlan,
     Verdict,
     Yield,
-    all_on_one,
     count,
     judge,
 )
@@ -133,18 +132,6 @@ def test_count_sorts_verdicts() -> None:
     order = [Verdict.OK] * 4 + [Verdict.LOST] * 3 + [Verdict.GRAZING] * 2 + [Verdict.FAILED]
     got = count([replace(blank, verdict=v) for v in order])
     assert (got.ok, got.lost, got.grazing, got.failed) == (4, 3, 2, 1)
-
-
-def test_all_on_one_board_is_the_worst_of_each() -> None:
-    ok, lost, grazing, failed = Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED
-    boards = [(ok, ok), (ok, lost), (grazing, lost), (failed, grazing), (failed, ok), (ok, ok)]
-    rows = [(i, v) for i, board in enumerate(boards) for v in board]
-    got = all_on_one(rows, 2)
-    assert got is not None
-    assert (got.ok, got.lost, got.grazing, got.failed) == (2, 2, 1, 1)
-    assert all_on_one(rows[:-1], 2) is None
-    assert all_on_one([(0, ok)], 1) is None
-    assert all_on_one([], 2) is None
 
 
 # A small study on the exact rung.

@@ -1,0 +1,209 @@
+"""The work of a tolerance study, layer by layer: how far it grows and who is asked what.
+
+Each step takes a study and gives it back with more in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Literal
+
+from designer import hearing, layers
+from designer.bands import Bands
+from designer.blame import blame
+from designer.blocks import BlockStore
+from designer.hearing import NOMINAL_SAMPLES, Ask, Hearing
+from designer.layers import Runner
+from designer.progress import Progress
+from designer.reached import Reached
+from designer.recipe import Recipe
+from designer.recipe_search import find_recipes
+from designer.tuning import Tuned
+from designer.verdict import BLOCK, Answer, StudyPlan
+from designer.workers import SpicePool
+from designer.yield_maps import Over, yield_map
+
+if TYPE_CHECKING:
+    from designer.study import Study
+
+MOST_UNTIL = 100_000
+"""Samples at which a study that grows until its intervals are narrow gives up."""
+MOST_NOMINAL = 1000
+"""Boards of each response that ngspice starts from the nominal orbit in such a study, at most."""
+MORE_NOMINAL = 50
+"""By how many their number grows."""
+
+RungName = Literal["exact", "auto", "ngspice"]
+RUNGS: tuple[RungName, ...] = ("exact", "auto", "ngspice")
+
+
+class Stores:
+    """Where the layers of a study are kept; this one keeps nothing."""
+
+    def samples(self, plan: StudyPlan) -> BlockStore[Answer] | None:
+        return None
+
+    def ngspice(self, plan: StudyPlan) -> BlockStore[Hearing] | None:
+        return None
+
+    def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned] | None:
+        return None
+
+    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached] | None:
+        return None
+
+
+@dataclass(frozen=True)
+class Work:
+    """Who does the work of a study, and where it goes."""
+
+    jobs: int
+    pool: SpicePool | None
+    stores: Stores
+    runner: Runner
+    said: Progress
+    rung: RungName
+
+    def made(self, study: Study) -> Study:
+        """A study of the plan's samples."""
+        return self._all_heard(self._sampled(study, study.plan.samples), NOMINAL_SAMPLES)
+
+    def grown(self, study: Study) -> Study:
+        """A study of as many samples as it takes; it stops at edges of blocks only."""
+        until = study.until
+        assert until is not None
+        samples = -(-study.plan.samples // BLOCK) * BLOCK
+        nominal = NOMINAL_SAMPLES
+        study = self._sampled(study, samples)
+        while True:
+            asks = self._random(study, nominal)
+            study = replace(study, heard=self._heard(study, asks, last=False))
+            wide = _widths(study)
+            if max(wide) < until:
+                break
+            # Exact samples narrow the first part of an interval, boards in ngspice the second.
+            exact = max(high - low for low, high in (y.interval for y in study.yields if y))
+            spoken = self.pool is not None and self.rung == "auto"
+            if exact >= 0.7 * until and samples < MOST_UNTIL:
+                samples = min(samples + BLOCK, MOST_UNTIL)
+                study = self._sampled(study, samples)
+            elif spoken and nominal < min(MOST_NOMINAL, samples):
+                nominal += MORE_NOMINAL
+            elif samples < MOST_UNTIL and exact >= until:
+                samples = min(samples + BLOCK, MOST_UNTIL)
+                study = self._sampled(study, samples)
+            else:
+                break
+        study = self._all_heard(study, nominal)
+        narrow = max(_widths(study)) < until
+        if not narrow:
+            self.said.note(
+                f"the intervals are still wider than {until:g}: a study grows to "
+                f"{MOST_UNTIL} samples at most, and to {MOST_NOMINAL} boards in ngspice"
+            )
+        return replace(study, narrow=narrow)
+
+    def tuned(self, study: Study, bands: Bands) -> Study:
+        """With the generator free within the bands."""
+        plan = study.plan
+        step = self.said.stage("tuned boards", len(study.answers))
+        rows = layers.fill(
+            plan,
+            self.stores.tuned(plan, bands),
+            layers.SEARCH,
+            partial(layers.Tunings, plan, study.answers, bands),
+            self.runner,
+            step,
+        )
+        return replace(study, tuned=tuple(rows))
+
+    def reached(self, study: Study) -> Study:
+        """From power-up, by the recipes that the nominal circuit and a few boards suggest."""
+        plan = study.plan
+        self.said.stage("start recipes")
+        recipes = find_recipes(plan, self.jobs)
+        step = self.said.stage("boards from power-up", len(study.answers))
+        rows = layers.fill(
+            plan,
+            self.stores.reached(plan, recipes),
+            layers.SEARCH,
+            partial(layers.PowerUps, plan, recipes),
+            self.runner,
+            step,
+        )
+        return replace(study, reached=tuple(rows), recipes=recipes)
+
+    def blamed(self, study: Study) -> Study:
+        """With the parts that the losses come from."""
+        step = self.said.stage("blame")
+        found = blame(study.plan, study.answers, jobs=self.jobs, progress=step)
+        return replace(study, blame=found)
+
+    def mapped(self, study: Study, overs: Sequence[Over]) -> Study:
+        """With a yield map of each response over each of these settings."""
+        maps = []
+        for over in overs:
+            for number, index in enumerate(study.asked):
+                step = self.said.stage(f"yield map over {over}, response {index + 1}")
+                b = study.checked[index].model.b
+                found = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
+                maps.append(found)
+        return replace(study, maps=tuple(maps))
+
+    def _sampled(self, study: Study, samples: int) -> Study:
+        """With the answers of so many samples; those that it has are at an edge of a block."""
+        plan = replace(study.plan, samples=samples)
+        first = len(study.answers) // len(plan.questions)
+        steps = (samples - first) * len(plan.questions)
+        step = self.said.stage(
+            f"tolerance study, {samples} boards, responses: {len(plan.questions)}", steps
+        )
+        rows = layers.fill(
+            plan,
+            self.stores.samples(plan),
+            BLOCK,
+            partial(layers.Samples, plan),
+            self.runner,
+            step,
+            first,
+        )
+        return replace(study, plan=plan, answers=(*study.answers, *rows))
+
+    def _random(self, study: Study, nominal: int) -> list[Ask]:
+        if self.rung == "ngspice":
+            return hearing.ask_all(study.answers)
+        return hearing.ask_random(study.answers, nominal)
+
+    def _all_heard(self, study: Study, nominal: int) -> Study:
+        """With the boards at a boundary, which are known only once there is no more sample."""
+        asks = self._random(study, nominal)
+        if self.rung == "auto":
+            asks += hearing.ask_boundary(study.answers, study.plan.questions, asks)
+        return replace(study, heard=self._heard(study, asks))
+
+    def _heard(
+        self, study: Study, asks: Sequence[Ask], *, last: bool = True
+    ) -> tuple[Hearing, ...]:
+        plan = study.plan
+        asks = [a for a in asks if plan.questions[a.question].settings is not None]
+        if self.pool is None or not asks:
+            return ()
+        step = self.said.stage(f"ngspice, {len(asks)} runs", len(asks))
+        store = self.stores.ngspice(plan)
+        return tuple(
+            layers.listen(
+                plan, asks, store, self.pool, self.jobs, step, known=study.heard, last=last
+            )
+        )
+
+
+def _widths(study: Study) -> list[float]:
+    """Of each response's interval, the combined one where there is one."""
+    both = [
+        (c.low, c.high) if c is not None else y.interval
+        for c, y in zip(study.combined, study.yields, strict=True)
+        if y is not None
+    ]
+    return [high - low for low, high in both]

@@ -1,0 +1,214 @@
+"""Start recipes: what they say, what they try, and whether they keep their word."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from designer.boards import Boards
+from designer.circuit import Resistor, nominal_board
+from designer.deck import Excitation
+from designer.ensemble import Ensemble
+from designer.exact import drive_of
+from designer.flow import Flow
+from designer.power_up import until_strobe
+from designer.reached import Reached, phases, reached_block, switched_on
+from designer.recipe import Recipe, Way
+from designer.recipe_search import (
+    ASIDE,
+    HOLD,
+    STEP,
+    candidates,
+    find_recipes,
+    highest_resonance,
+    phase,
+)
+from designer.reduction import Reduction
+from designer.spread import draw
+from designer.verdict import Verdict
+from tests.bench_plans import answers, ensemble, period_counts, plan, question
+from tests.paper_cases import OMEGA, subject
+
+
+def recipes(p: int) -> dict[Way, Recipe]:
+    return {r.way: r for r in candidates(question(p), subject(p).system)}
+
+
+def nominal(p: int) -> Ensemble:
+    return ensemble([subject(p).board], p)
+
+
+# What a recipe is.
+
+
+@pytest.mark.parametrize("way", list(Way))
+def test_a_recipe_ends_at_the_wanted_setting_in_small_steps(way: Way) -> None:
+    recipe = recipes(2)[way]
+    stages = list(recipe.stages())
+    assert stages[-1] == (recipe.target, recipe.wait)
+    assert recipe.target == question(2).excitation
+    assert stages[0][0] == recipe.first
+    for (a, held), (b, _) in pairwise(stages):
+        assert held == HOLD
+        assert abs(math.log(b.frequency / a.frequency)) <= math.log1p(STEP) + 1e-12
+        assert abs(math.log(b.amplitude / a.amplitude)) <= math.log1p(STEP) + 1e-12
+    swept = sum(periods / setting.frequency for setting, periods in stages[:-1])
+    assert recipe.sweep_seconds == pytest.approx(swept)
+    assert [d.omega for d, _ in recipe.drives] == pytest.approx(
+        [2 * math.pi * e.frequency for e, _ in stages]
+    )
+
+
+def test_candidates_are_what_their_names_say() -> None:
+    found = recipes(2)
+    target = question(2).excitation
+    assert next(iter(found)) is Way.DIRECT
+    assert found[Way.DIRECT].first == target
+    assert found[Way.FROM_ABOVE].first.frequency == pytest.approx((1 + ASIDE) * target.frequency)
+    assert found[Way.FROM_BELOW].first.frequency == pytest.approx((1 - ASIDE) * target.frequency)
+    assert found[Way.AMPLITUDE].first == Excitation(target.frequency, 0.5 * target.amplitude)
+
+
+def test_the_long_sweep_begins_above_the_model_s_resonances() -> None:
+    """Inside the clearance the paper's two masses have ω² = (3 ± √5)/2, a little damped."""
+    hertz = highest_resonance(subject(1).system)
+    per_omega = subject(1).excitation.frequency / OMEGA[1]
+    undamped = math.sqrt((3.0 + math.sqrt(5.0)) / 2.0)
+    assert hertz / per_omega == pytest.approx(undamped, rel=0.05)
+    assert hertz / per_omega < undamped
+
+
+def test_a_recipe_in_words_and_in_json() -> None:
+    tried = replace(
+        recipes(1)[Way.FROM_ABOVE], reached=12, trials=12, board_reached=5, board_trials=6
+    )
+    frequency = tried.target.frequency
+    text = tried.text
+    assert f"switch on at {1.1 * frequency:.5g} Hz (omega 1.705)" in text
+    assert f"to {frequency:.5g} Hz (omega 1.55)" in text
+    assert "12 of 12" in text
+    assert "5 of 6" in text
+    said = json.loads(json.dumps(tried.as_dict()))
+    assert said["text"] == text
+    assert said["to_frequency_hz"] == frequency
+    assert said["sweep_seconds"] > 0.0
+    direct = recipes(1)[Way.DIRECT]
+    assert direct.sweep_seconds == 0.0
+    assert "at this setting" in direct.text
+
+
+def test_phases_fill_the_half_circle_too() -> None:
+    """A mirror symmetric circuit does not tell a phase from the one half a turn away."""
+    half = sorted((phase(k) % math.pi) / math.pi for k in range(12))
+    gaps = [b - a for a, b in pairwise(half)]
+    assert max(gaps) < 0.2
+    assert min(gaps) > 0.03
+
+
+# What the paper's circuit does (measured independently before: about a quarter of the starts from
+# rest end on 3-3-3 at ω = 1.55 and on 1-1-1 at ω = 0.85; a sweep reaches the wanted one always).
+
+
+@pytest.mark.parametrize(("p", "other"), [(1, "3-3-3"), (2, "1-1-1")])
+def test_a_direct_start_is_left_to_chance(p: int, other: str) -> None:
+    starts = [(0, question(p), recipes(p)[Way.DIRECT], phase(k)) for k in range(32)]
+    ended = switched_on(nominal(p), starts)
+    met = [e.orbit.response for e in ended]
+    assert set(met) == {f"1-{p}-{p}", other}
+    assert 0.12 <= met.count(other) / len(met) <= 0.40
+    for e in ended:
+        assert (e.verdict is Verdict.OK) == (e.orbit.response == f"1-{p}-{p}")
+
+
+@pytest.mark.parametrize("p", [1, 2])
+def test_a_sweep_from_above_all_resonances_is_not(p: int) -> None:
+    recipe = recipes(p)[Way.FROM_FAR]
+    starts = [(0, question(p), recipe, phase(k)) for k in range(8)]
+    ended = switched_on(nominal(p), starts)
+    assert {e.orbit.response for e in ended} == {f"1-{p}-{p}"}
+
+
+def test_recipes_found_keep_their_word_at_other_phases() -> None:
+    """On phases that the search has not seen; and 1-3-3 needs no more than to be switched on."""
+    of = plan(1, 3)
+    found = find_recipes(of, 2)
+    assert found[0].way is not Way.DIRECT
+    assert found[1].way is Way.DIRECT
+    for recipe, p in zip(found, (1, 3), strict=True):
+        assert recipe.reached == recipe.trials > 0
+        assert recipe.rate == 1.0
+        starts = [(0, question(p), recipe, 0.1 + 0.77 * k) for k in range(8)]
+        assert {e.verdict for e in switched_on(nominal(p), starts)} == {Verdict.OK}
+    other = replace(of, seed=99, samples=1000, questions=of.questions[1:])
+    assert find_recipes(other, 1) == found[1:]
+
+
+# Rows of a study.
+
+
+def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
+    """900 periods from discharged capacitors, without sweep, counted by eye."""
+    of = plan(2)
+    direct = recipes(2)[Way.DIRECT]
+    rows = reached_block(of, range(6), [direct], 2)
+    assert [(r.sample, r.question) for r in rows] == [(i, 0) for i in range(6)]
+    seen = 0
+    for row in rows:
+        board = draw(of.circuit, of.spread, of.seed, row.sample)
+        system = Reduction(of.circuit, board).system()
+        drive = drive_of(direct.target)
+        met = until_strobe(system, drive, row.phase)
+        assert met is not None
+        run = Flow(system, drive).run(met[0], 900)
+        counted = period_counts(run.strobes, run.counts)
+        if counted is not None:
+            assert row.response == "-".join(map(str, counted))
+            seen += 1
+        assert row.clipped is False
+        assert row.periods > direct.wait
+    assert seen >= 4
+
+
+def test_neither_jobs_nor_blocks_change_what_is_reached() -> None:
+    of = plan(1, 3)
+    known = [recipes(1)[Way.FROM_ABOVE], recipes(3)[Way.DIRECT]]
+    calls: list[int] = []
+    whole = reached_block(of, range(4), known, 2, lambda: calls.append(1))
+    assert len(calls) == len(whole) == 8
+    parts: list[Reached] = []
+    for block in (range(1), range(1, 4)):
+        parts += reached_block(of, block, known, 1)
+    assert parts == whole
+
+
+def test_phases_are_drawn_from_seed_and_sample_alone() -> None:
+    assert phases(3, 5, 4)[:2] == phases(3, 5, 2)
+    drawn = [phases(3, s, 1)[0] for s in range(400)]
+    assert len(set(drawn)) == 400
+    assert all(0.0 <= v < 2.0 * math.pi for v in drawn)
+    assert sum(drawn) / 400 == pytest.approx(math.pi, abs=4.0 * 2.0 * math.pi / math.sqrt(12 * 400))
+    assert phases(4, 5, 1) != phases(3, 5, 1)
+
+
+def test_reached_agrees_with_as_built_where_one_attractor_is_left() -> None:
+    """At ω = 0.54 the nominal circuit has one attractor: how it is started does not matter."""
+    of = plan(3)
+    rows = reached_block(of, range(8), [recipes(3)[Way.DIRECT]], 2)
+    ok = [a.verdict is Verdict.OK for a in answers(of, range(8))]
+    assert any(ok)
+    assert sum(r.verdict is Verdict.OK for r in rows) == pytest.approx(sum(ok), abs=1)
+
+
+def test_a_board_that_cannot_be_reduced_is_failed() -> None:
+    of = plan(1, samples=1)
+    broken = replace(of.circuit, parts=(*of.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
+    boards = Boards.of(broken, [nominal_board(broken)])
+    (ended,) = switched_on(Ensemble(boards), [(0, question(1), recipes(1)[Way.DIRECT], 1.0)])
+    assert ended.verdict is Verdict.FAILED
+    assert ended.reason
+    (row,) = reached_block(replace(of, circuit=broken), range(1), [recipes(1)[Way.DIRECT]], 1)
+    assert row.verdict is Verdict.FAILED

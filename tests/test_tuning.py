@@ -1,0 +1,211 @@
+"""Tuned: what the search finds, against grids and against boards with a known cure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from designer.adjustment import AS_BUILT, Adjustment
+from designer.all_on_one import all_on_one
+from designer.bands import Bands
+from designer.circuit import Resistor
+from designer.exact import drive_of
+from designer.flow import Flow
+from designer.reduction import Reduction
+from designer.setting_search import Case, filled, seek
+from designer.spread import Spread, draw
+from designer.tuning import MOST_TRIES, Tuned, tuned_block
+from designer.verdict import Answer, Verdict, judge
+from tests.bench_plans import answers, ensemble, period_counts, plan, question, shifted
+from tests.paper_cases import subject
+
+ROUGH = Spread(0.01, 0.01, 3e-4, 1e-3)
+
+
+def same(a: list[Tuned], b: list[Tuned]) -> bool:
+    return [repr(r) for r in a] == [repr(r) for r in b]
+
+
+def test_a_board_that_works_needs_nothing() -> None:
+    of = plan(1, 2, spread=Spread(0.0, 0.0, 0.0, 0.0, 0.0))
+    built = answers(of, range(2))
+    rows = tuned_block(of, range(2), built, Bands(), 1)
+    assert [(r.sample, r.question) for r in rows] == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    for row, answer in zip(rows, built, strict=True):
+        assert row.verdict is answer.verdict is Verdict.OK
+        assert row.setting == AS_BUILT
+        assert (row.tries, row.response) == (0, answer.response)
+        assert (row.radius, row.penetration, row.miss) == (
+            answer.radius,
+            answer.penetration,
+            answer.miss,
+        )
+        assert (row.bench_verdict, row.bench_seen, row.bench_steps) == (Verdict.OK, True, 1)
+
+
+def test_a_constant_force_is_cured_at_the_first_try() -> None:
+    """The board's only defect is a DC force of 4 % of the drive; the opposite one takes it away."""
+    p = 7
+    asked = question(p)
+    gain = sum(1.0 / r.value for r in subject(p).circuit.resistors if "s2" in r.nets)
+    lever = subject(p).circuit.values["R6"] * gain
+    ratio = 0.04
+    board = shifted(p, ratio * asked.excitation.amplitude / lever, "U2C")
+    boards = ensemble([board], p)
+    (lost,) = boards.settle([0], [drive_of(asked.excitation)], asked.start.start[None, :])
+    assert judge(lost, asked.spec, asked.start)[0] is Verdict.LOST
+    case = Case(0, asked, ratio)
+    seek(boards, [case], Bands())
+    assert case.found is not None
+    assert len(case.tries) == 1
+    assert case.found.setting == Adjustment(offset=ratio)
+    assert case.found.orbit.penetration == pytest.approx(asked.start.penetration, rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def rough() -> tuple[list[Answer], list[Tuned]]:
+    """Boards of which many fail as built."""
+    of = plan(3, 6, spread=ROUGH)
+    built = answers(of, range(8))
+    return built, tuned_block(of, range(8), built, Bands(), 2)
+
+
+def test_tuning_helps_and_takes_nothing_away(rough: tuple[list[Answer], list[Tuned]]) -> None:
+    built, rows = rough
+    works = [a.verdict is Verdict.OK for a in built]
+    assert 0 < sum(works) < len(works)
+    tuned = [r.verdict is Verdict.OK for r in rows]
+    assert all(t for t, b in zip(tuned, works, strict=True) if b)
+    assert sum(tuned) > sum(works)
+    assert {r.tries == 0 for r, b in zip(rows, works, strict=True) if b} == {True}
+
+
+def test_every_setting_found_lies_in_the_bands_and_works(
+    rough: tuple[list[Answer], list[Tuned]],
+) -> None:
+    """Held against a plain run of 900 periods from the nominal orbit, which shares no classifier
+    with the search. Settings found by following another attractor are not asked from there."""
+    of, bands = plan(3, 6, spread=ROUGH), Bands()
+    checked = 0
+    for row in rough[1]:
+        assert row.tries <= MOST_TRIES
+        assert row.setting.within(bands) == row.setting
+        if row.verdict is not Verdict.OK or not 0 < row.tries <= 9:
+            continue
+        asked = of.questions[row.question]
+        board = draw(of.circuit, of.spread, of.seed, row.sample)
+        flow = Flow(
+            Reduction(of.circuit, board).system(), drive_of(row.setting.of(asked.excitation))
+        )
+        run = flow.run(asked.start.start, 900)
+        found = period_counts(run.strobes, run.counts)
+        assert found is not None
+        assert f"{found[0]}-{found[1]}-{found[2]}" == row.response
+        checked += 1
+    assert checked >= 3
+
+
+def test_neither_jobs_nor_blocks_change_the_rows(rough: tuple[list[Answer], list[Tuned]]) -> None:
+    built, rows = rough
+    of = plan(3, 6, spread=ROUGH)
+    calls: list[int] = []
+    first = tuned_block(of, range(1), built, Bands(), 1, lambda: calls.append(1))
+    second = tuned_block(of, range(1, 2), built, Bands(), 1)
+    assert same(first + second, rows[:4])
+    assert len(calls) == 2
+
+
+def test_bands_of_no_width_are_as_built(rough: tuple[list[Answer], list[Tuned]]) -> None:
+    built, _ = rough
+    of = plan(3, 6, spread=ROUGH)
+    rows = tuned_block(of, range(4), built, Bands(0.0, 0.0, 0.0), 2)
+    assert [r.verdict for r in rows] == [a.verdict for a in built[:8]]
+    assert all(r.tries == 0 and r.setting == AS_BUILT for r in rows)
+    assert all(r.bench_setting == AS_BUILT for r in rows)
+
+
+def test_a_board_without_an_answer_stays_failed() -> None:
+    of = plan(1, samples=1)
+    broken = replace(of.circuit, parts=(*of.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
+    of = replace(of, circuit=broken)
+    known = Answer(0, 0, Verdict.FAILED, "failed", "singular", 0.0, 0.0, 0.0, 0.0, 0)
+    (row,) = tuned_block(of, range(1), [known], Bands(), 1)
+    assert row.verdict is Verdict.FAILED
+    assert row.reason == "singular"
+    assert row.unanswered == row.tries
+    assert (row.bench_verdict, row.bench_seen) == (Verdict.FAILED, False)
+
+
+def test_a_board_of_which_the_answer_is_missing_is_an_error() -> None:
+    with pytest.raises(KeyError):
+        tuned_block(plan(1), range(1), [], Bands(), 1)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_filling_points_are_in_every_corner(dimensions: int) -> None:
+    """Any 8 in a row (24 in three dimensions) have one in each quadrant or octant."""
+    count = {2: 8, 3: 24}[dimensions]
+    points = filled(count, dimensions)
+    assert points.shape == (count, dimensions)
+    assert np.abs(points).max() < 1.0
+    corners = {tuple(np.sign(p)) for p in points}
+    assert len(corners) == 2**dimensions
+    gaps = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
+    assert gaps[~np.eye(count, dtype=bool)].min() > 0.05
+
+
+def test_all_on_one_takes_the_worst_of_each_board() -> None:
+    blank = Answer(0, 0, Verdict.OK, "", "", 0.0, 0.0, 0.0, 0.0, 0)
+    said = {
+        0: ("ok", "ok"),
+        1: ("ok", "lost"),
+        2: ("grazing", "failed"),
+        3: ("failed", "ok"),
+        4: ("failed", "lost"),
+        5: ("ok", "ok"),
+    }
+    rows = [
+        replace(blank, sample=s, question=q, verdict=Verdict(v))
+        for s, verdicts in said.items()
+        for q, v in enumerate(verdicts)
+    ]
+    found = all_on_one(rows)
+    assert (found.ok, found.lost, found.grazing, found.failed) == (2, 2, 1, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("p", "sigma", "boards"), [(4, 1e-3, 3), (8, 3e-4, 3)])
+def test_the_search_finds_what_a_dense_grid_finds(p: int, sigma: float, boards: int) -> None:
+    """Every board that works somewhere on an 11 x 11 x 11 grid over the bands, from the nominal
+    orbit, is found with a hundredth of the questions."""
+    of = plan(p, spread=Spread(0.01, 0.01, sigma, 4 * sigma), seed=5)
+    built = answers(of, range(12))
+    lost = [a.sample for a in built if a.verdict is not Verdict.OK][:boards]
+    assert lost
+    asked, bands = of.questions[0], Bands()
+    ten = np.linspace(-1.0, 1.0, 11)
+    grid = [
+        Adjustment(f * bands.frequency, a * bands.amplitude, d * bands.offset)
+        for f in ten
+        for a in ten
+        for d in ten
+    ]
+    for sample in lost:
+        (row,) = tuned_block(of, range(sample, sample + 1), built, bands, 2)
+        boards_ = ensemble([draw(of.circuit, of.spread, of.seed, sample)], p)
+        found = False
+        for first in range(0, len(grid), 121):
+            part = grid[first : first + 121]
+            orbits = boards_.settle(
+                [0] * len(part),
+                [drive_of(s.of(asked.excitation)) for s in part],
+                np.tile(asked.start.start, (len(part), 1)),
+                jobs=2,
+            )
+            met = [judge(o, asked.spec, asked.start)[0] for o in orbits]
+            if Verdict.OK in met:
+                found = True
+                break
+        assert row.verdict is Verdict.OK or not found
