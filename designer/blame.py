@@ -19,31 +19,28 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, sobol_indices
+from scipy.stats import binomtest
 
 from designer import margins as smooth
 from designer.boards import Boards
-from designer.circuit import Capacitor, Circuit, Reference, Resistor, Section, nominal_board
+from designer.circuit import Capacitor, Reference, Resistor, Section
+from designer.corners import Corner, worst_corners
 from designer.ensemble import Ensemble
 from designer.exact import drive_of
+from designer.margin_indices import Index, sobol
 from designer.margins import Margin, Prediction
-from designer.quantities import Quantity, exact_in, quantities, with_column
-from designer.spread import Spread, draw_many, part_of
-from designer.system import Array
-from designer.system import Index as Places
+from designer.quantities import exact_in, quantities
+from designer.spread import draw_many
 from designer.verdict import Answer, StudyPlan, Verdict, judge
 
 LOST, KEPT = 50, 20
 """Boards of each response that are replayed: lost ones, and ok ones, in order of the samples."""
-CUBE = 512
-"""Base samples of the Sobol indices; a power of two."""
-CORNER = 5
-"""Coordinates that are put to the ends of their ranges."""
 SHOWN_LIMITS = 4
+DRAWN = 256
+"""Boards, at least, from which the standard deviations of the quantities are taken."""
 
 _DEAD_ZONE = re.compile(r"R[2-9]\d\d[AB]?")
 
@@ -79,38 +76,11 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Index:
-    """Sobol indices of the margin for one coordinate of the spread, which belongs to ``part``."""
-
-    coordinate: str
-    part: str
-    first: float
-    total: float
-
-
-@dataclass(frozen=True)
 class NearLimit:
     """What ends the response: in words, and how many standard deviations away it is nominally."""
 
     what: str
     distance: float
-
-
-@dataclass(frozen=True)
-class Corner:
-    """Coordinates at the ends of their ranges, all others nominal.
-
-    coordinates : what was put to its ends; worst : for each "low" or "high" in the corner of the
-    least margin; margin : there. verdict, response : on the exact rung. survived : of ``corners``.
-    """
-
-    coordinates: tuple[str, ...]
-    worst: tuple[str, ...]
-    margin: float
-    verdict: Verdict
-    response: str
-    survived: int
-    corners: int
 
 
 @dataclass(frozen=True)
@@ -187,7 +157,7 @@ def blame(
         return step
 
     count = 1 + max((a.sample for a in answers), default=0)
-    boards = draw_many(plan.circuit, plan.spread, plan.seed, range(count))
+    boards = draw_many(plan.circuit, plan.spread, plan.seed, range(max(count, DRAWN)))
     rows = [
         sorted((a for a in answers if a.question == i), key=lambda a: a.sample)
         for i in range(len(plan.questions))
@@ -197,7 +167,7 @@ def blame(
         plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=count_as("orbits")
     )
     indices = sobol(plan.circuit, plan.spread, found, plan.seed)
-    corners = _corners(plan, found, indices, jobs, count_as("attractors"))
+    corners = worst_corners(plan, found, indices, jobs, count_as("attractors"))
     responses = []
     for i, row in enumerate(rows):
         number = sum(a.verdict is Verdict.LOST for a in row)
@@ -224,54 +194,6 @@ def blame(
         spent["orbits"],
         time.perf_counter() - began,
     )
-
-
-def sobol(
-    circuit: Circuit, spread: Spread, margins: Sequence[Margin], seed: int, base: int = CUBE
-) -> list[tuple[Index, ...]]:
-    """Sobol indices of each margin over the spread's coordinates, largest total first.
-
-    Saltelli's estimators with ``base`` base samples on a scrambled Sobol set (scipy.stats). Empty
-    where nothing limits.
-    """
-    names = spread.coordinates(circuit)
-    real = [m for m in margins if m.limits]
-    if not real:
-        return [() for _ in margins]
-
-    def values(cube: Array) -> Array:
-        boards = spread.from_cube(circuit, np.minimum(cube.T, 1.0 - 2.0**-53))
-        return np.stack([m.of(boards) for m in real])
-
-    uniform: Any = _Uniform()
-    found = sobol_indices(
-        func=values,
-        n=base,
-        dists=[uniform] * len(names),
-        rng=np.random.default_rng([seed, base]),
-    )
-    first = np.reshape(found.first_order, (len(real), len(names)))
-    total = np.reshape(found.total_order, (len(real), len(names)))
-    by_margin = iter(range(len(real)))
-    out: list[tuple[Index, ...]] = []
-    for margin in margins:
-        if not margin.limits:
-            out.append(())
-            continue
-        i = next(by_margin)
-        rows = (
-            Index(name, part_of(name), float(first[i, k]), float(total[i, k]))
-            for k, name in enumerate(names)
-        )
-        out.append(tuple(sorted(rows, key=lambda x: (-x.total, x.coordinate))))
-    return out
-
-
-class _Uniform:
-    """A coordinate of the cube, as scipy.stats wants it."""
-
-    def ppf(self, q: Array) -> Array:
-        return q
 
 
 def _replay(
@@ -352,63 +274,6 @@ _KINDS: dict[type, str] = {
     Section: "op-amp",
     Reference: "reference",
 }
-
-
-def _corners(
-    plan: StudyPlan,
-    margins: Sequence[Margin],
-    indices: Sequence[Sequence[Index]],
-    jobs: int,
-    progress: Callable[[], None],
-) -> list[Corner | None]:
-    width = len(plan.spread.coordinates(plan.circuit))
-    ends = plan.spread.from_cube(
-        plan.circuit, np.array([np.zeros(width), np.full(width, 1.0 - 2.0**-53)])
-    )
-    out: list[Corner | None] = []
-    for i, (margin, ranked) in enumerate(zip(margins, indices, strict=True)):
-        known = {q.name: q for q in margin.quantities}
-        chosen = [known[x.coordinate] for x in ranked if x.coordinate in known][:CORNER]
-        if not chosen:
-            out.append(None)
-            continue
-        picks = np.array(list(product((0, 1), repeat=len(chosen))), dtype=np.intp)
-        boards = _corner_boards(plan.circuit, chosen, ends, picks)
-        question = plan.questions[i]
-        orbits = Ensemble(boards).settle(
-            range(len(boards)),
-            [drive_of(question.excitation)] * len(boards),
-            np.tile(question.start.start, (len(boards), 1)),
-            jobs=jobs,
-            progress=progress,
-        )
-        verdicts = [judge(o, question.spec, question.start)[0] for o in orbits]
-        values = margin.of(boards)
-        worst = int(np.argmin(values))
-        out.append(
-            Corner(
-                tuple(q.name for q in chosen),
-                tuple("high" if end else "low" for end in picks[worst]),
-                float(values[worst]),
-                verdicts[worst],
-                orbits[worst].response,
-                sum(v is Verdict.OK for v in verdicts),
-                len(boards),
-            )
-        )
-    return out
-
-
-def _corner_boards(
-    circuit: Circuit, chosen: Sequence[Quantity], ends: Boards, picks: Places
-) -> Boards:
-    """(2^k,) nominal boards with the chosen quantities at their low (0) or high (1) end."""
-    boards = Boards.of(circuit, [nominal_board(circuit)]).take(np.zeros(len(picks), dtype=np.intp))
-    for k, q in enumerate(chosen):
-        # Of a lower limit too "low" is the smaller number, whichever way it is drawn.
-        pair = np.sort(getattr(ends, q.group)[q.part])
-        boards = with_column(boards, q, pair[picks[:, k]])
-    return boards
 
 
 def _sentence(

@@ -30,7 +30,7 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
         return figure
     groups, parts = _rows([b for _, b in shown])
     rows = groups + parts
-    figure = new_figure(min(2.6 + 0.62 * len(shown), 11.0), 0.235 * len(rows) + 1.5)
+    figure = new_figure(7.4, 0.2 * len(rows) + 1.3)
     axes = figure.subplots()
     values = np.full((len(rows), len(shown)), np.nan)
     for j, (_, b) in enumerate(shown):
@@ -41,7 +41,7 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
     image = axes.imshow(values, cmap=COLOURS, vmin=0.0, vmax=100.0, aspect="auto")
     axes.set_yticks(range(len(rows)), rows, color=INK)
     ticks = [f"{_short(t)}\n{b.lost} lost" for t, b in shown]
-    axes.set_xticks(range(len(shown)), ticks, color=INK)
+    axes.set_xticks(range(len(shown)), ticks, color=INK, size=7)
     axes.tick_params(length=0)
     for spine in axes.spines.values():
         spine.set_visible(False)

@@ -148,10 +148,11 @@ def margins(
         progress=progress,
     )
     nominal = Boards.of(circuit, [nominal_board(circuit)])
+    probes = _probes(nominal, differing)
     found: list[list[Limit]] = []
     for question in questions:
         base = _Base(nominal, question, question.start)
-        found.append(_nominal_limits(base, differing, boards, jobs, progress))
+        found.append(_nominal_limits(base, probes, differing, boards, jobs, progress))
     for crossing in met:
         limit = _crossing_limit(
             crossing, questions[crossing.question], boards, differing, jobs, progress
@@ -183,9 +184,19 @@ class _Base:
         return bool(self.orbit.n % 2 and self.orbit.asymmetry < SYMMETRY_TOLERANCE)
 
 
-def _follow(base: _Base, boards: Boards, jobs: int) -> list[Followed | None]:
+def _probes(board: Boards, differing: Sequence[Quantity]) -> Ensemble:
+    """For each quantity the board with a little less of it, then with a little more."""
+    rows = board.take(np.zeros(2 * len(differing), dtype=np.intp))
+    for k, q in enumerate(differing):
+        values = column(rows, q).copy()
+        values[2 * k] -= STEP * q.sigma
+        values[2 * k + 1] += STEP * q.sigma
+        rows = with_column(rows, q, values)
+    return Ensemble(rows)
+
+
+def _follow(base: _Base, ensemble: Ensemble, jobs: int) -> list[Followed | None]:
     """The base's orbit on each of these boards."""
-    ensemble = Ensemble(boards)
 
     def one(index: int) -> Followed | None:
         try:
@@ -194,30 +205,24 @@ def _follow(base: _Base, boards: Boards, jobs: int) -> list[Followed | None]:
         except (ArithmeticError, np.linalg.LinAlgError):
             return None
 
-    return list(parallel(one, range(len(boards)), jobs))
+    return list(parallel(one, range(len(ensemble)), jobs))
 
 
 def _gradients(
     base: _Base,
     wanted: Sequence[Function],
-    differing: Sequence[Quantity],
+    probes: Ensemble,
     jobs: int,
     progress: Callable[[], None],
 ) -> Array:
     """(functions, k) change over one standard deviation of each quantity; 0 where the orbit or the
     extreme is not found on one of the two boards of a difference."""
-    rows = base.board.take(np.zeros(2 * len(differing), dtype=np.intp))
-    for k, q in enumerate(differing):
-        values = column(rows, q).copy()
-        values[2 * k] -= STEP * q.sigma
-        values[2 * k + 1] += STEP * q.sigma
-        rows = with_column(rows, q, values)
-    runs = _follow(base, rows, jobs)
+    runs = _follow(base, probes, jobs)
     for _ in runs:
         progress()
-    out = np.zeros((len(wanted), len(differing)))
+    out = np.zeros((len(wanted), len(runs) // 2))
     for f, function in enumerate(wanted):
-        for k in range(len(differing)):
+        for k in range(len(runs) // 2):
             below, above = function.on(runs[2 * k]), function.on(runs[2 * k + 1])
             if below is not None and above is not None:
                 out[f, k] = (above - below) / (2.0 * STEP)
@@ -226,16 +231,17 @@ def _gradients(
 
 def _nominal_limits(
     base: _Base,
+    probes: Ensemble,
     differing: tuple[Quantity, ...],
     boards: Boards,
     jobs: int,
     progress: Callable[[], None],
 ) -> list[Limit]:
-    orbit = _follow(base, base.board, 1)[0]
+    orbit = _follow(base, Ensemble(base.board), 1)[0]
     if orbit is None:
         return []
     wanted = functions(orbit, base.symmetric)
-    slopes = _gradients(base, wanted, differing, jobs, progress)
+    slopes = _gradients(base, wanted, probes, jobs, progress)
     limits = [
         limit
         for f, row in zip(wanted, slopes, strict=True)
@@ -260,7 +266,7 @@ def _crossing_limit(
     shares = np.array([BACK * crossing.inside, crossing.inside])
     near = between(lost, shares)
     base = _Base(near.take([0]), question, crossing.orbit)
-    before, last = _follow(base, near, 1)
+    before, last = _follow(base, Ensemble(near), 1)
     if before is None or last is None:
         return None
     end, first = 0.5 * (crossing.inside + crossing.outside), None
@@ -274,7 +280,7 @@ def _crossing_limit(
             first = (zero, function)
     if first is None:
         return None
-    slopes = _gradients(base, [first[1]], differing, jobs, progress)[0]
+    slopes = _gradients(base, [first[1]], _probes(base.board, differing), jobs, progress)[0]
     row = boards.take([crossing.board])
     way = np.array([float((column(row, q)[0] - q.nominal) / q.sigma) for q in differing])
     limit = _limit(first[1], -end * float(np.sum(slopes * way)), slopes, differing, boards)

@@ -168,7 +168,7 @@ def _limits(data: ReportData) -> Table | None:
         if decided:
             said = f"{p.right} of {decided}"
             if p.right < decided:
-                said += f" ({p.missed} lost boards missed, {p.alarms} false alarms)"
+                said += f" (lost boards missed: {p.missed}, false alarms: {p.alarms})"
         rows.append((words.name(c), b.limited_by, said))
     if not rows:
         return None

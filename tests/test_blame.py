@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from designer.attractor import settle
-from designer.blame import Blame, Index, blame, sobol
+from designer.blame import Blame, blame
 from designer.boards import Boards
 from designer.circuit import nominal_board
 from designer.crossings import crossings
 from designer.exact import block, drive_of
 from designer.flow import Flow
 from designer.followed import Function, follow, functions
+from designer.margin_indices import Index, sobol
 from designer.margins import Limit, Margin, Prediction
 from designer.modelfile import Expect, Response
 from designer.quantities import Quantity, between, column, quantities, with_column

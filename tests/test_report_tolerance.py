@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from designer import pipeline
-from designer.blame import Blame, Corner, Index, NearLimit, ResponseBlame, Subject
+from designer.blame import Blame, NearLimit, ResponseBlame, Subject
 from designer.catalog import load_catalog
+from designer.corners import Corner
 from designer.exact import block
+from designer.margin_indices import Index
 from designer.margins import Prediction
 from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
@@ -167,7 +169,7 @@ def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
     assert lost == "10"
     assert groups == "all offsets: 9 of 10 (60 to 98 %), 1 of 4 ok boards lost"
     assert parts == "U3C: 6 of 10 (31 to 83 %)"
-    assert said["limit_table"].rows[0][2] == "95 of 100 (2 lost boards missed, 3 false alarms)"
+    assert said["limit_table"].rows[0][2] == "95 of 100 (lost boards missed: 2, false alarms: 3)"
     assert said["corner_table"].rows[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
     assert "500 attractors" in said["blame_note"]
 
