@@ -16,7 +16,7 @@ from designer.reduction import Reduction
 from designer.spread import draw, draw_many
 from designer.system import Array, Drive, PiecewiseLinearSystem
 from tests.test_ensemble import FEW, STAGES, nominal
-from tests.test_montecarlo import plan
+from tests.test_verdict import plan
 
 
 def integrated(system: PiecewiseLinearSystem, drive: Drive, x: Array, periods: int) -> Array:
