@@ -80,7 +80,7 @@ def test_every_choice_of_a_small_catalogue(seed: int) -> None:
     compare(best(t, resistors, capacitors, np.ones(2), OPEN), truth)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), shape=st.sampled_from([(2, 2), (2, 3), (1, 3), (3, 1)]))
 def test_every_choice_of_random_catalogues(seed: int, shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(seed)
