@@ -215,7 +215,7 @@ class Reduction:
             d=rows[:, n + 1],
             guards=tuple(guards),
             sides=sides,
-            clipped=any(position != 0 and not s.limits for s, position in amplifiers),
+            clipped=any(position and not c.may_limit(s, position) for s, position in amplifiers),
         )
 
     def _sides(self, key: ModeKey) -> tuple[int, ...]:
