@@ -14,7 +14,8 @@ import pytest
 from designer import composites
 from designer.bom import bill
 from designer.catalog import load_catalog
-from designer.composites import EXACT, Pair, Program, best, pairs_near
+from designer.coefficients import EXACT
+from designer.composites import Pair, Program, best, pairs_near
 from designer.design import Design, Peaks
 from designer.job import Options, read_design, synthesise_into
 from designer.minimax import minimax

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from designer import linear_search
+from designer.coefficients import EXACT
 from designer.completion import Bounds
 from designer.eseries import series_values
 from designer.linear_block import Targets
@@ -189,7 +190,7 @@ def test_a_lower_bound_is_one_where_the_work_runs_out(
         return
     assert answer.bound <= truth + 1e-9
     assert answer.error >= truth - CLOSE
-    assert answer.proved is (answer.error <= answer.bound + linear_search.PROOF_TOLERANCE)
+    assert answer.proved is (answer.error <= answer.bound + EXACT)
 
 
 PAPER = Dimensionless(0.5, 0.5, 0.0, 0.5, 0.1, 0.0, 0.25)
