@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 
 from designer.attempt import Attempt, Order, attempt, linear_block
-from designer.dead_zone_target import EXACT
+from designer.coefficients import EXACT
 from designer.limits import Limits
 from designer.linear_search import FIRST_LEVEL, LinearBlock
 from designer.selection import Shortfall

@@ -250,6 +250,18 @@ class Circuit:
         pairs = zip(self.switches, self.rest, strict=True)
         return tuple(moved.get(name, position) for name, position in pairs)
 
+    def may_limit(self, section: Section, position: int) -> bool:
+        """Whether a section may stand at this limit, 1 upper or -1 lower: those of the dead-zone
+        stage may; one that is a stop's switch only at the end where a stop is. The free end of a
+        one-sided stage would be a second stop that the model does not have."""
+        ends = {
+            contact.position
+            for stop in self.stops
+            for _, contact in stop.contacts
+            if contact.switch == section.name
+        }
+        return section.limits and (not ends or position in ends)
+
     @property
     def packages(self) -> tuple[str, ...]:
         """Op-amp packages in order of appearance."""

@@ -20,6 +20,10 @@ from designer.minimax import minimax
 from designer.reduction import Reduction
 from designer.system import Array
 
+EXACT = 1e-6
+"""Errors that differ by less count as equal: one up to it as none, one this close to its lower
+bound as proved, and a condition that costs less as one that does not bind."""
+
 
 @dataclass(frozen=True)
 class Scales:

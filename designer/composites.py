@@ -18,14 +18,12 @@ import cvxpy as cp
 import numpy as np
 
 from designer.attempt import Attempt, Order
-from designer.coefficients import CoefficientErrors
+from designer.coefficients import EXACT, CoefficientErrors
 from designer.partnames import matching_resistors
 from designer.selection import SOLVER
 from designer.system import Array
 from designer.topology import Composite
 
-EXACT = 1e-6
-"""An error that counts as none."""
 REACH = 3.0
 """Half width, in ln, of the tables of pairs at least, in units of the error to be cured."""
 MOST_PAIRS = 48

@@ -8,6 +8,7 @@ import numpy as np
 
 from designer.catalog import OpAmp
 from designer.circuit import Circuit, Section
+from designer.dead_zone_parts import idle_limits
 from designer.design import Check, Design, Peaks
 from designer.limits import (
     GENERATOR_PEAK,
@@ -43,6 +44,7 @@ def verify(
     """
     found = [
         *_swing(design, peaks, loads),
+        *_idle(design, loads),
         *_level(design, opamp, peaks),
         *_stages(design, opamp, peaks),
         *_current(opamp, loads),
@@ -63,6 +65,28 @@ def _swing(design: Design, peaks: Peaks, loads: Loads | None) -> list[Check]:
         if load.section not in meant and load.peak > top:
             where, top = load.section, load.peak
     return [Check("swing", "swing_v", limit, top, where)]
+
+
+def _idle(design: Design, loads: Loads | None) -> list[Check]:
+    """fv of a rectifier against what the idle half's series diode stands, on the worse side.
+
+    The driving section's output is a drop beyond fv.
+    """
+    reach = idle_limits(design.circuit, effective(design.circuit.values, design.composites))
+    drop = {d.name: d.model.drop for d in design.circuit.diodes}
+    found = [
+        Check(
+            "swing",
+            "rectifier_fv_v",
+            abs(limit),
+            max((load.high if limit > 0.0 else -load.low) - drop[diode], 0.0),
+            diode,
+        )
+        for load in _known(loads)
+        if load.section in reach
+        for diode, limit in [reach[load.section]]
+    ]
+    return [max(found, key=lambda check: check.excess)] if found else []
 
 
 def saturating(circuit: Circuit) -> frozenset[str]:

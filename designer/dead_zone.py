@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from designer import rectifier_stage, saturating_search
-from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget, parts_of
+from designer.coefficients import EXACT
+from designer.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
 from designer.system import Array
 from designer.ties import ties_of
 from designer.value_program import Ranking

@@ -6,12 +6,14 @@ belongs to the integrator. docs/synthesis.md has the formulas.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from designer.circuit import (
     GROUND,
     NEGATIVE,
     POSITIVE,
+    Circuit,
     Contact,
     Diode,
     Part,
@@ -164,6 +166,25 @@ def _rectifier(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[Pa
         ]
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
     return parts, Stop(clearance, MOVING, contacts.get(1), contacts.get(-1))
+
+
+def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:
+    """How far a half of the rectifier may drive fv [V] before the other's series diode conducts.
+
+    By the driving section: that diode, and 2 Vref R208/R201 and two drops of the idle half, with
+    the sign that fv has then. values : [ohm] by name, a composite's as one. Empty where there are
+    not both halves.
+    """
+    references = {r.name: r for r in circuit.references}
+    if any(half.reference not in references for half in _HALVES.values()):
+        return {}
+    out = {}
+    for side, driving in _HALVES.items():
+        idle = _HALVES[-side]
+        lift = 2.0 * references[idle.reference].volts * values[idle.lift] / values[idle.threshold]
+        drop = next(d.model.drop for d in circuit.diodes if d.name == idle.series)
+        out[driving.section] = (idle.series, side * (lift + 2.0 * drop))
+    return out
 
 
 def _section(name: str, node: str, out: str, role: str) -> Section:

@@ -7,8 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-EXACT = 1e-6
-"""An error up to it counts as none, and an error this close to its bound as proved."""
 EXCURSION_MARGIN = 1.05
 """Of the largest excursion on the free side of a one-sided stop."""
 LEAST_SPAN, SPAN_ROOM = 1.25, 1.6

@@ -81,7 +81,7 @@ class Limits:
         out = self
         for check in broken:
             by = check.excess * (1.0 + MARGIN)
-            if check.quantity in ("swing_v", "generator_peak_v"):
+            if check.quantity in ("swing_v", "rectifier_fv_v", "generator_peak_v"):
                 out = replace(out, swing=out.swing / by)
             elif check.quantity == "signal_level_ratio":
                 out = replace(out, level=out.level / by)

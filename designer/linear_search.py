@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from designer.coefficients import EXACT
 from designer.completion import Bounds, rules_of
 from designer.linear_block import PARTS, Targets, catalogue, slice_from
 from designer.linear_kernel import Rules, Values, complete
@@ -24,8 +25,6 @@ from designer.wishes import NO_WISHES, Wishes
 
 FIRST_LEVEL, GROWTH, LAST_LEVEL = 1e-9, 1.6, 0.1
 """Levels: the first, then 1e-6 and on by this factor, up to the last."""
-PROOF_TOLERANCE = 1e-6
-"""An error this close to its lower bound counts as proved."""
 MOST_STEPS = 600_000_000
 """Steps of the compiled loops that one search may take: a few seconds."""
 THINNED = (8, 4, 2)
@@ -48,7 +47,7 @@ class LinearBlock:
     values : by part name [ohm, F]. error : the least that the largest of the ten errors can be
     made by the scales; with ``Wishes.slack`` up to that much above ``least``, the least error
     that was found. bound : no choice under the conditions has a smaller error. proved : ``least``
-    is within ``PROOF_TOLERANCE`` of bound. proof : how that is known, in words. solver : its word
+    is within ``EXACT`` of bound. proof : how that is known, in words. solver : its word
     for the choice among equals.
     """
 
@@ -134,7 +133,7 @@ def best(
         error=error,
         least=least,
         bound=bound,
-        proved=least <= bound + PROOF_TOLERANCE,
+        proved=least <= bound + EXACT,
         proof=_proof(found, len(signal), len(capacitors)),
         solver=chosen.solver,
         cost=Cost(time.perf_counter() - began, found.rows, found.steps),

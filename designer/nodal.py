@@ -159,7 +159,7 @@ class NodalEquations:
     def clipped(self, key: ModeKey) -> bool:
         """Whether an op-amp that ought to be linear is at a limit."""
         pairs = zip(self._sections, key, strict=False)
-        return any(position != 0 and not s.limits for s, position in pairs)
+        return any(position and not self.circuit.may_limit(s, position) for s, position in pairs)
 
     def _side(self, stop: Stop, key: ModeKey) -> int:
         for side, contact in stop.contacts:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget, outside
+from designer.coefficients import EXACT
+from designer.dead_zone_target import DeadZone, DeadZoneTarget, outside
 from designer.system import Array, Mask
 from designer.value_program import Ranking, Rows, choose, fewest
 from designer.value_tables import (

@@ -50,6 +50,7 @@ _CONDITIONS = {
     "frequency_low_hz": ("frequency at ω = 1, at least", "Hz"),
     "frequency_high_hz": ("frequency at ω = 1, at most", "Hz"),
     "swing_v": ("peak of any state, at most", "V"),
+    "rectifier_fv_v": ("rectifier's output, so that the idle half stays off, at most", "V"),
     "generator_peak_v": ("generator amplitude (peak), at most", "V"),
     "signal_level_ratio": ("ratio of the states' peaks that belong together, at most", ""),
     "signal_share_ratio": ("another state's peak over that of x₁, at most", ""),

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer import saturating_rows, saturating_stage
-from designer.dead_zone_target import EXACT, DeadZone, DeadZoneTarget, parts_of
+from designer.coefficients import EXACT
+from designer.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
 from designer.saturating_tables import (
     MOST_SHIFT,
     Box,

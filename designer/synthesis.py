@@ -21,11 +21,12 @@ from designer.attempt import Attempt, Order, attempt, linear_block, order, zone_
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.circuitspec import SIDE_CONDITIONS, CircuitSpec
+from designer.coefficients import EXACT
 from designer.design import Certificate, Check, Design, Peaks
 from designer.errors import InputError, Unreachable
 from designer.freeing import FREES
 from designer.limits import LOAD, SIGNAL, SWING_SHARE, Limits, limits
-from designer.linear_search import PROOF_TOLERANCE, LinearBlock
+from designer.linear_search import LinearBlock
 from designer.model import Dimensionless
 from designer.partnames import check_names, check_preferred, parts_of, wishes_of
 from designer.reduction import Reduction
@@ -45,8 +46,6 @@ __all__ = [
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
-WORTH = 1e-6
-"""What a condition must cost in error to be called binding."""
 
 
 @dataclass(frozen=True)
@@ -240,7 +239,7 @@ def _certificate(made: Attempt, widest: LinearBlock) -> Certificate:
         proof += "; the circuit has another linear block, for the dead zone or the conditions"
     if zone is not None:
         proof += f"; dead zone, for the scales of the circuit's linear block: {zone.proof}"
-    proved = widest.proved and reached <= widest.bound + PROOF_TOLERANCE
+    proved = widest.proved and reached <= widest.bound + EXACT
     return Certificate("optimal" if proved else "bound", min(widest.bound, reached), proof)
 
 
@@ -255,7 +254,7 @@ def _with_composites(
     improved = _verified(order, better, order.spec.kept, found)
     if not all(check.holds for check in improved.checks):
         return design
-    exact = improved.errors.max_error <= PROOF_TOLERANCE
+    exact = improved.errors.max_error <= EXACT
     certificate = Certificate(
         "optimal" if exact else "bound",
         0.0,
@@ -263,7 +262,7 @@ def _with_composites(
         if exact
         else "composites near the best single parts; no lower bound but 0",
     )
-    least = improved.errors.max_error - WORTH
+    least = improved.errors.max_error - EXACT
     binding = {name: cost for name, cost in design.binding.items() if cost < least}
     return replace(improved, certificate=certificate, binding=binding)
 
@@ -271,7 +270,7 @@ def _with_composites(
 def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> dict[str, float]:
     """max_error without each condition that costs some; nothing where the error is none."""
     error, kept = reached.design.errors.max_error, order.spec.kept
-    if error <= WORTH:
+    if error <= EXACT:
         return {}
 
     def without(names: frozenset[str]) -> float:
@@ -279,7 +278,7 @@ def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> 
         return float("inf") if isinstance(other, Shortfall) else other.design.errors.max_error
 
     active = [n for n in SIDE_CONDITIONS if n in kept and _acts(order, reached, n)]
-    least = error - WORTH - order.spec.slack  # inside the slack an error may lie anywhere
+    least = error - EXACT - order.spec.slack  # inside the slack an error may lie anywhere
     if len(active) > 1 and without(kept) > least:
         return {}
     costs = {name: without(frozenset({name})) for name in active}

@@ -12,7 +12,7 @@ from designer.alternatives import _beside, best_beside
 from designer.attempt import Attempt, attempt, linear_block, order
 from designer.catalog import load_catalog
 from designer.circuitspec import CircuitSpec
-from designer.dead_zone_target import EXACT
+from designer.coefficients import EXACT
 from designer.design import Peaks
 from designer.limits import limits
 from designer.model import Dimensionless

@@ -584,6 +584,7 @@ def _wait_for(path: Path, process: subprocess.Popen[str]) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_killed_study_goes_on_and_ends_the_same(
     finished: tuple[Path, subprocess.CompletedProcess[str]],
     home: Path,

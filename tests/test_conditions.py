@@ -13,6 +13,7 @@ from designer import conditions, limits, topology
 from designer.catalog import load_catalog
 from designer.circuit import Circuit, nominal_board
 from designer.circuitspec import SIDE_CONDITIONS, CircuitSpec
+from designer.dead_zone_parts import idle_limits
 from designer.design import Check, Design, Peaks
 from designer.errors import Unreachable
 from designer.flow import Flow
@@ -20,9 +21,10 @@ from designer.harmonics import fastest
 from designer.limits import GENERATOR_PEAK, LOAD, bandwidth_limit, output_gain
 from designer.loads import Load, Loads
 from designer.model import Dimensionless
-from designer.modelfile import Response, read_model_file
+from designer.modelfile import Response, parse_model_file, read_model_file
 from designer.orbit import Orbit, OrbitStatus
 from designer.partnames import terms_of
+from designer.pipeline import design_for
 from designer.reduction import Reduction
 from designer.responses import find, peaks
 from designer.stages import stages
@@ -297,3 +299,54 @@ def test_a_response_without_a_period_has_a_highest_harmonic_too() -> None:
     flow = Flow(PAPER.second_order().piecewise_linear(), Drive(1.0))
     rest = Orbit(OrbitStatus.APERIODIC, start=np.zeros(4))
     assert 1.0 <= fastest(flow, rest) < 512.0
+
+
+def test_how_far_a_rectifier_may_drive_its_output() -> None:
+    """2 Vref R208/R201 and two drops, each side by the other half's parts; the driving section is
+    a drop beyond fv, and what it holds while idle does not count."""
+    made = circuit("rectifier", R201=1.2e4, R204=1e4, R208=1.2e4, R209=9e3)
+    volts = {r.name: r.volts for r in made.references}
+    drop = made.diodes[0].model.drop
+    reach = idle_limits(made, made.values)
+    assert {section: diode for section, (diode, _) in reach.items()} == {
+        "U3A": "D202",
+        "U3B": "D200",
+    }
+    assert reach["U3A"][1] == pytest.approx(1.8 * volts["VR2"] + 2.0 * drop)
+    assert reach["U3B"][1] == pytest.approx(-2.0 * volts["VR1"] - 2.0 * drop)
+    assert idle_limits(circuit("saturation"), circuit("saturation").values) == {}
+    design_ = replace(design(), circuit=made)
+    for low, high, diode, fv in (
+        (-10.7, 9.0, "D202", 9.0 - drop),
+        (-30.0, 11.0, "D202", 11.0 - drop),
+        (-10.7, 1.0, "D200", 8.0 - drop),
+    ):
+        loads = Loads((Load("U3A", low, high, 1e-3, "a", "a", "a"),
+                       Load("U3B", -8.0, 10.7, 1e-3, "a", "a", "a")), {})  # fmt: skip
+        kept = frozenset({"swing"})
+        found = {c.quantity: c for c in conditions.verify(design_, kept, TL074C, PEAKS, [], loads)}
+        check = found["rectifier_fv_v"]
+        assert check.where == diode
+        assert check.found == pytest.approx(fv)
+        assert check.holds is (fv < abs(reach["U3A" if diode == "D202" else "U3B"][1]))
+
+
+def test_a_rectifier_on_high_rails_is_scaled_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On ± 18 V the swing alone would let fv pass what two 5 V references allow."""
+    path = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
+    text = path.read_text(encoding="utf-8")
+    text = text[: text.index("[[response]]")] + text[text.index("[circuit]") :]
+    text = text.replace("[circuit]", '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n\n[circuit]')
+    text = text.replace('"saturation"', '"rectifier"').replace('"TL074C"', '"OPA4192"')
+    text = text.replace("supply = 15.0", "supply = 18.0")
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("saturation"))
+    modelfile = parse_model_file(text)
+
+    def fv() -> Check:
+        _, made = design_for(modelfile, CATALOG)
+        return next(c for c in made.checks if c.quantity == "rectifier_fv_v")
+
+    assert fv().holds
+    monkeypatch.setattr("designer.limits.Limits.tightened", lambda self, *_, **__: self)
+    with pytest.raises(Unreachable, match="swing"):
+        fv()

@@ -90,6 +90,28 @@ def test_one_stop_follows_the_model(sides: Sides, omega: float) -> None:
     assert orbit.miss / found.scales.volts[0] == pytest.approx(on_model.miss, rel=1e-4)
 
 
+@pytest.mark.parametrize("sides", ["both", *ONE_SIDED])
+def test_the_free_end_of_a_one_sided_stage_is_clipping(sides: Sides) -> None:
+    """U3C's limits are 0.6 V and 11 V from v1 = 0 here: contact, or clipping where no stop is."""
+    if sides == "both":
+        circuit, ends = circuit_of(EXACT), {1: SATURATION / dead_zone_gains(EXACT)[0]}
+        ends[-1] = ends[1]
+    else:
+        circuit = stage("saturation", sides, one_sided())
+        ends = {1: 0.6, -1: 11.0} if sides == "upper" else {1: 11.0, -1: 0.6}
+    system = Reduction(circuit, replace(nominal_board(circuit), bias={})).system()
+    for side, end in ends.items():
+        for part, there in ((0.99, False), (1.01, True)):
+            x = np.array([side * part * end, 0.0, 0.0, 0.0])
+            mode = system.mode(system.mode_at(x, 0.0))
+            stop = sides == "both" or (side > 0) is (sides == "upper")
+            assert mode.sides == ((side if there and stop else 0),)
+            assert mode.clipped is (there and not stop)
+        flow = Flow(system, Drive(2 * np.pi * 400.0, 0.0))
+        run = flow.run(np.array([1.01 * side * end, 0.0, 0.0, 0.0]), 1, measure=True)
+        assert (run.clipped_time > 0.0) is (not stop)
+
+
 def test_penetration_of_contacts_so_deep_that_the_path_before_saturates_too() -> None:
     """Peak less threshold, at any depth: U3C's own overdrive stops growing with U3B's output."""
     circuit = circuit_of(EXACT)

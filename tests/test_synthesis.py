@@ -310,7 +310,7 @@ PEAKS_19 = Peaks(np.array([1.01150755, 1.4017911, 1.40236639, 2.1494458]), 0.173
 @pytest.mark.parametrize(
     ("model", "held", "series"),
     [
-        pytest.param(COARSE_SHARE, PEAKS_16, "E96", id="E96"),
+        pytest.param(COARSE_SHARE, PEAKS_16, "E96", id="E96", marks=pytest.mark.slow),
         pytest.param(CASE_19, PEAKS_19, "E24", id="E24"),
     ],
 )
