@@ -165,6 +165,7 @@ def follow(
         toward[-1] = direction
     tangent = tangent if tangent @ toward >= 0.0 else -tangent
     points, step = [first], FIRST
+    parted = _parted(curve, first)  # else Newton's method may fall onto the parent near its end
     end = End.POINTS
     while len(points) < POINTS:
         here = points[-1]
@@ -182,10 +183,11 @@ def follow(
             solved = None
         if solved is not None:
             new = at(curve, solved)
-        if new is None or solved is None:
+        fallen = new is not None and parted and not _parted(curve, new)
+        if new is None or solved is None or fallen:
             step *= 0.5
             if step < LEAST:
-                end = End.LOST
+                end = End.JOINED if fallen else End.LOST
                 break
             continue
         if joined(curve, here, new):
@@ -267,6 +269,11 @@ def apart(curve: Curve, point: BranchPoint) -> Array:
             return np.zeros(len(partner))
         partner = flow.system.mirror @ partner
     return np.asarray((partner - point.solved.x) / curve.scale[:-1])
+
+
+def _parted(curve: Curve, point: BranchPoint) -> bool:
+    """Whether an orbit and its partner are two."""
+    return not curve.symmetric and bool(np.abs(apart(curve, point)).max() > SAME)
 
 
 def joined(curve: Curve, a: BranchPoint, b: BranchPoint) -> bool:

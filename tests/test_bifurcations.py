@@ -169,6 +169,19 @@ def test_twins_meet_at_the_pitchfork() -> None:
     assert abs(fit(0.0) - p.value) < 1e-6
 
 
+def test_no_branch_falls_back_onto_its_parent() -> None:
+    over = family.of_model(PAPER, 0.335, "omega")
+    orbit = settle(over.flow(0.335), np.zeros(4))
+    found = survey(over, [(0.335, orbit)], 0.314, 0.35, depth=1)
+    assert len(found.branches) > 1
+    for branch, parent in zip(found.branches, found.parents, strict=True):
+        if parent >= 0:
+            away = [np.abs(apart(branch.curve, p)).max() for p in branch.points]
+            assert min(away) > 1e-7
+    named = [(w.response, w.symmetric) for w in all_windows(found) if w.width > 1e-2]
+    assert named == [("1-5-5", False), ("1-5-5", True)]
+
+
 def test_doubling_is_where_long_runs_change_their_period() -> None:
     p = point(first_cascade(), Kind.DOUBLING, 1.34995)
     for shift, n in ((3e-3, 1), (-3e-3, 2)):
