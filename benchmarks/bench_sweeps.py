@@ -116,9 +116,11 @@ def costs(
         plain = cpu(Course(periods, 1, 0)) - none  # half of it with a tangent
         shown = cpu(Course(0, periods, 0)) - none
         flow = setting.flow()
-        before = time.process_time()
-        flow.run(start, periods)
-        free = time.process_time() - before
+        free = np.inf
+        for _ in range(3):
+            before = time.process_time()
+            flow.run(start, periods)
+            free = min(free, time.process_time() - before)
         before = time.process_time()
         by_flow(flow, start, Course(0, 50, 0))
         slow = (time.process_time() - before) / 50

@@ -3,7 +3,7 @@
 A track is one way through the parameter: down or up, following the attractor (each step starts
 where the one before ended), or one start that is the same at every step. Followed tracks are
 sequential, and run beside each other; the steps of a fixed start are independent. Blocks end where
-the step number says, so an interrupted sweep goes on as if it had not been interrupted.
+the step number says, so an interrupted sweep goes on from what it has.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Finished blocks of a sweep, a map or a basin on disk, as Parquet.
 
 Every file says which work it belongs to and carries the provenance; it appears whole or not at
-all. Equal work gives equal bytes.
+all.
 """
 
 from __future__ import annotations

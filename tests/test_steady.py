@@ -207,3 +207,16 @@ def test_all_impacts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = (run.impacts.time > 40 * 2 * np.pi / 0.215) & (run.impacts.side > 0)
     assert len(got.velocities) == shown.sum() > 3
     np.testing.assert_allclose(got.velocities, run.impacts.state[shown, 1], atol=1e-8)
+
+
+def test_compiled_code_is_keyed_by_the_files_it_calls() -> None:
+    """A function that calls another file's kernel closes over a hash of that file's source."""
+    keyed = ("_dip", "_observe", "exponent", "travel")
+    for module, names in (
+        (sweep_kernel, keyed),
+        (naming_kernel, ("_lap", "_shoot", "_polish", "classify")),
+    ):
+        for name in names:
+            (cell,) = getattr(module, name).py_func.__closure__
+            assert cell.cell_contents == module.STAMP
+    assert sweep_kernel.stamp_of(modal) != sweep_kernel.stamp_of(sweep_kernel)
