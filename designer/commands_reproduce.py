@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from designer.commands import Jobs, Log, Quiet, Verbose, _compiling, _session, app
+from designer.commands import Jobs, Log, Quiet, Resume, Verbose, _compiling, _session, app
 from designer.errors import InputError
-
-REPORTS = Path("reports")
 
 
 class Subject(StrEnum):
@@ -23,6 +20,12 @@ class Subject(StrEnum):
     TOLERANCE = "tolerance"
 
 
+PLACES = {
+    Subject.DYNAMICS: Path("reports/paper-dynamics"),
+    Subject.TOLERANCE: Path("reports/tolerance"),
+}
+
+
 @app.command()
 def reproduce(
     what: Annotated[
@@ -30,9 +33,20 @@ def reproduce(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Where to [default: reports/paper-WHAT]."),
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Where to [default: reports/paper-dynamics, reports/tolerance].",
+        ),
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option("--samples", metavar="N", help="Boards a case (tolerance).")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option("--seed", metavar="N", help="Of the boards (tolerance).")
     ] = None,
     jobs: Jobs = None,
+    resume: Resume = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
     log: Log = None,
@@ -43,22 +57,26 @@ def reproduce(
 
         if jobs is not None:
             at_least("--jobs", jobs, 1)
-        module = _module(what)
-        module.reproduce(
-            out or REPORTS / f"paper-{what.value}", jobs=jobs or cores(), progress=progress
-        )
+        if what not in PLACES:
+            there = " or ".join(PLACES)
+            raise InputError(None, "what to reproduce", what.value, f"{there}, in this version")
+        place = PLACES[what] if out is None else out
+        if what is Subject.DYNAMICS:
+            from designer import reproduce_dynamics
+
+            for name, value in (("--samples", samples), ("--seed", seed)):
+                if value is not None:
+                    raise InputError(None, name, value, "nothing: dynamics draws no boards")
+            reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
+        else:
+            from designer import reproduce_tolerance
+
+            reproduce_tolerance.reproduce(
+                place,
+                samples=reproduce_tolerance.SAMPLES if samples is None else samples,
+                seed=reproduce_tolerance.SEED if seed is None else seed,
+                jobs=jobs,
+                progress=progress,
+                resume=resume,
+            )
     return 0
-
-
-def _module(what: Subject) -> Any:
-    """The module that does it; InputError for what this version does not have."""
-    name = f"designer.reproduce_{what.value}"
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        if error.name != name:
-            raise
-        there = [s.value for s in Subject if s is not what and s is not Subject.CIRCUIT]
-        raise InputError(
-            None, "what to reproduce", what.value, f"{' or '.join(there)}: this version has no more"
-        ) from None
