@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -27,7 +26,6 @@ def question(p: int) -> Question:
     return Question(spec, known.excitation, known.orbit, None)
 
 
-@cache
 def plan(*ps: int, spread: Spread = SPREAD, seed: int = 11, samples: int = 25) -> StudyPlan:
     """A study of these 1-p-p responses."""
     return StudyPlan(subject(ps[0]).circuit, spread, seed, samples, tuple(map(question, ps)))

@@ -59,7 +59,7 @@ def test_ngspice_shows_what_the_exact_reduction_says(
     circuit = stage("rectifier", sides, SCALED if sides == "both" else LOW)
     asked = subject(circuit, nominal_board(circuit), sides, omega)
     assert asked.orbit.response == response
-    job = gate.job(asked, SolverSettings("trap", asked.period / steps))
+    job = gate.job(asked, SolverSettings("trap", asked.period / steps), whole=True)
     waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
     assert job.reduce(waves).orbit.response == response
     points = 100

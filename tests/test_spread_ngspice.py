@@ -37,7 +37,7 @@ def test_ngspice_runs_the_board_that_the_reduction_solves(index: int) -> None:
     asked = subject(circuit, board, "both", 0.54)
     assert asked.orbit.status is OrbitStatus.PERIODIC
     steps, points = 2000, 100
-    job = gate.job(asked, SolverSettings("trap", asked.period / steps))
+    job = gate.job(asked, SolverSettings("trap", asked.period / steps), whole=True)
     for rail in ("VCC", "VEE"):
         assert f"\n{rail} {rail.lower()} 0 {board.supply[rail]!r}\n" in job.netlist
     waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
