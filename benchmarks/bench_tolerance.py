@@ -118,7 +118,7 @@ def measure(samples: int = SAMPLES, most: int = 8, boards: int = 10) -> list[Row
             longest = 0
             for first in range(0, samples, BLOCK):
                 block = range(first, min(first + BLOCK, samples))
-                for answer, _ in exact.block(asked, block, cores()):
+                for answer in exact.block(asked, block, cores()):
                     verdicts[answer.verdict] += 1
                     longest = max(longest, answer.periods)
             seconds, cpu = time.perf_counter() - began, time.process_time() - spent
