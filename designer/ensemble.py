@@ -26,6 +26,8 @@ CHUNK = 32
 """Questions that one thread takes at a time; no answer depends on it."""
 TOGETHER = 125
 """Boards that one thread reduces at a time: their matrices stay in the cache. Nor on this."""
+FAINT = 5.0 * attractor.CHAOS
+"""Growth of a tangent vector per drive period below which chaos is not plain."""
 RULES = np.array(
     [
         MAX_EVENTS,
@@ -149,8 +151,12 @@ class Ensemble:
     def _alone(self, board: int, drive: Drive, start: Array) -> Response:
         """One question, in Python."""
         try:
-            flow = Flow(self.reduction(board).system(), drive, fast=self._fast)
+            system = self.reduction(board).system()
+            flow = Flow(system, drive, fast=self._fast)
             orbit = attractor.settle(flow, start)
+            if self._fast and _faint(orbit, drive):
+                flow = Flow(system, drive, fast=False)
+                orbit = attractor.settle(flow, start)
             trace = np.zeros(0)
             if orbit.status is OrbitStatus.PERIODIC:
                 trace = displacement(flow, orbit)
@@ -222,6 +228,13 @@ class Ensemble:
             periods=spent,
         )
         return Response(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+
+
+def _faint(orbit: Orbit, drive: Drive) -> bool:
+    """Whether rounding may decide between no period and chaos: the general kernel has the word."""
+    if orbit.status is OrbitStatus.APERIODIC:
+        return orbit.lyapunov * drive.period < FAINT
+    return orbit.status is OrbitStatus.NOT_SETTLED
 
 
 def _reduced(boards: Boards, jobs: int) -> tuple[kernel.Modes | None, Mask]:
