@@ -846,7 +846,7 @@ class Answers(NamedTuple):
 
     whole : (E, 7) ints: FOUND or ASK, n, p, q, drive periods spent, mode at the start, impacts.
     real : (E, 32): start (4), monodromy (16), extremes (8), penetration, miss, asymmetry, 1.0 where
-    a tangency is undecided. when, speed, stop : (E, IMPACTS) of the impacts over three laps; trace
+    a tangency is undecided. when, speed, stop : (E, IMPACTS) of the impacts over two laps; trace
     : (E, LONGEST · POINTS) the displacement over n drive periods.
     """
 
@@ -1146,6 +1146,7 @@ def _describe(
 ) -> bool:
     """``attractor.describe`` of the orbit through x, written as answer e; False if it drifts."""
     cursor, nothing, peak = np.zeros(3, dtype=np.int64), np.zeros((0, 0)), np.zeros(4)
+    point = x.copy()
     start = mode_at(data, ints, x)
     if start < 0:
         return False
@@ -1154,11 +1155,31 @@ def _describe(
         trail.extremes[i, 0], trail.extremes[i, 1] = np.inf, -np.inf
     trail.graze[0], trail.graze[1], trail.graze[2], trail.met[0] = np.inf, np.inf, 0.0, 0
     hits[: 3 * n] = 0
-    code = advance(
-        data, ints, x, cursor, drive, ways.one, nothing, dense[: 3 * n + 1], hits[: 3 * n], trail
-    )
-    met = trail.met[0]
-    if code != DONE or met > len(trail.when):
+    # Measured over two laps, so that a contact that lasts over the strobe is seen whole once.
+    twice, met = 2 * n, 0
+    for lap in range(2):
+        first, last = (0, twice) if lap == 0 else (twice, 3 * n)
+        cursor[2] = 1 - lap
+        code = advance(
+            data,
+            ints,
+            point,
+            cursor,
+            drive,
+            ways.one,
+            nothing,
+            dense[first : last + 1],
+            hits[first:last],
+            trail,
+        )
+        if code != DONE:
+            return False
+        if lap == 0:
+            met = trail.met[0]
+            answers.real[e, 28], answers.real[e, 29] = trail.graze[0], trail.graze[1]
+        for i in range(4):
+            point[i] = dense[last, i]
+    if met > len(trail.when):
         return False
     real = answers.real[e]
     for i in range(4):
@@ -1174,7 +1195,7 @@ def _describe(
         for i in range(4):
             if not abs(dense[k, i] - dense[k % n, i]) <= drive[6] * peak[i]:
                 return False
-    real[28], real[29], real[31] = trail.graze[0], trail.graze[1], trail.graze[2]
+    real[31] = trail.graze[2]
     for k in range(met):
         answers.when[e, k], answers.stop[e, k] = trail.when[k], trail.stop[k]
         answers.speed[e, k] = trail.at[k, j + 1] if j < 3 else 0.0

@@ -116,7 +116,7 @@ def _subjects(
     fewer = replace(plan, questions=tuple(plan.questions[n] for n in numbers))
     found: dict[tuple[int, int], Subject | None] = {}
     for run in _runs(sorted({a.sample for a in asks})):
-        for answer, subject in exact.block(fewer, run, jobs):
+        for answer, subject in exact.subjects(fewer, run, jobs):
             found[answer.sample, numbers[answer.question]] = subject
     return found
 

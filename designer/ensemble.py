@@ -19,11 +19,15 @@ from designer.boards import Boards
 from designer.flow import MAX_EVENTS, Flow, FlowResult, heed
 from designer.orbit import Complex, Orbit, OrbitStatus, failed
 from designer.reduction import FloatingCircuit, Reduction
-from designer.system import Array, Drive, ModeKey
+from designer.system import Array, Drive, Mask, ModeKey
 from designer.threads import parallel
 
 CHUNK = 32
 """Questions that one thread takes at a time; no answer depends on it."""
+TOGETHER = 125
+"""Boards that one thread reduces at a time: their matrices stay in the cache. Nor on this."""
+FAINT = 5.0 * attractor.CHAOS
+"""Growth of a tangent vector per drive period below which chaos is not plain."""
 RULES = np.array(
     [
         MAX_EVENTS,
@@ -48,9 +52,10 @@ class Ensemble:
     """N boards, reduced once each and asked as often as is wanted.
 
     fast : take the compiled way where it fits; False: ``attractor.settle`` of each board.
+    jobs : threads that reduce.
     """
 
-    def __init__(self, boards: Boards, *, fast: bool = True) -> None:
+    def __init__(self, boards: Boards, *, fast: bool = True, jobs: int = 1) -> None:
         self.boards = boards
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
@@ -58,7 +63,7 @@ class Ensemble:
         self._good = np.zeros(len(boards), dtype=np.bool_)
         self._keys = working.working_keys(boards.circuit)
         if fast:
-            self._modes, self._good = working.of_boards(boards)
+            self._modes, self._good = _reduced(boards, jobs)
 
     def __len__(self) -> int:
         return len(self.boards)
@@ -146,8 +151,12 @@ class Ensemble:
     def _alone(self, board: int, drive: Drive, start: Array) -> Response:
         """One question, in Python."""
         try:
-            flow = Flow(self.reduction(board).system(), drive, fast=self._fast)
+            system = self.reduction(board).system()
+            flow = Flow(system, drive, fast=self._fast)
             orbit = attractor.settle(flow, start)
+            if self._fast and _faint(orbit, drive):
+                flow = Flow(system, drive, fast=False)
+                orbit = attractor.settle(flow, start)
             trace = np.zeros(0)
             if orbit.status is OrbitStatus.PERIODIC:
                 trace = displacement(flow, orbit)
@@ -219,6 +228,31 @@ class Ensemble:
             periods=spent,
         )
         return Response(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+
+
+def _faint(orbit: Orbit, drive: Drive) -> bool:
+    """Whether rounding may decide between no period and chaos: the general kernel has the word."""
+    if orbit.status is OrbitStatus.APERIODIC:
+        return orbit.lyapunov * drive.period < FAINT
+    return orbit.status is OrbitStatus.NOT_SETTLED
+
+
+def _reduced(boards: Boards, jobs: int) -> tuple[kernel.Modes | None, Mask]:
+    """``working.of_boards`` by ``jobs`` threads."""
+    count = len(boards)
+    if count <= TOGETHER:
+        return working.of_boards(boards)
+    chunks = [range(k, min(k + TOGETHER, count)) for k in range(0, count, TOGETHER)]
+    found = list(parallel(lambda chunk: working.of_boards(boards.take(chunk)), chunks, jobs))
+    good = np.concatenate([each for _, each in found])
+    parts = [modes for modes, _ in found if modes is not None]
+    if not parts:
+        return None, good
+    of_each = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("A", "B", "d", "guard", "past")
+    }
+    return parts[0]._replace(**of_each), good
 
 
 def displacement(flow: Flow, orbit: Orbit) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -30,12 +30,29 @@ def block(
     indices: range,
     jobs: int,
     progress: Callable[[], None] = lambda: None,
-) -> list[tuple[Answer, Subject | None]]:
-    """An answer for every board and every question, in order; with what ngspice would need of it.
+) -> list[Answer]:
+    """An answer for every board and every question, in order; ``progress`` is called once each."""
+    return [answer for answer, _, _ in _asked(plan, indices, jobs, progress)]
 
-    ``progress`` is called once an answer.
-    """
-    boards = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+
+def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, Subject | None]]:
+    """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
+    return [
+        (
+            answer,
+            Subject(boards.reduction(answer.sample - indices.start), excitation, orbit)
+            if len(orbit.start)
+            else None,
+        )
+        for answer, orbit, boards in _asked(plan, indices, jobs, lambda: None)
+        for excitation in [plan.questions[answer.question].excitation]
+    ]
+
+
+def _asked(
+    plan: StudyPlan, indices: range, jobs: int, progress: Callable[[], None]
+) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
+    boards = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs)
     drives = [drive_of(q.excitation) for q in plan.questions]
     asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
     found = boards.respond(
@@ -45,18 +62,14 @@ def block(
         jobs=jobs,
         progress=progress,
     )
-    nominal = [_displacement(plan, number) for number in range(len(plan.questions))]
     twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
-    out: list[tuple[Answer, Subject | None]] = []
+    wanted = [images(_displacement(plan, k), mirror=twins) for k in range(len(plan.questions))]
     for (i, number), response in zip(asked, found, strict=True):
         orbit, question = response.orbit, plan.questions[number]
         verdict, reason = judge(orbit, question.spec, question.start)
-        subject = None
         waveform = float("nan")
-        if len(orbit.start):
-            subject = Subject(boards.reduction(i), question.excitation, orbit)
-            if orbit.status is OrbitStatus.PERIODIC:
-                waveform = waveform_error(response.trace, nominal[number], mirror=twins)
+        if orbit.status is OrbitStatus.PERIODIC:
+            waveform = waveform_error(response.trace, wanted[number])
         answer = Answer(
             sample=indices[i],
             question=number,
@@ -70,8 +83,7 @@ def block(
             periods=orbit.periods,
             waveform=_kept(waveform),
         )
-        out.append((answer, subject))
-    return out
+        yield answer, orbit, boards
 
 
 def displacement(system: PiecewiseLinearSystem, drive: Drive, orbit: Orbit) -> Array:
@@ -79,22 +91,24 @@ def displacement(system: PiecewiseLinearSystem, drive: Drive, orbit: Orbit) -> A
     return ensemble.displacement(Flow(system, drive), orbit)
 
 
-def waveform_error(shown: Array, wanted: Array, *, mirror: bool = False) -> float:
-    """RMS difference of two displacements over ``wanted``'s peak, at the best shift by whole drive
-    periods; nan where they have different periods.
+def images(wanted: Array, *, mirror: bool = False) -> Array:
+    """(k, n · POINTS) a displacement (n · POINTS,) from each of its n drive periods on.
 
-    mirror : the mirror image of ``wanted``, half a drive period on, does as well: a board with
-    stops on both sides may show the twin, and is as good.
+    mirror : the mirror image, half a drive period on, too: a board with stops on both sides may
+    show the twin, and is as good.
     """
-    if len(shown) != len(wanted):
+    both = [wanted] + ([-np.roll(wanted, -POINTS // 2)] if mirror else [])
+    shifted = [np.roll(one, k * POINTS) for one in both for k in range(len(wanted) // POINTS)]
+    return np.array(shifted).reshape(len(shifted), len(wanted))
+
+
+def waveform_error(shown: Array, wanted: Array) -> float:
+    """RMS difference of a displacement (m,) and the ``images`` (k, m) that are wanted, from the
+    nearest of them, over their peak; nan where they have different periods."""
+    if shown.shape != wanted.shape[1:] or not len(wanted):
         return float("nan")
-    images = [wanted] + ([-np.roll(wanted, -POINTS // 2)] if mirror else [])
-    least = min(
-        float(np.sqrt(np.mean((np.roll(shown, k * POINTS) - image) ** 2)))
-        for image in images
-        for k in range(len(shown) // POINTS)
-    )
-    return least / float(np.abs(wanted).max())
+    square = ((wanted - shown) ** 2).mean(axis=1).min()
+    return float(np.sqrt(square) / np.abs(wanted[0]).max())
 
 
 def _displacement(plan: StudyPlan, number: int) -> Array:

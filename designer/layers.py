@@ -54,7 +54,7 @@ class Samples:
         self.plan, self.indices = plan, indices
 
     def __call__(self, jobs: int, progress: Step) -> list[Answer]:
-        return [answer for answer, _ in exact.block(self.plan, self.indices, jobs, progress)]
+        return exact.block(self.plan, self.indices, jobs, progress)
 
 
 class Tunings:

@@ -123,7 +123,7 @@ def _case(case: Case, short: int, jobs: int, said: Progress) -> dict[str, Any]:
     began, plan = time.perf_counter(), case.plan
     number = len(plan.questions)
     step = said.stage(f"{case.name}: as built", plan.samples * number)
-    answers = [a for a, _ in exact.block(plan, range(plan.samples), jobs, step)]
+    answers = exact.block(plan, range(plan.samples), jobs, step)
     some = [a for a in answers if a.sample < short]
     step = said.stage(f"{case.name}: tuned", short * number)
     tuned = tuned_block(plan, range(short), some, Bands(), jobs, step)

@@ -33,7 +33,7 @@ def plan(*ps: int, spread: Spread = SPREAD, seed: int = 11, samples: int = 25) -
 
 def answers(of: StudyPlan, indices: range) -> list[Answer]:
     """As built."""
-    return [answer for answer, _ in exact.block(of, indices, 2)]
+    return exact.block(of, indices, 2)
 
 
 def ensemble(boards: Sequence[Board], p: int = 1) -> Ensemble:

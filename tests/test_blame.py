@@ -42,7 +42,7 @@ def plan(p: int, spread: str, samples: int = 24) -> StudyPlan:
 
 @cache
 def answers(p: int, spread: str, samples: int = 24) -> tuple[Answer, ...]:
-    return tuple(a for a, _ in block(plan(p, spread, samples), range(samples), 2))
+    return tuple(block(plan(p, spread, samples), range(samples), 2))
 
 
 @cache

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from designer import ensemble
 from designer.attractor import settle
 from designer.boards import Boards
 from designer.circuit import Circuit, nominal_board
@@ -54,9 +55,9 @@ def respond(
     kind: str, p: int, indices: range, *, fast: bool = True, jobs: int = 1
 ) -> list[Response]:
     drive, orbit = nominal(kind, p)
-    ensemble = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, indices), fast=fast)
+    boards = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, indices), fast=fast)
     count = len(indices)
-    return ensemble.respond(
+    return boards.respond(
         range(count), [drive] * count, np.tile(orbit.start, (count, 1)), jobs=jobs
     )
 
@@ -120,9 +121,31 @@ def test_the_compiled_way_is_the_general_one(kind: str, p: int) -> None:
 def test_usual_boards_need_no_reduction_of_their_own(kind: str) -> None:
     """That is: the compiled way served them, or the test above compared nothing."""
     drive, orbit = nominal(kind, 2)
-    ensemble = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, range(40)))
-    ensemble.respond(range(40), [drive] * 40, np.tile(orbit.start, (40, 1)))
-    assert len(ensemble._reductions) <= 4
+    boards = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, range(40)))
+    boards.respond(range(40), [drive] * 40, np.tile(orbit.start, (40, 1)))
+    assert len(boards._reductions) <= 4
+
+
+def test_where_chaos_is_not_plain_the_general_kernel_has_the_word(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With no chaos taken for plain, all of it is the general kernel's, bit for bit."""
+    monkeypatch.setattr(ensemble, "FAINT", np.inf)
+    indices = range(12)
+    asked = [
+        (got.orbit, want.orbit)
+        for got, want in zip(
+            respond("saturation", 8, indices),
+            respond("saturation", 8, indices, fast=False),
+            strict=True,
+        )
+        if want.orbit.status in (OrbitStatus.APERIODIC, OrbitStatus.NOT_SETTLED)
+    ]
+    assert asked, "the test wants chaos"
+    for got, want in asked:
+        assert got.status is want.status
+        assert got.start.tobytes() == want.start.tobytes()
+        assert (got.lyapunov, got.periods) == (want.lyapunov, want.periods)
 
 
 def raw(response: Response) -> tuple[bytes, ...]:
@@ -140,23 +163,23 @@ def test_a_board_s_bytes_do_not_depend_on_its_company(kind: str) -> None:
         part = [raw(r) for r in respond(kind, 3, range(first, last))]
         assert part == together[first:last]
     drive, orbit = nominal(kind, 3)
-    ensemble = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, range(40)))
+    boards = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, range(40)))
     order = [5, 39, 5, 0]
-    again = ensemble.respond(order, [drive] * 4, np.tile(orbit.start, (4, 1)))
+    again = boards.respond(order, [drive] * 4, np.tile(orbit.start, (4, 1)))
     assert [raw(r) for r in again] == [together[k] for k in order]
 
 
 def test_one_board_under_many_drives() -> None:
     drive, orbit = nominal("rectifier", 2)
-    ensemble = Ensemble(draw_many(STAGES["rectifier"], FEW["rectifier"], 7, range(2)))
+    boards = Ensemble(draw_many(STAGES["rectifier"], FEW["rectifier"], 7, range(2)))
     drives = [
         Drive(drive.omega * f, drive.amplitude * g, o)
         for f, g, o in ((1.0, 1.0, 0.0), (1.01, 1.0, 0.0), (1.0, 0.95, 0.0), (1.0, 1.0, 0.02))
     ]
     starts = np.tile(orbit.start, (4, 1))
-    found = ensemble.settle([1] * 4, drives, starts)
+    found = boards.settle([1] * 4, drives, starts)
     for one, each in zip(found, drives, strict=True):
-        alone = settle(Flow(ensemble.reduction(1).system(), each, fast=False), orbit.start)
+        alone = settle(Flow(boards.reduction(1).system(), each, fast=False), orbit.start)
         assert (one.status, one.n, one.p, one.q) == (alone.status, alone.n, alone.p, alone.q)
         np.testing.assert_allclose(one.start, alone.start, rtol=0.0, atol=1e-8)
     assert len({one.start.tobytes() for one in found}) == 4
@@ -164,12 +187,12 @@ def test_one_board_under_many_drives() -> None:
 
 def test_running_without_settling_is_the_flow() -> None:
     drive, orbit = nominal("rectifier", 1)
-    ensemble = Ensemble(draw_many(STAGES["rectifier"], FEW["rectifier"], 7, range(3)))
+    boards = Ensemble(draw_many(STAGES["rectifier"], FEW["rectifier"], 7, range(3)))
     starts = np.stack([orbit.start, np.zeros(4), 3.0 * orbit.start])
-    found = ensemble.run([0, 1, 2], [drive] * 3, starts, 4, jobs=2)
+    found = boards.run([0, 1, 2], [drive] * 3, starts, 4, jobs=2)
     for k, run in enumerate(found):
         assert run is not None
-        alone = Flow(ensemble.reduction(k).system(), drive, fast=False).run(starts[k], 4)
+        alone = Flow(boards.reduction(k).system(), drive, fast=False).run(starts[k], 4)
         scale = float(np.abs(alone.strobes).max())
         np.testing.assert_allclose(run.strobes, alone.strobes, rtol=0.0, atol=1e-9 * scale)
         assert run.mode == alone.mode

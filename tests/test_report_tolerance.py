@@ -75,7 +75,7 @@ def plain() -> ReportData:
     found, design = pipeline.design_for(modelfile, catalog)
     checked = pipeline.check(design, found, None)
     plan = pipeline.plan_study(modelfile, design, checked, catalog, samples=3, seed=1)
-    answers = tuple(a for a, _ in block(plan, range(3), 2))
+    answers = tuple(block(plan, range(3), 2))
     return ReportData(
         modelfile,
         design,
