@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
@@ -63,20 +65,25 @@ class Cluster:
         """
         source = enumerate(tasks)
         index: dict[Any, int] = {}
-        done = self._as_completed()
-        limit = AHEAD * max(len(self._client.scheduler_info()["workers"]), 1)
+        with self._staying():
+            done = self._as_completed()
+            limit = AHEAD * max(len(self._client.scheduler_info()["workers"]), 1)
         try:
-            self._feed(source, index, done, limit)
+            with self._staying():
+                self._feed(source, index, done, limit)
             while index:
-                future = next(done)
-                number = index.pop(future)
-                rows = self._result(future)
+                with self._staying():
+                    future = next(done)
+                    number = index.pop(future)
+                    rows: Sequence[Any] = future.result()
                 for _ in rows:
                     step()
                 yield number, rows
-                self._feed(source, index, done, limit)
+                with self._staying():
+                    self._feed(source, index, done, limit)
         finally:
-            self._client.cancel(list(index))
+            if self._client.status == "running":
+                self._client.cancel(list(index))
 
     def _as_completed(self) -> Any:
         from distributed import as_completed
@@ -97,18 +104,21 @@ class Cluster:
             index[future] = number
             done.add(future)
 
-    def _result(self, future: Any) -> Sequence[Any]:
+    @contextmanager
+    def _staying(self) -> Iterator[None]:
+        """A cluster that goes away in here is said as such; a block's own error stays as it is."""
         from distributed.scheduler import KilledWorker
 
         try:
-            rows: Sequence[Any] = future.result()
+            yield
         except KilledWorker as error:
             raise EnvironmentMissing(f"the cluster lost a block's workers: {error}") from None
-        except (OSError, RuntimeError) as error:
-            if future.cancelled() or self._client.status != "running":
-                raise EnvironmentMissing(f"the cluster went away: {error}") from None
-            raise
-        return rows
+        except CancelledError as error:  # of every future, once the client gives up
+            raise EnvironmentMissing(f"the cluster went away: {_line(error)}") from None
+        except Exception as error:
+            if self._client.status == "running":
+                raise
+            raise EnvironmentMissing(f"the cluster went away: {_line(error)}") from None
 
     def _check(self, address: str) -> None:
         """The cluster has workers, and all of them make rows by the rules of this process."""
@@ -139,8 +149,12 @@ def _connected(address: str) -> Any:  # a Client, which has no types
     try:
         return make(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
-        said = " ".join(str(error).split())
-        raise EnvironmentMissing(f"no cluster at {address}: {said}; {_HOW}") from None
+        raise EnvironmentMissing(f"no cluster at {address}: {_line(error)}; {_HOW}") from None
+
+
+def _line(error: BaseException) -> str:
+    """What it says, on one line."""
+    return " ".join(str(error).split())
 
 
 def _who() -> tuple[str, dict[str, int]]:

@@ -41,6 +41,8 @@ SAMPLES, SEED = 500, 20260
 SHORT = 50
 """Boards that are tuned and powered up, at most: a board costs some hundred settings."""
 FOLDER = "cases"
+FILES = ("tolerance.json", "tolerance.parquet", "yields.png", "README.md")
+"""What is made of the cases."""
 KINDS = ("as built", "tuned", "tuned on the bench", "reached")
 Say = Callable[[], None]
 
@@ -82,33 +84,46 @@ def reproduce(
     """Make the report in the folder ``out``.
 
     samples : boards of each case as built; of these the first ``short`` are tuned and powered up.
-    resume : go on with what is there, as long as it was made with the same settings. only : names
-    of cases, for a part of the report.
+    resume : go on with what is there, as long as it was made with the same settings; a file of the
+    report is replaced only beside a case that it was made of. only : names of cases, for a part of
+    the report.
 
     Raises
     ------
-    InputError : results are there already, or of other settings; a number that cannot be.
+    InputError : results, or files that go by their names, are there already; results of other
+        settings; a number that cannot be.
     """
     said = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     for name, value, least in (("--samples", samples, 1), ("--seed", seed, 0), ("--jobs", jobs, 1)):
         at_least(name, value, least)
     folder = out / FOLDER
-    if not resume and folder.is_dir() and any(folder.iterdir()):
+    begun = folder.is_dir() and any(folder.iterdir())
+    if begun and not resume:
         raise InputError(str(folder), "--out", "results", "an empty folder, or --resume")
+    if not begun:
+        _free(out)
     _made(folder)
     catalog = load_catalog()
-    found = []
     said.stage("nominal circuits")
-    for case in cases(catalog, samples=samples, seed=seed):
-        if only is not None and case.name not in only:
-            continue
-        path = folder / f"{case.name}.json"
-        key = _key(case, short, catalog.hash)
-        known = _read(path, key) if resume else None
+    asked = [
+        case
+        for case in cases(catalog, samples=samples, seed=seed)
+        if only is None or case.name in only
+    ]
+    keys = {case.name: _key(case, short, catalog.hash) for case in asked}
+    there = {
+        name: _read(folder / f"{name}.json", key) if resume else None for name, key in keys.items()
+    }
+    if not any(there.values()):
+        _free(out)
+    found = []
+    for case in asked:
+        known = there[case.name]
         if known is None:
-            known = {"format": FORMAT, "key": key, **_case(case, min(short, samples), jobs, said)}
-            _write(path, _json(known))
+            made = _case(case, min(short, samples), jobs, said)
+            known = {"format": FORMAT, "key": keys[case.name], **made}
+            _write(folder / f"{case.name}.json", _json(known))
         found.append(known)
     rows = tuple(Row(**row) for known in found for row in known["rows"])
     settings = {"samples": samples, "short": min(short, samples), "bands": Bands().as_dict()}
@@ -191,12 +206,8 @@ def _files(
         "cost": {"seconds": cost},
     }
     text = readme(rows, document, samples=samples, seed=seed)
-    return {
-        "tolerance.json": _json(document),
-        "tolerance.parquet": table.getvalue(),
-        "yields.png": picture.getvalue(),
-        "README.md": text.encode("utf-8"),
-    }
+    contents = (_json(document), table.getvalue(), picture.getvalue(), text.encode("utf-8"))
+    return dict(zip(FILES, contents, strict=True))
 
 
 def _with_interval(row: Row) -> dict[str, Any]:
@@ -251,6 +262,19 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 def _json(value: Mapping[str, Any]) -> bytes:
     text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
     return f"{text}\n".encode()
+
+
+def _free(out: Path) -> None:
+    """Nothing stands where the report's own files go.
+
+    Raises
+    ------
+    InputError : one of them, whoever made it, would be written over.
+    """
+    for name in FILES:
+        if (out / name).exists():
+            found = "a file that the report would replace, and no case of it to go on with"
+            raise InputError(str(out / name), "--out", found, "a folder without it")
 
 
 def _made(folder: Path) -> None:

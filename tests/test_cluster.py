@@ -84,6 +84,29 @@ def test_a_worker_that_dies_loses_nothing(address: str, tmp_path: Path) -> None:
     assert found == {i: [i] for i in range(12)}
 
 
+class Slow:
+    """A block that takes its time, so that others wait behind it."""
+
+    def __call__(self, jobs: int, progress: Any) -> list[int]:
+        time.sleep(0.2)
+        return [0]
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_is_said() -> None:
+    """As exit 3, by its own error: neither a traceback nor an end without the rows."""
+    with LOCAL(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
+    ) as mortal:
+        there = Cluster(mortal.scheduler_address)
+        found = there.run((Slow() for _ in range(200)), nothing)
+        assert next(found)[1] == [0]
+        mortal.close()
+        with there, pytest.raises(EnvironmentMissing, match="the cluster went away"):
+            for _ in found:
+                pass
+
+
 def test_nobody_at_the_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Exit 3 and nothing written: neither anew nor over what is there."""
     model, out = ROOT / "examples" / "paper.toml", tmp_path / "out"

@@ -96,6 +96,25 @@ def test_it_goes_on_where_it_was_and_refuses_what_is_not_its_own(
         assert (out / name).read_bytes() == before[name]
 
 
+@pytest.mark.parametrize("name", ["README.md", "tolerance.json", "tolerance.parquet", "yields.png"])
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_file_of_the_users_is_not_written_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, resume: bool
+) -> None:
+    """Whether or not it goes on: without a case of its own in the folder, the file is foreign."""
+    monkeypatch.setattr(reproduce_tolerance, "cases", lambda *_, **__: iter(()))
+    (tmp_path / name).write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=name):
+        reproduce(tmp_path, samples=1, jobs=1, resume=resume)
+    assert not (tmp_path / "cases").exists()
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "notes.txt").write_text("mine too", encoding="utf-8")
+    with pytest.raises(InputError):
+        reproduce(tmp_path, samples=1, jobs=1, resume=resume)
+    assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
+    assert sorted(p.name for p in tmp_path.rglob("*")) == sorted(["cases", "notes.txt", name])
+
+
 def test_numbers_that_cannot_be_are_refused(tmp_path: Path) -> None:
     for wrong in ({"samples": 0}, {"seed": -1}, {"jobs": 0}):
         with pytest.raises(InputError):
