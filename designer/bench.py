@@ -52,12 +52,14 @@ TAG = 0xBE7C
 @dataclass(frozen=True)
 class BenchResult:
     """Where the person stopped. state : (states,) of the board there, at drive phase 0; seen :
-    whether the wanted pattern was on the screen; steps : settings tried, the first one included."""
+    whether the wanted pattern was on the screen; steps : settings tried, the first one included.
+    failure : why the procedure could not be played; "" where it was."""
 
     setting: Adjustment
     state: Array
     seen: bool
     steps: int
+    failure: str = ""
 
 
 def find_on_bench(

@@ -78,8 +78,9 @@ _GLOSSARY = (
     ("failed", "no answer; such boards are not part of the yield"),
     (
         "tuned",
-        "some setting of the generator within the stated bands works; on the bench: the one that "
-        "the bench procedure finds works",
+        "a setting of the generator within the stated bands was found that works. Where none was "
+        "found among the settings tried the board counts as lost, though there may be one: the "
+        "yield is a lower bound. On the bench: what the bench procedure finds works",
     ),
     ("reached", "switched on by the recipe, from discharged capacitors, the board ends on it"),
     (

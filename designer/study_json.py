@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,7 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "margins": margins(answers),
         "agreement": _agreement(answers, study.heard_of(index)),
         "combined": _combined(study.combined[index]),
-        "tuned": _tuned(study.tuned_of(index)),
+        "tuned": tuned_json(study.tuned_of(index)),
         "reached": _reached(study, index),
         "blame": _blame(study, index),
     }
@@ -95,7 +95,7 @@ def _yield(counted: Yield | None) -> dict[str, Any] | None:
     }
 
 
-def _tuned(rows: Sequence[Tuned]) -> dict[str, Any] | None:
+def tuned_json(rows: Sequence[Tuned]) -> dict[str, Any] | None:
     """What exists within the bands, and under ``bench`` what the bench procedure finds."""
     if not rows:
         return None
@@ -104,9 +104,11 @@ def _tuned(rows: Sequence[Tuned]) -> dict[str, Any] | None:
     return {
         **_counted(count(rows)),
         "tries": sum(r.tries for r in rows),
+        "unanswered": sum(r.unanswered for r in rows),
         "reasons": _reasons(rows),
         "bench": {
             **_counted(found),
+            "reasons": _counted_reasons((r.bench_verdict, r.bench_reason) for r in rows),
             "steps": sum(r.bench_steps for r in rows),
             "seen_where_it_is_not": sum(r.bench_seen and r.bench_verdict != "ok" for r in rows),
         },
@@ -197,19 +199,24 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
 
 def _reasons(answers: Sequence[Answer | Tuned | Reached]) -> dict[str, int]:
     """Why boards do not show the response, most frequent first."""
+    return _counted_reasons((a.verdict, a.reason) for a in answers)
+
+
+def _counted_reasons(judged: Iterable[tuple[Verdict, str]]) -> dict[str, int]:
     met = Counter(
-        f"{a.verdict}: {_kind(a)}" if _kind(a) else str(a.verdict)
-        for a in answers
-        if a.verdict != "ok"
+        f"{verdict}: {_kind(reason)}" if reason else str(verdict)
+        for verdict, reason in judged
+        if verdict != "ok"
     )
     return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
 
 
-def _kind(answer: Answer | Tuned | Reached) -> str:
+def _kind(reason: str) -> str:
     """The reason without its figures, so that like ones are counted together."""
-    if answer.reason.startswith("asymmetric by"):
-        return "asymmetric"
-    return answer.reason
+    for kind in ("asymmetric", "not found", "not seen"):
+        if reason.startswith(f"{kind} "):
+            return kind
+    return "most settings gave no answer" if reason.endswith("settings gave no answer") else reason
 
 
 def margins(answers: Sequence[Answer]) -> dict[str, Any]:

@@ -37,16 +37,18 @@ _NAN = float("nan")
 class Tuned:
     """One sample of one response, with the generator free within the bands.
 
-    verdict : ok where some setting works; grazing where none does and one is undecided; lost where
-    none of those tried does; failed where none gave an answer. response, reason : there, or as
+    verdict : ok where some setting works; failed where none is known to and at least half of those
+    asked, as built among them, gave no answer; else grazing where one is undecided, and lost where
+    none was found, which is no proof that there is none. response, reason : there, or as
     built where nothing was found. frequency, amplitude, offset : the setting as fractions, see
     ``Adjustment``; zeros where the board works as built and where nothing was found. tries :
     settings asked, unanswered of them without an answer. radius, penetration, miss : margins of
     the orbit found (nan without one).
 
     bench_verdict : the exact circuit's, at the setting where the simulated person stopped;
-    bench_seen : whether the person saw the wanted pattern there. bench_steps : settings of the
-    generator that it took.
+    failed where the procedure could not be played. bench_reason : why it is not ok. bench_seen :
+    whether the person saw the wanted pattern there. bench_steps : settings of the generator that it
+    took.
     """
 
     sample: int
@@ -64,6 +66,7 @@ class Tuned:
     miss: float
     bench_verdict: Verdict
     bench_response: str
+    bench_reason: str
     bench_seen: bool
     bench_frequency: float
     bench_amplitude: float
@@ -116,7 +119,7 @@ def tuned_block(
         plan, indices, ensemble, [known[indices[i], number] for i, number in asked], bands, jobs
     )
     rows = []
-    for (i, number), (result, verdict, response) in zip(asked, benches, strict=True):
+    for (i, number), (result, verdict, response, reason) in zip(asked, benches, strict=True):
         answer, case = known[indices[i], number], cases.get((i, number))
         rows.append(
             Tuned(
@@ -125,6 +128,7 @@ def tuned_block(
                 **_outcome(answer, case),
                 bench_verdict=verdict,
                 bench_response=response,
+                bench_reason=reason,
                 bench_seen=result.seen,
                 bench_frequency=result.setting.frequency,
                 bench_amplitude=result.setting.amplitude,
@@ -155,11 +159,16 @@ def _outcome(answer: Answer, case: Case | None) -> dict[str, Any]:
 
 
 def _not_found(answer: Answer, case: Case) -> tuple[Verdict, str]:
-    met = {answer.verdict, *(t.verdict for t in case.tries)}
-    for verdict in (Verdict.GRAZING, Verdict.LOST):
-        if verdict in met:
-            return verdict, f"at none of {len(case.tries)} settings"
-    return Verdict.FAILED, answer.reason
+    met = [answer.verdict, *(t.verdict for t in case.tries)]
+    silent = met.count(Verdict.FAILED)
+    if silent == len(met):
+        return Verdict.FAILED, answer.reason
+    if 2 * silent >= len(met):
+        return Verdict.FAILED, f"{silent} of {len(met)} settings gave no answer"
+    reason = f"not found among {len(case.tries)} tries"
+    if silent:
+        reason += f", {silent} of {len(met)} settings gave no answer"
+    return (Verdict.GRAZING if Verdict.GRAZING in met else Verdict.LOST), reason
 
 
 def _columns(
@@ -194,9 +203,9 @@ def _on_bench(
     known: Sequence[Answer],
     bands: Bands,
     jobs: int,
-) -> list[tuple[BenchResult, Verdict, str]]:
-    """What the person finds on each board, and what it really is: ``known`` are the answers as
-    built, in the rows' order."""
+) -> list[tuple[BenchResult, Verdict, str, str]]:
+    """What the person finds on each board, and what it really is (verdict, response, reason):
+    ``known`` are the answers as built, in the rows' order."""
 
     def play(answer: Answer) -> BenchResult:
         board = answer.sample - indices.start
@@ -206,8 +215,9 @@ def _on_bench(
             return find_on_bench(
                 system, question, bands, seed=(plan.seed, answer.sample, answer.question)
             )
-        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError):
-            return BenchResult(AS_BUILT, question.start.start, False, 0)
+        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
+            failure = f"{type(error).__name__}: {error}"
+            return BenchResult(AS_BUILT, question.start.start, False, 0, failure)
 
     results = list(parallel(play, known, jobs))
     moved = [k for k, r in enumerate(results) if r.seen and r.setting != AS_BUILT]
@@ -227,13 +237,15 @@ def _on_bench(
     for k, (answer, result) in enumerate(zip(known, results, strict=True)):
         question = plan.questions[answer.question]
         if k in orbits:
-            verdict, _ = judge(orbits[k], question.spec, question.start)
-            out.append((result, verdict, orbits[k].response))
-        elif result.seen:
-            out.append((result, answer.verdict, answer.response))
+            verdict, reason = judge(orbits[k], question.spec, question.start)
+            out.append((result, verdict, orbits[k].response, reason))
+        elif result.seen or (answer.verdict is Verdict.FAILED and not result.failure):
+            out.append((result, answer.verdict, answer.response, answer.reason))
+        elif result.failure:
+            out.append((result, Verdict.FAILED, answer.response, result.failure))
         else:
-            gone = Verdict.FAILED if answer.verdict is Verdict.FAILED else Verdict.LOST
-            out.append((result, gone, answer.response))
+            reason = f"not seen at {result.steps} settings"
+            out.append((result, Verdict.LOST, answer.response, reason))
     return out
 
 

@@ -8,15 +8,18 @@ from itertools import product
 import numpy as np
 import pytest
 
+from designer import tuning
 from designer.adjustment import AS_BUILT, Adjustment
 from designer.all_on_one import all_on_one
 from designer.bands import Bands
 from designer.circuit import Resistor
 from designer.exact import drive_of
 from designer.flow import Flow
-from designer.reduction import Reduction
-from designer.setting_search import Case, filled, seek
+from designer.orbit import Orbit, OrbitStatus
+from designer.reduction import FloatingCircuit, Reduction
+from designer.setting_search import Case, Try, filled, seek
 from designer.spread import Spread, draw
+from designer.study_json import tuned_json
 from designer.tuning import MOST_TRIES, Tuned, tuned_block
 from designer.verdict import Answer, Verdict, judge
 from tests.bench_plans import answers, ensemble, period_counts, plan, question, shifted
@@ -137,6 +140,82 @@ def test_a_board_without_an_answer_stays_failed() -> None:
     assert row.reason == "singular"
     assert row.unanswered == row.tries
     assert (row.bench_verdict, row.bench_seen) == (Verdict.FAILED, False)
+    assert row.bench_reason
+
+
+def test_what_has_no_answer_is_not_lost() -> None:
+    """A board that was lost as built, and of which no setting and no bench has an answer."""
+    of = plan(1, samples=1)
+    broken = replace(of.circuit, parts=(*of.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
+    known = Answer(0, 0, Verdict.LOST, "2-1-1", "to 2-1-1", 0.0, 0.0, 0.0, 0.0, 0)
+    (row,) = tuned_block(replace(of, circuit=broken), range(1), [known], Bands(), 1)
+    assert row.unanswered == row.tries > 0
+    assert row.verdict is Verdict.FAILED
+    assert row.reason == f"{row.tries} of {row.tries + 1} settings gave no answer"
+    assert row.bench_verdict is Verdict.FAILED
+
+
+@pytest.mark.parametrize(
+    "error", [FloatingCircuit("cut off"), ZeroDivisionError("by 0"), np.linalg.LinAlgError("rank")]
+)
+def test_a_bench_that_breaks_off_is_failed_with_its_reason(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise error
+
+    of = plan(1, samples=1)
+    monkeypatch.setattr(tuning, "find_on_bench", broken)
+    known = Answer(0, 0, Verdict.LOST, "2-1-1", "to 2-1-1", 0.0, 0.0, 0.0, 0.0, 0)
+    (row,) = tuned_block(of, range(1), [known], Bands(), 1)
+    assert (row.bench_verdict, row.bench_seen, row.bench_steps) == (Verdict.FAILED, False, 0)
+    assert row.bench_reason == f"{type(error).__name__}: {error}"
+
+
+@pytest.mark.parametrize(
+    ("built", "statuses", "expected"),
+    [
+        ("lost", "clipped clipped", "lost: not found among 2 tries"),
+        ("lost", "clipped failed", "lost: not found among 2 tries, 1 of 3"),
+        ("lost", "grazing failed", "grazing: not found among 2 tries, 1 of 3"),
+        ("lost", "failed failed", "failed: 2 of 3"),
+        ("failed", "failed clipped", "failed: 2 of 3"),
+        ("failed", "grazing failed", "failed: 2 of 3"),
+        ("failed", "failed", "failed: singular"),
+        ("lost", "", "lost: not found among 0 tries"),
+    ],
+)
+def test_a_board_given_up_is_lost_only_where_most_settings_answered(
+    built: str, statuses: str, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def seek(_ensemble: object, cases: list[Case], *_: object, **__: object) -> None:
+        for case in cases:
+            for status in statuses.split():
+                orbit = Orbit(OrbitStatus(status))
+                verdict, reason = judge(orbit, case.question.spec, case.question.start)
+                case.tries.append(Try(AS_BUILT, orbit, verdict, reason))
+
+    of = plan(1, samples=1)
+    monkeypatch.setattr(tuning, "seek", seek)
+    known = Answer(0, 0, Verdict(built), "", "singular", 0.0, 0.0, 0.0, 0.0, 0)
+    (row,) = tuned_block(of, range(1), [known], Bands(), 1)
+    said = f"{row.verdict}: {row.reason}"
+    assert said == expected + " settings gave no answer" * (" of " in expected)
+    assert (row.tries, row.unanswered) == (len(statuses.split()), statuses.count("failed"))
+
+
+def test_json_states_what_had_no_answer() -> None:
+    blank = Tuned(
+        0, 0, Verdict.LOST, "", "not found among 9 tries", 0.0, 0.0, 0.0, 9, 4, 0.5, 1.0, 1.0,
+        Verdict.LOST, "", "not seen at 12 settings", False, 0.0, 0.0, 0.0, 12,
+    )  # fmt: skip
+    other = replace(blank, sample=1, reason="not found among 7 tries", tries=7, unanswered=2)
+    broken = replace(blank, sample=2, bench_verdict=Verdict.FAILED, bench_reason="ValueError: x")
+    said = tuned_json([blank, other, broken])
+    assert said is not None
+    assert (said["tries"], said["unanswered"]) == (25, 10)
+    assert said["reasons"] == {"lost: not found": 3}
+    assert said["bench"]["reasons"] == {"lost: not seen": 2, "failed: ValueError: x": 1}
 
 
 def test_a_board_of_which_the_answer_is_missing_is_an_error() -> None:
