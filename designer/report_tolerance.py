@@ -224,7 +224,7 @@ def _corners(data: ReportData) -> Table | None:
     if not rows:
         return None
     return Table(
-        ("response", "worst corner, all else nominal", "the board there", "corners survived"),
+        ("response", "worst corner, all else in the middle", "the board there", "corners survived"),
         tuple(rows),
         (3,),
     )
