@@ -152,9 +152,9 @@ class Spread:
     def from_cube(self, circuit: Circuit, cube: Array) -> Boards:
         """N boards of a cube (N, K) of uniform numbers in [0, 1), columns as ``coordinates``.
 
-        Every quantity of a board, the lower output limits by their magnitude, is non-decreasing in
-        its own numbers; below room temperature a part's value falls with its temperature
-        coefficient's.
+        Every quantity of a board is non-decreasing in its own numbers, the lower output limits and
+        the negative rail by their magnitude; below room temperature a part's value falls with its
+        temperature coefficient's.
         """
         names = self.coordinates(circuit)
         if cube.ndim != 2 or cube.shape[1] != len(names):
