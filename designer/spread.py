@@ -195,10 +195,15 @@ def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
     return draw_many(circuit, spread, seed, range(index, index + 1)).board(0)
 
 
-def draw_many(circuit: Circuit, spread: Spread, seed: int, indices: range) -> Boards:
-    """The boards of these numbers of the study with this seed."""
+def draw_many(
+    circuit: Circuit, spread: Spread, seed: int, indices: range, stream: str = ""
+) -> Boards:
+    """The boards of these numbers of the study with this seed.
+
+    stream : goes before the coordinates' names: boards that no study has, whatever its seed.
+    """
     names = spread.coordinates(circuit)
-    cube = samples.cube(seed, names, indices)
+    cube = samples.cube(seed, [stream + name for name in names], indices)
     if BOARD in names and spread.measured is not None:  # in turn: they are what there is
         count = len(spread.measured.boards)
         cube[:, names.index(BOARD)] = (np.asarray(indices) % count + 0.5) / count

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -203,9 +204,8 @@ def _on_bench(
         question = plan.questions[answer.question]
         try:
             system = ensemble.reduction(board).system()
-            return find_on_bench(
-                system, question, bands, seed=(plan.seed, answer.sample, answer.question)
-            )
+            stream = crc32(question.stream.encode("utf-8"))
+            return find_on_bench(system, question, bands, seed=(plan.seed, answer.sample, stream))
         except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError):
             return BenchResult(AS_BUILT, question.start.start, False, 0)
 
