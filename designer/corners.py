@@ -1,4 +1,9 @@
-"""The coordinates that matter most at the ends of their ranges, in every combination."""
+"""The coordinates that matter most at the ends of their ranges, in every combination.
+
+The corners are those of the cube that boards are drawn from. So temperature, ageing and what parts
+have in common are coordinates like any other, and a part's value at a corner is one that a board
+can have: its temperature coefficient acts with the board's temperature, not beside it.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +14,28 @@ from itertools import product
 import numpy as np
 
 from designer.boards import Boards
-from designer.circuit import Circuit, nominal_board
 from designer.ensemble import Ensemble
 from designer.exact import drive_of
 from designer.margin_indices import Index
 from designer.margins import Margin
-from designer.quantities import Quantity, with_column
+from designer.quantities import column
+from designer.spread import BOARD
 from designer.system import Index as Places
 from designer.verdict import StudyPlan, Verdict, judge
 
 CORNER = 5
 """Coordinates that are put to the ends of their ranges."""
+LAST = 1.0 - 2.0**-53
+"""End of a coordinate of the cube."""
 
 
 @dataclass(frozen=True)
 class Corner:
-    """Coordinates at the ends of their ranges, all others nominal.
+    """Coordinates at the ends of their ranges, all others in the middle of theirs.
 
-    coordinates : what was put to its ends; worst : for each "low" or "high" in the corner of the
-    least margin; margin : there. verdict, response : on the exact rung. survived : of ``corners``.
+    coordinates : what was put to its ends; worst : for each "low" or "high", the smaller or larger
+    number, in the corner of the least margin; margin : there. verdict, response : on the exact
+    rung. survived : of ``corners``.
     """
 
     coordinates: tuple[str, ...]
@@ -49,19 +57,18 @@ def worst_corners(
     """For each question the corners of its ``CORNER`` largest indices, on the exact rung; None
     where nothing limits. progress : called once an attractor.
     """
-    width = len(plan.spread.coordinates(plan.circuit))
-    ends = plan.spread.from_cube(
-        plan.circuit, np.array([np.zeros(width), np.full(width, 1.0 - 2.0**-53)])
-    )
+    places = {name: k for k, name in enumerate(plan.spread.coordinates(plan.circuit))}
     out: list[Corner | None] = []
     for i, (margin, ranked) in enumerate(zip(margins, indices, strict=True)):
-        known = {q.name: q for q in margin.quantities}
-        chosen = [known[x.coordinate] for x in ranked if x.coordinate in known][:CORNER]
+        # Measured boards are in no order, so they have no ends.
+        chosen = [x.coordinate for x in ranked if x.total > 0.0 and x.coordinate != BOARD][:CORNER]
         if not chosen:
             out.append(None)
             continue
+        columns = [places[name] for name in chosen]
         picks = np.array(list(product((0, 1), repeat=len(chosen))), dtype=np.intp)
-        boards = _corner_boards(plan.circuit, chosen, ends, picks)
+        boards = _at(plan, columns, picks)
+        falling = _falling(plan, columns, chosen, margin)
         question = plan.questions[i]
         orbits = Ensemble(boards).settle(
             range(len(boards)),
@@ -75,8 +82,8 @@ def worst_corners(
         worst = int(np.argmin(values))
         out.append(
             Corner(
-                tuple(q.name for q in chosen),
-                tuple("high" if end else "low" for end in picks[worst]),
+                tuple(chosen),
+                tuple("low" if end == 0 else "high" for end in picks[worst] ^ falling),
                 float(values[worst]),
                 verdicts[worst],
                 orbits[worst].response,
@@ -87,13 +94,21 @@ def worst_corners(
     return out
 
 
-def _corner_boards(
-    circuit: Circuit, chosen: Sequence[Quantity], ends: Boards, picks: Places
-) -> Boards:
-    """(2^k,) nominal boards with the chosen quantities at their low (0) or high (1) end."""
-    boards = Boards.of(circuit, [nominal_board(circuit)]).take(np.zeros(len(picks), dtype=np.intp))
-    for k, q in enumerate(chosen):
-        # Of a lower limit too "low" is the smaller number, whichever way it is drawn.
-        pair = np.sort(getattr(ends, q.group)[q.part])
-        boards = with_column(boards, q, pair[picks[:, k]])
-    return boards
+def _at(plan: StudyPlan, columns: Sequence[int], picks: Places) -> Boards:
+    """Boards with these coordinates at their first (0) or last (1) end, a row of ``picks`` each."""
+    cube = np.full((len(picks), len(plan.spread.coordinates(plan.circuit))), 0.5)
+    cube[:, columns] = np.where(picks == 1, LAST, 0.0)
+    return plan.spread.from_cube(plan.circuit, cube)
+
+
+def _falling(
+    plan: StudyPlan, columns: Sequence[int], chosen: Sequence[str], margin: Margin
+) -> Places:
+    """(k,) 1 where the quantity of a coordinate's name falls with it, as a lower limit does."""
+    known = {q.name: q for q in margin.quantities}
+    out = np.zeros(len(chosen), dtype=np.intp)
+    for k, (place, name) in enumerate(zip(columns, chosen, strict=True)):
+        if name in known:
+            first, last = column(_at(plan, [place], np.array([[0], [1]])), known[name])
+            out[k] = last < first
+    return out

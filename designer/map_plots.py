@@ -50,9 +50,12 @@ def map_chart(label: str, found: YieldMap) -> Figure:
 
 
 def _marks(axes: Axes, found: YieldMap, scale: float) -> None:
-    best = scale * found.recommended[0]
     word = "coarsest of the best" if found.over == "grade" else "recommended"
-    axes.axvline(best, color=_BEST, lw=1.2, label=f"{word}: {best:.4g}")
+    if found.recommended is None:
+        axes.plot([], [], color=_BEST, lw=1.2, label=f"{word}: nowhere")
+    else:
+        best = scale * found.recommended[0]
+        axes.axvline(best, color=_BEST, lw=1.2, label=f"{word}: {best:.4g}")
     if found.over == "grade":
         return
     axes.axvline(found.used, color=INK, lw=0.9, ls="--", label=f"in use: {found.used:.4g}")
@@ -79,9 +82,10 @@ def _heat(label: str, found: YieldMap) -> Figure:
     axes.set_ylabel(_AXES["grade"])
     axes.axvline(found.used, color="white", lw=1.0, ls="--")
     best = found.recommended
+    where = ([], []) if best is None else ([best[0]], [found.axes[1].values.index(best[1])])
+    said = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
     axes.plot(
-        [best[0]], [list(found.axes[1].values).index(best[1])], "o", ms=8, mfc="none", mec=_BEST,
-        mew=2.0, label=f"recommended: ω = {best[0]:.4g} at {100 * best[1]:g} %",
+        *where, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {said}"
     )  # fmt: skip
     axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {found.used:.4g}")
     axes.set_facecolor("#d9d9d9")

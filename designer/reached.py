@@ -1,7 +1,7 @@
 """Reached: which boards end on a response when they are switched on by its recipe.
 
-From discharged capacitors, with the generator anywhere in its period (drawn from seed and sample)
-and the op-amps free to clip, on the exact circuit.
+From discharged capacitors, with the generator anywhere in its period (drawn from seed, sample and
+response) and the op-amps free to clip, on the exact circuit.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from designer.orbit import Orbit, failed
 from designer.power_up import Arrival, follow
 from designer.recipe import Recipe
 from designer.reduction import FloatingCircuit
+from designer.samples import uniforms
 from designer.spread import draw_many
+from designer.system import Array
 from designer.threads import parallel
 from designer.verdict import Question, StudyPlan, Verdict, judge
 
-TAG = 0x9A5E
+STREAM = "phase:"
 """Sets the generator's phase apart from the other draws of a sample."""
 
 
@@ -102,10 +104,10 @@ def switched_on(
     return out
 
 
-def phases(seed: int, sample: int, count: int) -> list[float]:
-    """Phase of the generator at power-up [rad] for each of ``count`` questions on one sample."""
-    rng = np.random.default_rng([seed, sample, TAG])
-    return [float(v) for v in rng.uniform(0.0, 2.0 * np.pi, count)]
+def phases(seed: int, question: Question, indices: range) -> Array:
+    """(N,) phase of the generator at power-up [rad] on each of these samples; it depends on the
+    response, not on its place in the plan."""
+    return 2.0 * np.pi * uniforms(seed, f"{STREAM}{question.stream}", indices)
 
 
 def reached_block(
@@ -121,8 +123,8 @@ def reached_block(
     """
     ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
     asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
-    drawn = [phases(plan.seed, sample, len(plan.questions)) for sample in indices]
-    starts = [(i, plan.questions[number], recipes[number], drawn[i][number]) for i, number in asked]
+    drawn = [phases(plan.seed, question, indices).tolist() for question in plan.questions]
+    starts = [(i, plan.questions[number], recipes[number], drawn[number][i]) for i, number in asked]
     rows = []
     for (i, number), ended in zip(asked, switched_on(ensemble, starts, jobs), strict=True):
         arrival = ended.arrival
@@ -133,7 +135,7 @@ def reached_block(
                 verdict=ended.verdict,
                 response=ended.orbit.response,
                 reason=ended.reason,
-                phase=drawn[i][number],
+                phase=drawn[number][i],
                 periods=ended.orbit.periods + (0 if arrival is None else arrival.periods),
                 clipped=arrival is not None and arrival.clipped,
             )

@@ -1,6 +1,6 @@
 """Which recipe to give a response: candidates tried from the simplest on.
 
-Each is tried on the nominal circuit and on sample boards of a seed of its own, from discharged
+Each is tried on the nominal circuit and on sample boards of its own, from discharged
 capacitors, with phases of the generator that fill the circle. The first that always worked is
 taken, else the one that worked most often.
 """
@@ -29,8 +29,8 @@ TRIALS = 12
 """Phases at which the nominal circuit is switched on."""
 BOARDS = 6
 """Sample boards that a recipe is tried on, once each."""
-TRIAL_SEED = 0x57A27
-"""Of those boards: no study's."""
+TRIAL = "recipe:"
+"""Stream of those boards."""
 STEP = 0.01
 """Largest step of a sweep, as a fraction."""
 HOLD = 20
@@ -52,7 +52,7 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
     """A recipe for each question of the plan; its seed and number of samples do not matter."""
     nominal = Ensemble(Boards.of(plan.circuit, [nominal_board(plan.circuit)]))
-    sample = Ensemble(draw_many(plan.circuit, plan.spread, TRIAL_SEED, range(BOARDS)))
+    sample = Ensemble(draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL))
     return tuple(_find(question, nominal, sample, jobs) for question in plan.questions)
 
 

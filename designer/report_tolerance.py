@@ -224,7 +224,7 @@ def _corners(data: ReportData) -> Table | None:
     if not rows:
         return None
     return Table(
-        ("response", "worst corner, all else nominal", "the board there", "corners survived"),
+        ("response", "worst corner, all else in the middle", "the board there", "corners survived"),
         tuple(rows),
         (3,),
     )
@@ -235,7 +235,6 @@ def _maps(data: ReportData) -> Table | None:
     for found in data.layers.maps:
         label = _label_of(data, found.question)
         best = found.recommended
-        place = tuple(a.values.index(v) for a, v in zip(found.axes, best, strict=True))
         names = [a.name for a in found.axes]
         window = words.NONE
         if found.window is not None:
@@ -246,16 +245,21 @@ def _maps(data: ReportData) -> Table | None:
         in_use = words.NONE
         if found.over != "grade" and found.used in found.axes[0].values:
             at = found.axes[0].values.index(found.used)
-            y = found.at(at) if len(names) == 1 else found.at(at, place[1])
+            grade = 0 if best is None else found.axes[-1].values.index(best[-1])
+            y = found.at(at) if len(names) == 1 else found.at(at, grade)
             in_use = f"{words.number(found.used)}: {_share(y)}"
-        recommended = ", ".join(_setting(n, v) for n, v in zip(names, best, strict=True))
+        recommended = "nowhere"
+        if best is not None:
+            place = tuple(a.values.index(v) for a, v in zip(found.axes, best, strict=True))
+            setting = ", ".join(_setting(n, v) for n, v in zip(names, best, strict=True))
+            recommended = f"{setting}: {_share(found.at(*place))}"
         rows.append(
             (
                 label,
                 " × ".join("ω" if n == "omega" else n for n in names),
                 window,
                 in_use,
-                f"{recommended}: {_share(found.at(*place))}",
+                recommended,
             )
         )
     if not rows:

@@ -37,8 +37,8 @@ from designer.tuning import tuned_block
 from designer.verdict import Answer, StudyPlan, Verdict, Yield
 
 FORMAT = 1
-SAMPLES, SEED = 500, 20260
-SHORT = 50
+SAMPLES, SEED = 250, 20260
+SHORT = 25
 """Boards that are tuned and powered up, at most: a board costs some hundred settings."""
 FOLDER = "cases"
 FILES = ("tolerance.json", "tolerance.parquet", "yields.png", "README.md")

@@ -152,9 +152,9 @@ class Spread:
     def from_cube(self, circuit: Circuit, cube: Array) -> Boards:
         """N boards of a cube (N, K) of uniform numbers in [0, 1), columns as ``coordinates``.
 
-        Every quantity of a board, the lower output limits by their magnitude, is non-decreasing in
-        its own numbers; below room temperature a part's value falls with its temperature
-        coefficient's.
+        Every quantity of a board is non-decreasing in its own numbers, the lower output limits and
+        the negative rail by their magnitude; below room temperature a part's value falls with its
+        temperature coefficient's.
         """
         names = self.coordinates(circuit)
         if cube.ndim != 2 or cube.shape[1] != len(names):
@@ -195,10 +195,15 @@ def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
     return draw_many(circuit, spread, seed, range(index, index + 1)).board(0)
 
 
-def draw_many(circuit: Circuit, spread: Spread, seed: int, indices: range) -> Boards:
-    """The boards of these numbers of the study with this seed."""
+def draw_many(
+    circuit: Circuit, spread: Spread, seed: int, indices: range, stream: str = ""
+) -> Boards:
+    """The boards of these numbers of the study with this seed.
+
+    stream : goes before the coordinates' names: boards that no study has, whatever its seed.
+    """
     names = spread.coordinates(circuit)
-    cube = samples.cube(seed, names, indices)
+    cube = samples.cube(seed, [stream + name for name in names], indices)
     if BOARD in names and spread.measured is not None:  # in turn: they are what there is
         count = len(spread.measured.boards)
         cube[:, names.index(BOARD)] = (np.asarray(indices) % count + 0.5) / count

@@ -220,13 +220,15 @@ def _kind(reason: str) -> str:
 
 
 def margins(answers: Sequence[Answer]) -> dict[str, Any]:
-    """Quantiles of each margin over the boards that are ok; null where none has the margin.
+    """Quantiles of each margin over the boards that are ok and have it; null where none has it.
 
-    penetration, miss : V of the moving state; the others are ratios.
+    boards : that are ok, and ``counted`` by margin: not every board has every margin, such as the
+    nearest miss without one. penetration, miss : V of the moving state; the others are ratios.
     """
     ok = [a for a in answers if a.verdict is Verdict.OK]
-    out: dict[str, Any] = {"quantiles": list(QUANTILES), "boards": len(ok)}
+    out: dict[str, Any] = {"quantiles": list(QUANTILES), "boards": len(ok), "counted": {}}
     for name in MARGINS:
         values = [v for a in ok if math.isfinite(v := float(getattr(a, name)))]
         out[name] = list(np.quantile(values, QUANTILES)) if values else None
+        out["counted"][name] = len(values)
     return out

@@ -46,6 +46,12 @@ class Question:
     start: Orbit
     settings: SolverSettings | None
 
+    @property
+    def stream(self) -> str:
+        """Names what is drawn for this response alone: the same wherever it stands in a plan."""
+        assert self.spec.omega is not None
+        return f"{self.spec.omega:.9g}:{self.spec.expect}"
+
 
 @dataclass(frozen=True)
 class Answer:

@@ -103,13 +103,17 @@ class YieldMap:
         return self._each(lambda y: y.interval[1])
 
     @property
-    def recommended(self) -> tuple[float, ...]:
-        """The setting whose interval has the highest lower end, on every axis.
+    def recommended(self) -> tuple[float, ...] | None:
+        """The setting whose interval has the highest lower end, on every axis; None where no board
+        is ok anywhere.
 
         Of neighbours in the first axis that are equal to it, the middle of the longest row; over
-        the grade and of grades, the coarsest of equals.
+        the grade and of grades, the coarsest of equals. The nominal circuit shows the response
+        there.
         """
-        low = self.low
+        if not (self.there & (self.ok > 0)).any():
+            return None
+        low = np.where(self.there & (self.ok > 0), self.low, -1.0)
         best = float(low.max())
         grade: tuple[float, ...] = ()
         if low.ndim == 2:
@@ -141,7 +145,7 @@ class YieldMap:
             "used": self.used,
             "window": None if self.window is None else list(self.window),
             "open": list(self.open),
-            "recommended": list(self.recommended),
+            "recommended": None if self.recommended is None else list(self.recommended),
             "cost": {"attractors": self.attractors, "seconds": self.seconds},
         }
 

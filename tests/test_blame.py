@@ -12,16 +12,18 @@ from designer.attractor import settle
 from designer.blame import Blame, blame
 from designer.boards import Boards
 from designer.circuit import nominal_board
+from designer.corners import worst_corners
 from designer.crossings import crossings
 from designer.exact import block, drive_of
 from designer.flow import Flow
 from designer.followed import Function, follow, functions
+from designer.laws import Uniform
 from designer.margin_indices import Index, sobol
 from designer.margins import Limit, Margin, Prediction
 from designer.modelfile import Expect, Response
 from designer.quantities import Quantity, between, column, quantities, with_column
 from designer.reduction import Reduction
-from designer.spread import Spread, draw_many
+from designer.spread import Group, Spread, draw_many
 from designer.system import Array
 from designer.verdict import Answer, Question, StudyPlan, Verdict, judge
 from tests import paper_cases
@@ -243,6 +245,47 @@ def test_the_worst_corner_is_tried_on_the_exact_rung() -> None:
     orbit = settle(flow, question.start.start)
     assert judge(orbit, question.spec, question.start)[0] is corner.verdict
     assert orbit.response == corner.response
+
+
+def test_corners_put_temperature_tracking_and_ageing_to_their_ends() -> None:
+    """A margin that falls with R4 alone: its worst corner is R4's largest value, by hand."""
+    spread = replace(
+        NO_SPREAD,
+        resistor=0.001,
+        temperature=(10.0, 45.0),
+        tempco={"R4": Uniform(-100e-6, 100e-6)},
+        ageing={"R4": Uniform(-0.002, 0.002)},
+        groups=(Group("network:1", ("R4", "R5"), 0.5),),
+    )
+    study = replace(plan(1, "tiny"), spread=spread)
+    nominal = {r.name: r.value for r in study.circuit.resistors}["R4"]
+    q = Quantity("R4", "values", nominal, 1e-3 * nominal)
+    margin = Margin((q,), (Limit("x", "contact", 2.0, 1.0, np.array([-1.0])),))
+    chosen = ("R4", "R4.tempco", "temperature", "R4.ageing", "network:1")
+    ranked = [Index(name, "R4", 0.0, 0.1) for name in chosen]
+    ranked.append(Index("C1", "C1", 0.0, 0.0))
+    calls: list[int] = []
+    (corner,) = worst_corners(study, [margin], [ranked], 1, lambda: calls.append(1))
+    assert corner is not None
+    assert corner.coordinates == chosen
+    assert corner.worst == ("high",) * 5
+    assert len(calls) == corner.corners == 32
+    # Half of what ages and warms is in common with R5, and stays in the middle.
+    value = nominal * 1.001 * (1.0 + 0.5 * 0.002) * (1.0 + 0.5 * 100e-6 * (45.0 - 25.0))
+    assert corner.margin == pytest.approx(2.0 - (value - nominal) / q.sigma, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["VEE", "VCC"])
+def test_a_rails_corner_is_named_by_its_number(name: str) -> None:
+    """Low is the smaller number, of the negative rail too."""
+    study = replace(plan(1, "tiny"), spread=replace(NO_SPREAD, supply=0.01))
+    rail = next(r for r in study.circuit.rails if r.name == name)
+    q = Quantity(name, "supply", rail.volts, 0.01 * abs(rail.volts))
+    margin = Margin((q,), (Limit("x", "contact", 3.0, 1.0, np.array([-1.0])),))
+    (corner,) = worst_corners(study, [margin], [[Index(name, name, 1.0, 1.0)]], 1, lambda: None)
+    assert corner is not None
+    assert (corner.coordinates, corner.worst) == ((name,), ("high",))
+    assert corner.margin == pytest.approx(2.0)
 
 
 def test_no_loss_no_replay_and_the_nearest_limit_is_named() -> None:

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import pytest
 
+from designer import recipe_search
 from designer.boards import Boards
 from designer.circuit import Resistor, nominal_board
 from designer.deck import Excitation
@@ -28,7 +29,7 @@ from designer.recipe_search import (
     phase,
 )
 from designer.reduction import Reduction
-from designer.spread import draw
+from designer.spread import draw, draw_many
 from designer.verdict import Verdict
 from tests.bench_plans import answers, ensemble, period_counts, plan, question
 from tests.paper_cases import OMEGA, subject
@@ -185,13 +186,35 @@ def test_neither_jobs_nor_blocks_change_what_is_reached() -> None:
     assert parts == whole
 
 
-def test_phases_are_drawn_from_seed_and_sample_alone() -> None:
-    assert phases(3, 5, 4)[:2] == phases(3, 5, 2)
-    drawn = [phases(3, s, 1)[0] for s in range(400)]
+def test_phases_are_drawn_from_seed_sample_and_response_alone() -> None:
+    drawn = phases(3, question(1), range(400))
     assert len(set(drawn)) == 400
-    assert all(0.0 <= v < 2.0 * math.pi for v in drawn)
-    assert sum(drawn) / 400 == pytest.approx(math.pi, abs=4.0 * 2.0 * math.pi / math.sqrt(12 * 400))
-    assert phases(4, 5, 1) != phases(3, 5, 1)
+    assert ((drawn >= 0.0) & (drawn < 2.0 * math.pi)).all()
+    assert drawn.mean() == pytest.approx(math.pi, abs=4.0 * 2.0 * math.pi / math.sqrt(12 * 400))
+    assert phases(3, question(1), range(7, 9)).tolist() == drawn[7:9].tolist()
+    assert not set(phases(4, question(1), range(400))) & set(drawn)
+    assert not set(phases(3, question(2), range(400))) & set(drawn)
+
+
+def test_a_response_in_front_changes_nothing_of_the_others() -> None:
+    known = [recipes(1)[Way.DIRECT], recipes(3)[Way.DIRECT]]
+    alone = reached_block(plan(3), range(4), known[1:], 2)
+    both = reached_block(plan(1, 3), range(4), known, 2)
+    assert [replace(r, question=0) for r in both if r.question == 1] == alone
+
+
+@pytest.mark.parametrize("seed", [0, 0x57A27])
+def test_recipes_are_tried_on_boards_that_no_study_has(
+    monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """Not those of the seed 0, nor of one that the search once had for its own."""
+    of = replace(plan(3), seed=seed)
+    tried: list[Ensemble] = []
+    monkeypatch.setattr(recipe_search, "_find", lambda _q, _n, sample, _j: tried.append(sample))
+    find_recipes(of)
+    theirs = draw_many(of.circuit, of.spread, seed, range(recipe_search.BOARDS))
+    for name, values in theirs.values.items():
+        assert not (tried[0].boards.values[name] == values).any()
 
 
 def test_reached_agrees_with_as_built_where_one_attractor_is_left() -> None:

@@ -182,6 +182,15 @@ def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:
     assert row[4].startswith("0.9: 100 %")
 
 
+def test_a_response_that_survives_nowhere_has_no_recommended_setting(full: ReportData) -> None:
+    none = replace(mapped(1), ok=np.zeros(3, dtype=np.int64), lost=np.array([0, 10, 10]))
+    data = replace(full, layers=replace(full.layers, maps=(none,)))
+    row = facts(data)["map_table"].rows[0]
+    assert row[-1] == "nowhere"
+    assert row[-2].startswith("0.85: 0")
+    assert "nowhere" in render_markdown(data)
+
+
 def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: ReportData) -> None:
     html, markdown = render_html(full), render_markdown(full)
     page = Page(html)

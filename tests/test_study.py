@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from designer import cli, layers, study_work
+from designer import cli, layers, study_json, study_work
 from designer.errors import InputError
 from designer.folder import Folder
 from designer.hearing import Hearing, Kind, Why
@@ -43,6 +43,28 @@ b = 0.25
 omega = 0.85
 expect = "1-2-2"
 """
+
+
+# ---------------------------------------------------------------------------------------------
+# Margins in numbers
+
+
+def test_quantiles_of_a_margin_say_how_many_boards_have_it() -> None:
+    """A board without a miss, and one whose waveform was not compared, count in the others only."""
+    ok = Answer(0, 0, Verdict.OK, "1-1-1", "", 0.5, 1.0, 1.0, 0.0, 40, 0.1)
+    answers = [
+        ok,
+        replace(ok, sample=1, miss=math.inf),
+        replace(ok, sample=2, miss=math.inf, waveform=math.nan),
+        replace(ok, sample=3, verdict=Verdict.LOST),
+    ]
+    said = study_json.margins(answers)
+    assert said["boards"] == 3
+    assert said["counted"] == {
+        "radius": 3, "penetration": 3, "miss": 1, "asymmetry": 3, "waveform": 2,
+    }  # fmt: skip
+    none = study_json.margins([replace(a, miss=math.inf) for a in answers])
+    assert (none["miss"], none["counted"]["miss"]) == (None, 0)
 
 
 # ---------------------------------------------------------------------------------------------

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from designer.setting_search import Case, Try, filled, seek
 from designer.spread import Spread, draw
 from designer.study_json import tuned_json
 from designer.tuning import MOST_TRIES, Tuned, tuned_block
-from designer.verdict import Answer, Verdict, judge
+from designer.verdict import Answer, Question, Verdict, judge
 from tests.bench_plans import answers, ensemble, period_counts, plan, question, shifted
 from tests.paper_cases import subject
 
@@ -119,6 +121,27 @@ def test_neither_jobs_nor_blocks_change_the_rows(rough: tuple[list[Answer], list
     second = tuned_block(of, range(1, 2), built, Bands(), 1)
     assert same(first + second, rows[:4])
     assert len(calls) == 2
+
+
+def test_a_response_in_front_changes_no_reading_of_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The noise of the screen has a seed for each board and response, wherever that one stands."""
+    seeds: dict[str, set[tuple[int, ...]]] = {}
+
+    def record(_system: Any, question: Question, _bands: Bands, *, seed: Sequence[int]) -> Any:
+        seeds.setdefault(str(question.spec.expect), set()).add(tuple(seed))
+        raise ArithmeticError
+
+    monkeypatch.setattr(tuning, "find_on_bench", record)
+    found = []
+    for of in (plan(3), plan(1, 3)):
+        seeds.clear()
+        tuned_block(of, range(2), answers(of, range(2)), Bands(), 1)
+        found.append(dict(seeds))
+    assert len(found[0]["1-3-3"]) == 2
+    assert found[1]["1-3-3"] == found[0]["1-3-3"]
+    assert not found[1]["1-1-1"] & found[1]["1-3-3"]
 
 
 def test_bands_of_no_width_are_as_built(rough: tuple[list[Answer], list[Tuned]]) -> None:

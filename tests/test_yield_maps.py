@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,12 +138,37 @@ def test_over_the_grade_the_same_numbers_are_drawn() -> None:
 
 def test_the_recommended_setting_is_the_middle_of_the_best() -> None:
     def chosen(counts: list[list[int]] | list[int], over: Over = "omega") -> list[float]:
-        return [round(v, 9) for v in made(counts, over).recommended]
+        best = made(counts, over).recommended
+        assert best is not None
+        return [round(v, 9) for v in best]
 
     assert chosen([3, 10, 10, 10, 4, 10]) == [1.2]
     assert chosen([3, 5, 9, 4]) == [1.2]
     assert chosen([10, 10, 8], "grade") == [0.02]
     assert chosen([[9, 10, 3], [10, 10, 3], [2, 10, 1]], "omega-grade") == [1.1, 0.02]
+
+
+def test_where_nothing_survives_nothing_is_recommended(tmp_path: Path) -> None:
+    for counts, over in (
+        ([0, 0, 0], "omega"),
+        ([0, 0], "grade"),
+        ([[0, 0], [0, 0]], "omega-grade"),
+    ):
+        found = made(counts, over)  # type: ignore[arg-type]
+        assert found.recommended is None
+        assert found.as_dict()["recommended"] is None
+        for name, content in files([found], ["ω = 0.85   1-2-2"], {}).items():
+            assert content
+            (tmp_path / name).write_bytes(content)
+    assert len(list(tmp_path.glob("*.png"))) == 3
+
+
+def test_only_a_point_where_the_nominal_circuit_shows_it_is_recommended() -> None:
+    """A yield there is none of the response's; and beside the others it does not count as one."""
+    found = made([9, 3, 0, 3], "omega")
+    best = replace(found, there=np.array([False, True, True, True])).recommended
+    assert best == (1.1,)
+    assert replace(found, there=np.zeros(4, dtype=bool)).recommended is None
 
 
 def test_files_hold_what_the_maps_say() -> None:
@@ -153,7 +179,9 @@ def test_files_hold_what_the_maps_say() -> None:
     assert said["format"] == 1
     assert said["versions"] == {"designer": "x"}
     assert said["maps"][0]["ok"] == found[0].ok.tolist()
-    assert said["maps"][0]["recommended"] == list(found[0].recommended)
+    best = found[0].recommended
+    assert best is not None
+    assert said["maps"][0]["recommended"] == list(best)
     assert all(content[:4] == b"\x89PNG" for name, content in out.items() if name.endswith("png"))
 
 
