@@ -213,25 +213,11 @@ def _on_bench(
         question = plan.questions[answer.question]
         try:
             system = ensemble.reduction(board).system()
-<<<<<<< HEAD
-            return find_on_bench(
-                system, question, bands, seed=(plan.seed, answer.sample, answer.question)
-            )
+            stream = crc32(question.stream.encode("utf-8"))
+            return find_on_bench(system, question, bands, seed=(plan.seed, answer.sample, stream))
         except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
             failure = f"{type(error).__name__}: {error}"
             return BenchResult(AS_BUILT, question.start.start, False, 0, failure)
-||||||| f8f6a5f
-            return find_on_bench(
-                system, question, bands, seed=(plan.seed, answer.sample, answer.question)
-            )
-        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError):
-            return BenchResult(AS_BUILT, question.start.start, False, 0)
-=======
-            stream = crc32(question.stream.encode("utf-8"))
-            return find_on_bench(system, question, bands, seed=(plan.seed, answer.sample, stream))
-        except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError):
-            return BenchResult(AS_BUILT, question.start.start, False, 0)
->>>>>>> h/blame
 
     results = list(parallel(play, known, jobs))
     moved = [k for k, r in enumerate(results) if r.seen and r.setting != AS_BUILT]
