@@ -7,7 +7,6 @@ each response in the middle of its window; 1-8-8 at b = 0.285, where boards surv
 
 from __future__ import annotations
 
-import resource
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -133,7 +132,9 @@ def _memory(plan: StudyPlan, samples: int) -> float:
     asked = replace(plan, samples=samples)
     kept = [exact.block(asked, block, cores()) for block in asked.blocks()]
     assert sum(len(answers) for answers in kept) == samples * len(plan.questions)
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    # Not getrusage: what it tells of a new process includes the one that started it.
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return float(next(line.split()[1] for line in status.splitlines() if "VmHWM" in line)) / 1024.0
 
 
 def measure(
