@@ -7,7 +7,7 @@ each response in the middle of its window; 1-8-8 at b = 0.285, where boards surv
 
 from __future__ import annotations
 
-import resource
+import os
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -133,7 +133,9 @@ def _memory(plan: StudyPlan, samples: int) -> float:
     asked = replace(plan, samples=samples)
     kept = [exact.block(asked, block, cores()) for block in asked.blocks()]
     assert sum(len(answers) for answers in kept) == samples * len(plan.questions)
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    # Not getrusage: what it tells of a new process includes the one that started it.
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return float(next(line.split()[1] for line in status.splitlines() if "VmHWM" in line)) / 1024.0
 
 
 def measure(
@@ -199,7 +201,8 @@ def report(rows: list[Row], memories: Mapping[int, float], seconds: float) -> st
         "",
         f"- Commit: {commit()}",
         f"- Machine: {machine()}",
-        f"- Took {seconds:.0f} s.",
+        f"- Took {seconds:.0f} s, at a load of {os.getloadavg()[2]:.1f} in the last 15 minutes:",
+        "  wall times are for an idle machine only where that is at most the number of cores.",
         "",
         f"{rows[0].samples} boards as built, in blocks of {BLOCK}, on {cores()} cores: drawing,",
         "reduction, settling, margins, judging. `s` is wall time for all, compilation left out;",
@@ -210,7 +213,7 @@ def report(rows: list[Row], memories: Mapping[int, float], seconds: float) -> st
         f"run: a process of ngspice for each, {BRUTE_PERIODS} periods from rest, of which it gives",
         "the waveform and no verdict; the last `ratio` is that over our wall time, both on all",
         f"cores ({RUNS} runs; other settings or fewer periods would change it in proportion).",
-        "The saturating stage has the parts of `FINE`, the rectifying one bench-1 at 1 %.",
+        "The saturating stage has parts of 0.2 % here, the rectifying one bench-1 at 1 %.",
         "",
         *table(header, body),
         "",
