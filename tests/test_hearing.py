@@ -13,7 +13,7 @@ from designer.hearing import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,
     OWN_SAMPLES,
-    SLOW_SAMPLES,
+    SUBSET,
     Ask,
     Hearing,
     Kind,
@@ -51,7 +51,7 @@ def test_the_random_subset_and_every_slow_one() -> None:
     assert NOMINAL_SAMPLES >= 50
     assert nominal == {
         i: Why.RANDOM if i < NOMINAL_SAMPLES else Why.SLOW
-        for i in range(SLOW_SAMPLES)
+        for i in range(SUBSET)
         if i < NOMINAL_SAMPLES or i % 3 == 0
     }
     assert ask_random(answers[:60]) == [a for a in asks if a.sample < 60]
