@@ -36,16 +36,15 @@ from designer.verdict import Answer, Question, Verdict
 from designer.waveform_orbit import STROBE_TOLERANCE
 
 Z = float(norm.ppf(0.975))
-LONG = 5
-"""Drive periods of an orbit from which on its period counts as long."""
 
 
 class Explanation(StrEnum):
-    """Why two engines may differ on a board."""
+    """Why two engines differ on a board, where a margin or another run of ngspice shows it.
+
+    That a board is slow or its period long shows nothing: such boards can differ for any reason.
+    """
 
     GRAZING = "grazing margin"
-    SLOW = "slow"
-    LONG = "long period"
     BASIN = "another attractor from the nominal orbit"
     CLIPPED = "clipped"
     NONE = "unexplained"
@@ -240,7 +239,7 @@ def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> S
 def differences(
     answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
 ) -> list[Disagreement]:
-    """Every board on which ngspice says another n-p-q, with what may explain it."""
+    """Every board on which ngspice says another n-p-q, with what explains it, if anything does."""
     known = {a.sample: a for a in answers}
     stayed = {
         h.sample
@@ -273,9 +272,4 @@ def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) ->
         return Explanation.CLIPPED
     if said.kind is Kind.NOMINAL and stayed:
         return Explanation.BASIN
-    if answer.radius > SLOW:
-        return Explanation.SLOW
-    period = answer.response.partition("-")[0]
-    if not period.isdigit() or int(period) >= LONG:
-        return Explanation.LONG
     return Explanation.NONE

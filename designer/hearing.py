@@ -49,6 +49,7 @@ class Why(StrEnum):
     BOUNDARY = "boundary"
     SLOW = "slow"
     ALL = "all"
+    DIFFERS = "differs"
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,22 @@ def ask_boundary(
         for _, sample in sorted(boards)[:BOUNDARY_SAMPLES]
         for kind in Kind
         if (sample, question, kind) not in have
+    ]
+
+
+def ask_differing(
+    answers: Iterable[Answer], heard: Iterable[Hearing], known: Iterable[Ask] = ()
+) -> list[Ask]:
+    """From its own orbit, every board on which ngspice says another response from the nominal one,
+    without what is ``known``: where it stays there, the difference is one of basins."""
+    mine = {(a.sample, a.question): a for a in answers}
+    have = {(k.sample, k.question, k.kind) for k in known}
+    return [
+        Ask(h.sample, h.question, Kind.OWN, Why.DIFFERS)
+        for h in heard
+        if h.kind is Kind.NOMINAL
+        and (h.sample, h.question, Kind.OWN) not in have
+        and h.agrees(mine[h.sample, h.question]) is False
     ]
 
 

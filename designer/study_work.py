@@ -197,10 +197,13 @@ class Work:
         return hearing.ask_random(study.answers, nominal)
 
     def _all_heard(self, study: Study, nominal: int) -> Study:
-        """With the boards at a boundary, which are known only once there is no more sample."""
+        """With the boards at a boundary, which are known only once there is no more sample, and
+        those on which the engines differ, once that is known."""
         asks = self._random(study, nominal)
         if self.rung == "auto":
             asks += hearing.ask_boundary(study.answers, study.plan.questions, asks)
+        study = replace(study, heard=self._heard(study, asks, last=False))
+        asks += hearing.ask_differing(study.answers, study.heard, asks)
         return replace(study, heard=self._heard(study, asks))
 
     def _heard(

@@ -169,6 +169,39 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     assert "boundary" in [s.name for s in both.strata]
 
 
+@pytest.mark.parametrize("rung", ["auto", "ngspice"])
+def test_boards_that_differ_are_explained_by_their_own_orbit(
+    rung: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Board 45 is beyond those that are asked from their own orbit, and differs from the nominal
+    one."""
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        return [
+            Hearing(
+                a.sample, a.question, a.kind, a.why,
+                "3-3-3" if a.sample == 45 and a.kind is Kind.NOMINAL else "1-1-1",
+                "", "", 9, False,
+            )
+            for a in asks
+        ]  # fmt: skip
+
+    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(60)
+    spec = replace(p.questions[0].spec, expect=None)
+    questions = tuple(replace(p.questions[0], spec=spec, settings=object()) for _ in range(2))  # type: ignore[arg-type]
+    pool: Any = object()
+    checked: Any = (None, None)
+    study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
+    study = Work(1, pool, Stores(), Here(1), Progress(), rung).made(study)
+    for both in study.combined:
+        assert both is not None
+        (difference,) = both.differences
+        assert difference.sample == 45
+        assert difference.explanation == "another attractor from the nominal orbit"
+
+
 def _first(made: Fixed) -> Any:
     """Of the first question alone."""
     return lambda plan, indices: (
