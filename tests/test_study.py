@@ -13,17 +13,19 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from designer import cli, layers, study_work
+from designer import cli, layers, pipeline, study_work
 from designer.errors import InputError
 from designer.folder import Folder
 from designer.hearing import Hearing, Kind, Why
+from designer.laws import Uniform
 from designer.layers import Here, Samples
 from designer.progress import Progress
-from designer.study import Stores, Study
+from designer.study import Stores, Study, tolerance
 from designer.study_work import Work
 from designer.verdict import BLOCK, Answer, Verdict
 from tests.test_verdict import plan
@@ -236,6 +238,24 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
     assert asked == sorted(asked)
     assert asked[-1] > 100
     assert all(both is not None and both.width < 0.05 for both in study.combined)
+
+
+@pytest.mark.parametrize("spread", [None, Uniform(2e6, 4e6)])
+def test_a_study_says_that_the_bandwidth_does_not_enter(
+    spread: Uniform | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    p = plan(3)
+    p = replace(p, spread=replace(p.spread, gain_bandwidth=spread))
+    monkeypatch.setattr(pipeline, "plan_study", lambda *_, **__: p)
+    notes: list[str] = []
+    said = Progress()
+    monkeypatch.setattr(said, "note", notes.append)
+    made: Any = SimpleNamespace(
+        modelfile=SimpleNamespace(responses=(None,)), design=None, catalog=None
+    )
+    tolerance(made, samples=3, rung="exact", checked=(), progress=said)
+    assert len(notes) == (spread is not None)
+    assert all("gain-bandwidth does not enter the yield" in note for note in notes)
 
 
 # ---------------------------------------------------------------------------------------------
