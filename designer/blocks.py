@@ -55,6 +55,7 @@ class BlockStore(Generic[Row]):
     study : hash of everything that decides a row.
     omegas : of the questions; where rows have a ``question``, readers get a column ``omega``.
     size : samples of a block.
+    note : told how many blocks of another study were met.
     guard : called before each write; raises where the folder is no longer the study's.
     """
 
@@ -68,12 +69,15 @@ class BlockStore(Generic[Row]):
         omegas: Sequence[float | None] = (),
         size: int = BLOCK,
         guard: Callable[[], None] = lambda: None,
+        note: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.names: set[str] = set()
         """Files of this study that were read or written, relative to the design folder."""
         self.size = size
         self._root, self._folder, self._row, self._study = root, folder, row, study
-        self._omegas, self._guard = omegas, guard
+        self._omegas, self._guard, self._note = omegas, guard, note
+        self._foreign: set[str] = set()
+        self._noted = 0
         self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
         self._schema = self._schema_of()
         self._found: dict[str, list[Row]] = {}
@@ -90,6 +94,7 @@ class BlockStore(Generic[Row]):
             held = pq.read_schema(self._root / name).metadata or {}
             said = json.loads(held.get(_KEY, b"{}"))
             if {k: said.get(k) for k in ("format", "study")} != self._said():
+                self._foreign.add(name)
                 return []
             table = pq.read_table(self._root / name, schema=self._schema, partitioning=None)
             rows = [self._row_of(found) for found in table.to_pylist()]
@@ -132,6 +137,14 @@ class BlockStore(Generic[Row]):
             with contextlib.suppress(OSError):
                 partial.unlink(missing_ok=True)
         self._found[name] = list(rows)
+
+    def say_ignored(self) -> None:
+        """Tell once how many blocks of another study or of other rules were left aside."""
+        count = len(self._foreign)
+        if count > self._noted:
+            blocks = "1 block" if count == 1 else f"{count} blocks"
+            self._note(f"{self._folder}: {blocks} of another study ignored, computed again")
+        self._noted = count
 
     def forget(self) -> None:
         """Let go of the rows that are kept for comparison: memory stays flat."""

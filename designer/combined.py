@@ -7,10 +7,13 @@ rest::
 
     p = mean of X over all + sum over h of (N_h/N) · mean of (Y - X) over those asked in h
 
-Given the exact answers, those asked in a stratum are a simple random sample of it (the first so
-many indices of independent draws; all of those at a boundary), so the estimate is unbiased. Its
-variance is that of two-phase sampling, S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling
-Techniques, 1977, 12.2 and 7.2; Särndal, Swensson and Wretman, 1992, 9.6). The interval joins the
+Given the exact answers, those asked in a stratum are a simple random sample of it (of the first so
+many indices of independent draws; all of those at a boundary), so the estimate is unbiased if all
+of them have an answer. Those without are left out as if they were like the others, which they need
+not be (the way to an attractor is longest next to the loss of its stability); the estimates if all
+of them were lost, and if all were ok, stand beside. The variance is that of two-phase sampling,
+S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling Techniques, 1977, 12.2 and 7.2;
+Särndal, Swensson and Wretman, 1992, 9.6). The interval joins the
 terms by the method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27,
 2008, 1693): each enters with its own Wilson limits instead of its standard error, D = +1 and
 D = -1 apart. So fifty boards without a difference do not make the exact rung's interval ngspice's:
@@ -33,16 +36,15 @@ from designer.verdict import Answer, Question, Verdict
 from designer.waveform_orbit import STROBE_TOLERANCE
 
 Z = float(norm.ppf(0.975))
-LONG = 5
-"""Drive periods of an orbit from which on its period counts as long."""
 
 
 class Explanation(StrEnum):
-    """Why two engines may differ on a board."""
+    """Why two engines differ on a board, where a margin or another run of ngspice shows it.
+
+    That a board is slow or its period long shows nothing: such boards can differ for any reason.
+    """
 
     GRAZING = "grazing margin"
-    SLOW = "slow"
-    LONG = "long period"
     BASIN = "another attractor from the nominal orbit"
     CLIPPED = "clipped"
     NONE = "unexplained"
@@ -90,13 +92,16 @@ class Stratum:
 @dataclass(frozen=True)
 class Combined:
     """The yield by both engines; low, high : 95 %. disagreement : of n-p-q, on the random subset
-    from the nominal orbit. undecided : boards that were asked and have no answer."""
+    from the nominal orbit. undecided : boards that were asked and have no answer; if_lost, if_ok :
+    the estimate if ngspice lost all of these, and if it called all of them ok."""
 
     estimate: float
     low: float
     high: float
     disagreement: Rate
     undecided: int
+    if_lost: float
+    if_ok: float
     strata: tuple[Stratum, ...]
     differences: tuple[Disagreement, ...]
 
@@ -131,8 +136,17 @@ def combine(
     theirs = {sample: said for sample, said in theirs.items() if sample in mine}
     if not theirs:
         return None
+    ok = sum(a.verdict is Verdict.OK for a in mine.values())
     strata = tuple(_strata(list(mine.values()), theirs, heard, question))
-    estimate, low, high = interval(sum(a.verdict is Verdict.OK for a in mine.values()), strata)
+    estimate, low, high = interval(ok, strata)
+    silent = {
+        h.sample for h in heard if h.kind is Kind.NOMINAL and not h.decided and h.sample in mine
+    }
+
+    def if_all(said: bool) -> float:
+        whole = {**theirs, **dict.fromkeys(silent, said)}
+        return interval(ok, _strata(list(mine.values()), whole, heard, question))[0]
+
     random = [h for h in heard if h.kind is Kind.NOMINAL and h.why in (Why.RANDOM, Why.ALL)]
     known = {a.sample: a for a in answers}
     agreed = [h.agrees(known[h.sample]) for h in random if h.sample in known]
@@ -141,7 +155,9 @@ def combine(
         low,
         high,
         Rate(sum(a is False for a in agreed), sum(a is not None for a in agreed)),
-        sum(h.kind is Kind.NOMINAL and not h.decided for h in heard),
+        len(silent),
+        if_all(False),
+        if_all(True),
         strata,
         tuple(differences(answers, heard, question)),
     )
@@ -223,7 +239,7 @@ def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> S
 def differences(
     answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
 ) -> list[Disagreement]:
-    """Every board on which ngspice says another n-p-q, with what may explain it."""
+    """Every board on which ngspice says another n-p-q, with what explains it, if anything does."""
     known = {a.sample: a for a in answers}
     stayed = {
         h.sample
@@ -256,9 +272,4 @@ def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) ->
         return Explanation.CLIPPED
     if said.kind is Kind.NOMINAL and stayed:
         return Explanation.BASIN
-    if answer.radius > SLOW:
-        return Explanation.SLOW
-    period = answer.response.partition("-")[0]
-    if not period.isdigit() or int(period) >= LONG:
-        return Explanation.LONG
     return Explanation.NONE

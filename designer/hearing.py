@@ -4,9 +4,10 @@ Two kinds of run (``designer.confirmation`` says how long): on the sample's *own
 exact circuit rung ngspice only has to stay there; from the *nominal* design's orbit it finds its
 way itself, which makes it a verdict of its own.
 
-Who is asked, for each response: boards are independent draws from (seed, index), so the first few
-are a random subset, and the same one however many samples follow. The boards nearest to losing
-the response are asked besides, since that is where two engines would differ.
+Who is asked, for each response: boards are independent draws from (seed, index), so the first
+`SUBSET` are a random subset, and the same one however many samples follow. Of it the first are
+asked whatever their margins, and the slow ones all, since they are few and differ most. The boards
+nearest to losing the response are asked besides, since that is where two engines would differ.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ NOMINAL_SAMPLES = 50
 """How many it starts from the nominal orbit, at least."""
 SLOW = 0.9
 """A multiplier above this makes a sample slow."""
-SLOW_SAMPLES = 200
-"""Every slow one of so many samples starts from the nominal orbit as well."""
+SUBSET = 200
+"""Boards of the random subset: the first so many, or those from the nominal orbit where these are
+more. Every slow one of it starts from the nominal orbit as well."""
 BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
 UNDECIDED = "undecided"
@@ -47,6 +49,7 @@ class Why(StrEnum):
     BOUNDARY = "boundary"
     SLOW = "slow"
     ALL = "all"
+    DIFFERS = "differs"
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ def distance(answer: Answer, nominal: Orbit) -> float:
 
 def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> list[Ask]:
     """Of the random subset: the first `OWN_SAMPLES` from their own orbit, the first ``nominal``
-    from the nominal orbit, and every slow one of the first `SLOW_SAMPLES`."""
+    from the nominal orbit, and every slow one from there."""
     asks = []
     for a in answers:
         if not _orbits(a):
@@ -136,7 +139,7 @@ def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> lis
             asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
         if a.sample < nominal:
             asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.RANDOM))
-        elif a.sample < SLOW_SAMPLES and a.radius > SLOW:
+        elif a.sample < SUBSET and a.radius > SLOW:
             asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.SLOW))
     return asks
 
@@ -158,6 +161,22 @@ def ask_boundary(
         for _, sample in sorted(boards)[:BOUNDARY_SAMPLES]
         for kind in Kind
         if (sample, question, kind) not in have
+    ]
+
+
+def ask_differing(
+    answers: Iterable[Answer], heard: Iterable[Hearing], known: Iterable[Ask] = ()
+) -> list[Ask]:
+    """From its own orbit, every board on which ngspice says another response from the nominal one,
+    without what is ``known``: where it stays there, the difference is one of basins."""
+    mine = {(a.sample, a.question): a for a in answers}
+    have = {(k.sample, k.question, k.kind) for k in known}
+    return [
+        Ask(h.sample, h.question, Kind.OWN, Why.DIFFERS)
+        for h in heard
+        if h.kind is Kind.NOMINAL
+        and (h.sample, h.question, Kind.OWN) not in have
+        and h.agrees(mine[h.sample, h.question]) is False
     ]
 
 

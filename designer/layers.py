@@ -111,6 +111,8 @@ def fill(
             continue
         rows[block.start] = known
         _put(store, block, known)
+    if store is not None:
+        store.say_ignored()
     missing = [range(b.start + len(known) // len(plan.questions), b.stop) for b, known in todo]
     for index, made in runner.run((task(indices) for indices in missing), step):
         block, known = todo[index]
@@ -161,6 +163,8 @@ def listen(
         held |= {_order(h): h for h in heard}
         _put(store, block, heard if last else [held[key] for key in sorted(held)])
         rows += heard
+    if store is not None:
+        store.say_ignored()
     return rows
 
 

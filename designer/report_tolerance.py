@@ -121,7 +121,13 @@ def _share(counted: Yield | None) -> str:
 def _both(both: Both | None) -> str:
     if both is None:
         return words.NONE
-    return f"{100 * both.estimate:.3g} % ({100 * both.low:.3g} to {100 * both.high:.3g})"
+    said = f"{100 * both.estimate:.3g} % ({100 * both.low:.3g} to {100 * both.high:.3g})"
+    if both.undecided:
+        said += (
+            f", {both.undecided} without an answer in ngspice: {100 * both.if_lost:.3g} % if these "
+            f"are lost, {100 * both.if_ok:.3g} % if ok"
+        )
+    return said
 
 
 def _differences(data: ReportData) -> Table | None:

@@ -14,17 +14,14 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from designer import exact
 from designer.bands import Bands
 from designer.blame import blame
 from designer.catalog import load_catalog
-from designer.deck import Excitation
 from designer.errors import InputError
 from designer.preconditions import at_least, cores
 from designer.progress import Progress
@@ -224,26 +221,11 @@ def _parquet(rows: Sequence[Row], stream: io.BytesIO) -> None:
 
 
 def _key(case: Case, short: int, catalog_hash: str) -> str:
-    """Hash of what decides the case's result.
-
-    Settings and starts to nine digits: their last ones may differ between processes.
-    """
-    questions = tuple(
-        replace(
-            q,
-            excitation=Excitation(_nine(q.excitation.frequency), _nine(q.excitation.amplitude)),
-            start=replace(q.start, start=np.array([_nine(v) for v in q.start.start])),
-        )
-        for q in case.plan.questions
-    )
-    plan = replace(case.plan, questions=questions)
+    """Hash of what decides the case's result."""
+    plan = case.plan
     layers = [study_hash(plan, layer) for layer in ("samples", "tuned", "reached")]
     said = json.dumps([FORMAT, layers, plan.samples, short, Bands().as_dict(), catalog_hash])
     return hashlib.sha256(said.encode("ascii")).hexdigest()
-
-
-def _nine(value: float) -> float:
-    return float(f"{value:.9g}")
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:

@@ -31,6 +31,12 @@ SATURATION_SPREAD = 0.05
 ROOM = 25.0
 """°C at which parts have the values they are sold for."""
 
+NO_BANDWIDTH = (
+    "does not enter the yield: the exact circuit and ngspice's rung ideal, on which it is decided, "
+    "have no bandwidth"
+)
+"""What a spread of the gain-bandwidth comes with."""
+
 EVEN = Uniform(-1.0, 1.0)
 """Anywhere within the grade."""
 

@@ -6,7 +6,7 @@ from designer.bom import natural
 from designer.circuit import Circuit
 from designer.laws import Binned, Law, Normal, Split, Uniform
 from designer.report_words import quantity
-from designer.spread import Spread
+from designer.spread import NO_BANDWIDTH, Spread
 
 
 def words_of(spread: Spread, circuit: Circuit) -> str:
@@ -28,6 +28,8 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         ("gain-bandwidth", spread.gain_bandwidth, "Hz"),
     ):
         said += [f"{what} {_between(law, unit)}"] if law is not None else []
+    if spread.gain_bandwidth is not None:
+        said[-1] += f" (which {NO_BANDWIDTH})"
     if spread.supply:
         said.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")
     if spread.temperature is not None:

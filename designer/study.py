@@ -19,6 +19,7 @@ from designer.preconditions import at_least, cores, need_responses
 from designer.progress import Progress
 from designer.reached import Reached
 from designer.recipe import Recipe
+from designer.spread import NO_BANDWIDTH
 from designer.study_work import RUNGS, RungName, Stores, Work
 from designer.tuning import Tuned
 from designer.verdict import Answer, StudyPlan, Yield, count
@@ -179,6 +180,8 @@ def tolerance(
         samples=samples,
         seed=seed,
     )
+    if plan.spread.gain_bandwidth is not None:
+        said.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
     study = Study(checked, plan, asked, left_out, (), until=until)
     if not asked:
         return study

@@ -69,10 +69,16 @@ def study_files(options: Options, responses: int) -> list[str]:
 
 
 class FolderStores(Stores):
-    """The layers of one study in a design folder; ``guard`` is asked before each write."""
+    """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
+    is told of blocks that are of another study."""
 
-    def __init__(self, root: Path, guard: Callable[[], None]) -> None:
-        self._root, self._guard = root, guard
+    def __init__(
+        self,
+        root: Path,
+        guard: Callable[[], None],
+        note: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._root, self._guard, self._note = root, guard, note
         self._stores: dict[str, BlockStore[Any]] = {}
 
     def samples(self, plan: StudyPlan) -> BlockStore[Answer]:
@@ -112,6 +118,7 @@ class FolderStores(Stores):
                 omegas=[q.spec.omega for q in plan.questions],
                 size=size,
                 guard=self._guard,
+                note=self._note,
             )
         return self._stores[folder]
 

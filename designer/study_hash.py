@@ -12,7 +12,7 @@ from designer import __version__, confirmation, hearing
 from designer.jsonout import plain
 from designer.verdict import StudyPlan
 
-RULES = {"samples": 1, "ngspice": 1, "tuned": 2, "reached": 2}
+RULES = {"samples": 1, "ngspice": 2, "tuned": 2, "reached": 2}
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
 the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of
 the layer, so that rows of the old rules are not taken for rows of the new ones."""
@@ -24,10 +24,12 @@ def study_hash(
     """Hash of everything that decides the rows of a layer; not of how many there are.
 
     Every layer stands on the samples; ngspice's also on its settings. more : what else decides.
+    What is computed (settings of the generator and of ngspice, starts, recipes) counts to nine
+    digits: the last ones depend on the machine's linear algebra.
     """
     said = _samples(plan)
     if layer != "samples":
-        said["layer"] = [layer, RULES[layer], plain(more or {})]
+        said["layer"] = [layer, RULES[layer], nine_digits(plain(more or {}))]
     if layer == "ngspice":
         said["ngspice"] = {
             "refinements": [confirmation.OWN_REFINEMENTS, confirmation.NOMINAL_REFINEMENTS],
@@ -39,10 +41,20 @@ def study_hash(
             ],
             "undecided": hearing.UNDECIDED,
             "settings": [
-                None if q.settings is None else q.settings.as_dict() for q in plan.questions
+                None if q.settings is None else nine_digits(plain(q.settings.as_dict()))
+                for q in plan.questions
             ],
         }
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode("ascii")).hexdigest()
+
+
+def nine_digits(value: Any) -> Any:
+    """JSON data with every number in it to nine digits."""
+    if isinstance(value, float):
+        return float(f"{value:.9g}")
+    if isinstance(value, Mapping):
+        return {key: nine_digits(v) for key, v in value.items()}
+    return [nine_digits(v) for v in value] if isinstance(value, list | tuple) else value
 
 
 def _samples(plan: StudyPlan) -> dict[str, Any]:
@@ -58,8 +70,8 @@ def _samples(plan: StudyPlan) -> dict[str, Any]:
         "questions": [
             {
                 "spec": asdict(q.spec),
-                "excitation": asdict(q.excitation),
-                "start": [float(v) for v in q.start.start],
+                "excitation": nine_digits(asdict(q.excitation)),
+                "start": nine_digits([float(v) for v in q.start.start]),
                 "nominal": q.start.response,
             }
             for q in plan.questions

@@ -152,7 +152,7 @@ def _studied(
         folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
     gated = time.perf_counter()
     guard = folder.watch()
-    stores = FolderStores(folder.path, guard)
+    stores = FolderStores(folder.path, guard, progress.note)
     study = tolerance(
         made,
         samples=options.samples,

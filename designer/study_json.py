@@ -183,6 +183,8 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
             "high": high,
         },
         "undecided": both.undecided,
+        "if_undecided_lost": both.if_lost,
+        "if_undecided_ok": both.if_ok,
         "strata": [
             {
                 "name": s.name,

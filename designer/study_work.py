@@ -77,33 +77,53 @@ class Work:
         samples = -(-study.plan.samples // BLOCK) * BLOCK
         nominal = NOMINAL_SAMPLES
         study = self._sampled(study, samples)
-        while True:
+        spoken = self.pool is not None and self.rung == "auto"
+        known: tuple[Hearing, ...] = ()
+        while any(_decided(study)):
             asks = self._random(study, nominal)
             study = replace(study, heard=self._heard(study, asks, last=False))
-            wide = _widths(study)
-            if max(wide) < until:
+            if _wide(study) < until and spoken:
+                # The boards at a boundary are a stratum of their own and may widen it again. They
+                # are others once there are more samples, so these are not kept.
+                asks += hearing.ask_boundary(study.answers, study.plan.questions, asks)
+                known = self._heard(study, asks, known=known, store=False)
+                study = replace(study, heard=known)
+            if _wide(study) < until:
                 break
             # Exact samples narrow the first part of an interval, boards in ngspice the second.
-            exact = max(high - low for low, high in (y.interval for y in study.yields if y))
-            spoken = self.pool is not None and self.rung == "auto"
+            exact = max(
+                high - low
+                for y, some in zip(study.yields, _decided(study), strict=True)
+                if y is not None and some
+                for low, high in [y.interval]
+            )
             if exact >= 0.7 * until and samples < MOST_UNTIL:
                 samples = min(samples + BLOCK, MOST_UNTIL)
                 study = self._sampled(study, samples)
             elif spoken and nominal < min(MOST_NOMINAL, samples):
                 nominal += MORE_NOMINAL
-            elif samples < MOST_UNTIL and exact >= until:
+            elif samples < MOST_UNTIL and (exact >= until or nominal < MOST_NOMINAL):
                 samples = min(samples + BLOCK, MOST_UNTIL)
                 study = self._sampled(study, samples)
             else:
                 break
         study = self._all_heard(study, nominal)
-        narrow = max(_widths(study)) < until
-        if not narrow:
+        return replace(study, narrow=self._narrow(study, until))
+
+    def _narrow(self, study: Study, until: float) -> bool:
+        """Whether every interval is; says which is not, and why there are no more samples."""
+        silent = [i + 1 for i in study.asked if not _decided(study)[i]]
+        if silent:
+            self.said.note(
+                f"no board has an answer to response {', '.join(map(str, silent))}: "
+                "more samples would not narrow its interval"
+            )
+        if not _wide(study) < until:
             self.said.note(
                 f"the intervals are still wider than {until:g}: a study grows to "
                 f"{MOST_UNTIL} samples at most, and to {MOST_NOMINAL} boards in ngspice"
             )
-        return replace(study, narrow=narrow)
+        return not silent and _wide(study) < until
 
     def tuned(self, study: Study, bands: Bands) -> Study:
         """With the generator free within the bands."""
@@ -177,33 +197,61 @@ class Work:
         return hearing.ask_random(study.answers, nominal)
 
     def _all_heard(self, study: Study, nominal: int) -> Study:
-        """With the boards at a boundary, which are known only once there is no more sample."""
+        """With the boards at a boundary, which are known only once there is no more sample, and
+        those on which the engines differ, once that is known."""
         asks = self._random(study, nominal)
         if self.rung == "auto":
             asks += hearing.ask_boundary(study.answers, study.plan.questions, asks)
+        study = replace(study, heard=self._heard(study, asks, last=False))
+        asks += hearing.ask_differing(study.answers, study.heard, asks)
         return replace(study, heard=self._heard(study, asks))
 
     def _heard(
-        self, study: Study, asks: Sequence[Ask], *, last: bool = True
+        self,
+        study: Study,
+        asks: Sequence[Ask],
+        *,
+        last: bool = True,
+        known: Sequence[Hearing] = (),
+        store: bool = True,
     ) -> tuple[Hearing, ...]:
+        """What ngspice says to ``asks``. known : beside what the study has. store : keep it."""
         plan = study.plan
         asks = [a for a in asks if plan.questions[a.question].settings is not None]
         if self.pool is None or not asks:
             return ()
-        step = self.said.stage(f"ngspice, {len(asks)} runs", len(asks))
-        store = self.stores.ngspice(plan)
+        have = {(h.sample, h.question, h.kind) for h in (*known, *study.heard)}
+        fresh = any((a.sample, a.question, a.kind) not in have for a in asks)
+        step = self.said.stage(f"ngspice, {len(asks)} runs", len(asks)) if fresh else _nothing
         return tuple(
             layers.listen(
-                plan, asks, store, self.pool, self.jobs, step, known=study.heard, last=last
+                plan,
+                asks,
+                self.stores.ngspice(plan) if store else None,
+                self.pool,
+                self.jobs,
+                step,
+                known=(*known, *study.heard),
+                last=last,
             )
         )
 
 
-def _widths(study: Study) -> list[float]:
-    """Of each response's interval, the combined one where there is one."""
+def _nothing() -> None:
+    pass
+
+
+def _decided(study: Study) -> list[bool]:
+    """For each response, whether any board has an answer."""
+    return [y is not None and y.samples > y.failed for y in study.yields]
+
+
+def _wide(study: Study) -> float:
+    """Width of the widest interval, the combined one where there is one, of the responses to which
+    any board has an answer."""
     both = [
         (c.low, c.high) if c is not None else y.interval
-        for c, y in zip(study.combined, study.yields, strict=True)
-        if y is not None
+        for c, y, some in zip(study.combined, study.yields, _decided(study), strict=True)
+        if y is not None and some
     ]
-    return [high - low for low, high in both]
+    return max((high - low for low, high in both), default=0.0)

@@ -230,3 +230,48 @@ def test_a_folder_that_is_gone_is_said(tmp_path: Path, plan: StudyPlan) -> None:
     with pytest.raises(InputError, match="No such file"):
         _store(tmp_path / "gone", plan).put(block, _answers(block))
     assert not (tmp_path / "gone").exists()
+
+
+def test_last_digits_of_what_is_computed_do_not_make_another_study(plan: StudyPlan) -> None:
+    """Another machine's linear algebra rounds otherwise; a part's value is not computed by it."""
+    (one,) = plan.questions
+
+    def with_start(factor: float) -> StudyPlan:
+        start = replace(one.start, start=one.start.start / 3.0 * factor)
+        excitation = Excitation(300.0 / 7.0 * factor, 2.0 / 7.0 * factor)
+        assert one.settings is not None
+        settings = replace(one.settings, max_step=1e-5 / 7.0 * factor)
+        question = replace(one, start=start, excitation=excitation, settings=settings)
+        return replace(plan, questions=(question,))
+
+    def hashes(factor: float) -> list[str]:
+        of = with_start(factor)
+        return [
+            study_hash(of, "ngspice"),
+            study_hash(of, "reached", {"recipes": [2e3 / 7 * factor]}),
+        ]
+
+    assert hashes(1.0) == hashes(1.0 + 4e-15)
+    assert not set(hashes(1.0)) & set(hashes(1.0 + 1e-8))
+    first, *rest = plan.circuit.parts
+    assert isinstance(rest[-1], Resistor)
+    parts = (first, *rest[:-1], replace(rest[-1], value=rest[-1].value * (1.0 + 4e-15)))
+    other = replace(plan, circuit=replace(plan.circuit, parts=parts))
+    assert study_hash(other) != study_hash(plan)
+
+
+def test_blocks_of_another_study_are_ignored_aloud(tmp_path: Path, plan: StudyPlan) -> None:
+    def store(study: str, notes: list[str]) -> BlockStore[Answer]:
+        return BlockStore(tmp_path, "samples.parquet", Answer, study, note=notes.append)
+
+    def made(study: str) -> list[str]:
+        notes: list[str] = []
+        task = lambda block: lambda jobs, step: _answers(block)  # noqa: E731
+        fill(plan, store(study, notes), BLOCK, task, Here(1), lambda: None)
+        return notes
+
+    assert made("a" * 64) == []
+    assert made("a" * 64) == []
+    (said,) = made("b" * 64)
+    assert said == "samples.parquet: 2 blocks of another study ignored, computed again"
+    assert made("b" * 64) == []

@@ -13,13 +13,14 @@ from designer.hearing import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,
     OWN_SAMPLES,
-    SLOW_SAMPLES,
+    SUBSET,
     Ask,
     Hearing,
     Kind,
     Why,
     ask_all,
     ask_boundary,
+    ask_differing,
     ask_random,
     distance,
 )
@@ -51,7 +52,7 @@ def test_the_random_subset_and_every_slow_one() -> None:
     assert NOMINAL_SAMPLES >= 50
     assert nominal == {
         i: Why.RANDOM if i < NOMINAL_SAMPLES else Why.SLOW
-        for i in range(SLOW_SAMPLES)
+        for i in range(SUBSET)
         if i < NOMINAL_SAMPLES or i % 3 == 0
     }
     assert ask_random(answers[:60]) == [a for a in asks if a.sample < 60]
@@ -99,6 +100,20 @@ def test_the_nearest_to_a_boundary_are_asked_once() -> None:
             met = {a.sample for a in asks if a.question == number and a.kind is kind}
             assert met == (set() if (number, kind) == (0, Kind.OWN) else set(mine))
     assert {a.why for a in asks} == {Why.BOUNDARY}
+
+
+def test_boards_that_differ_are_asked_from_their_own_orbit() -> None:
+    """Boards 0 and 1 agree, 2 has no answer, 3 to 5 differ and 3 is asked anyway; 6 differs from
+    its own orbit alone."""
+    answers = [replace(BLANK, sample=i) for i in range(7)]
+    said = ["1-2-2", "1-2-2", "undecided", "1-1-1", "1-1-1", "aperiodic"]
+    heard = [
+        replace(HEARD, sample=i, kind=Kind.NOMINAL, response=response)
+        for i, response in enumerate(said)
+    ]
+    heard.append(replace(HEARD, sample=6, response="1-1-1"))
+    asks = ask_differing(answers, heard, [Ask(3, 0, Kind.OWN, Why.RANDOM)])
+    assert asks == [Ask(i, 0, Kind.OWN, Why.DIFFERS) for i in (4, 5)]
 
 
 def test_agreement_and_survival() -> None:

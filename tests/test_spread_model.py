@@ -320,6 +320,24 @@ share = 0.8
         assert part in words_of(spread, SOLD), part
 
 
+def test_a_spread_of_the_bandwidth_says_that_no_yield_depends_on_it() -> None:
+    said = words_of(of('gain_bandwidth = ["1 MHz", "2 MHz"]\nsupply = 0.02'), SOLD)
+    (bandwidth,) = (part for part in said.split("; ") if "gain-bandwidth" in part)
+    assert "1 MHz to 2 MHz" in bandwidth.replace("\N{NO-BREAK SPACE}", " ")
+    assert "does not enter the yield" in bandwidth
+    assert "does not enter" not in words_of(of("supply = 0.02"), SOLD)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.8, 1.0])
+def test_tracking_narrows_each_part_by_itself(share: float) -> None:
+    """By √(s² + (1 - s)²), as docs/spread.md says: the variance of a sum of two independent
+    numbers."""
+    grouped = of(f'[[spread.network]]\nparts = ["R1", "R2"]\nshare = {share}')
+    drawn = draw_many(SOLD, grouped, 3, range(40_000)).values["R1"]
+    alone = draw_many(SOLD, of(""), 3, range(40_000)).values["R1"]
+    assert drawn.std() / alone.std() == pytest.approx(np.hypot(share, 1.0 - share), rel=0.02)
+
+
 def test_an_exact_part_among_picked_ones() -> None:
     picked = 'resistors = { law = "binned", inner = 0.002 }\n'
     spread = of(f'{picked}[[spread.part]]\nnames = "R203"\ngrade = 0.0')

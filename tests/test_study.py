@@ -13,17 +13,19 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from designer import cli, layers, study_json, study_work
+from designer import cli, layers, pipeline, study_json, study_work
 from designer.errors import InputError
 from designer.folder import Folder
 from designer.hearing import Hearing, Kind, Why
+from designer.laws import Uniform
 from designer.layers import Here, Samples
 from designer.progress import Progress
-from designer.study import Stores, Study
+from designer.study import Stores, Study, tolerance
 from designer.study_work import Work
 from designer.verdict import BLOCK, Answer, Verdict
 from tests.test_verdict import plan
@@ -122,6 +124,115 @@ def test_a_study_that_stays_wide_ends_and_says_so(monkeypatch: pytest.MonkeyPatc
     assert study.plan.samples == 3 * BLOCK
 
 
+def test_a_response_without_an_answer_does_not_drive_the_study(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its interval is everything, however many boards there are; the other one's still counts."""
+
+    class Silent(Fixed):
+        def __call__(self, plan: Any, indices: range) -> Any:
+            made = super().__call__(plan, indices)
+            return lambda jobs, step: [
+                replace(a, verdict=Verdict.FAILED) if a.question == 1 else a
+                for a in made(jobs, step)
+            ]
+
+    monkeypatch.setattr(layers, "Samples", Silent(10))
+    monkeypatch.setattr(study_work, "MOST_UNTIL", 6 * BLOCK)
+    notes: list[str] = []
+    said = Progress()
+    monkeypatch.setattr(said, "note", notes.append)
+    work = Work(1, None, Stores(), Here(1), said, "exact")
+    checked: Any = (None, None)
+    study = work.grown(Study(checked, plan(200), (0, 1), {}, (), until=0.06))
+    assert study.narrow is False
+    assert study.plan.samples == 2 * BLOCK  # 0.06 is wider than Wilson's at 450 of 500
+    assert [note for note in notes if "response 2" in note]
+    assert not [note for note in notes if "wider" in note]
+
+
+@pytest.mark.parametrize("until", [0.064, 0.07, 0.076])
+def test_boards_at_a_boundary_count_before_a_study_ends(
+    until: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ngspice loses just the boards that are next to a boundary: asked after the last sample alone
+    they would make the interval wider again, and the study would end wide."""
+
+    class Near(Fixed):
+        def __call__(self, plan: Any, indices: range) -> Any:
+            made = super().__call__(plan, indices)
+            return lambda jobs, step: [
+                replace(a, penetration=0.01 * (a.sample - 99)) if 100 <= a.sample < 110 else a
+                for a in made(jobs, step)
+            ]
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        return [
+            Hearing(
+                a.sample, a.question, a.kind, a.why,
+                "1-1-2" if 100 <= a.sample < 110 else "1-1-1", "", "", 9, False,
+            )
+            for a in asks
+        ]  # fmt: skip
+
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(200)
+    nominal = replace(p.questions[0].start, penetration=1.0, miss=1.0)
+    spec = replace(p.questions[0].spec, expect=None)
+    one = replace(p.questions[0], spec=spec, start=nominal, settings=object())  # type: ignore[arg-type]
+    pool: Any = object()
+    work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
+    checked: Any = (None,)
+    study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=until)
+    monkeypatch.setattr(layers, "Samples", _first(Near(10**9)))
+    study = work.grown(study)
+    (both,) = study.combined
+    assert both is not None
+    assert study.narrow is True
+    assert both.width < until
+    assert "boundary" in [s.name for s in both.strata]
+
+
+@pytest.mark.parametrize("rung", ["auto", "ngspice"])
+def test_boards_that_differ_are_explained_by_their_own_orbit(
+    rung: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Board 45 is beyond those that are asked from their own orbit, and differs from the nominal
+    one."""
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        return [
+            Hearing(
+                a.sample, a.question, a.kind, a.why,
+                "3-3-3" if a.sample == 45 and a.kind is Kind.NOMINAL else "1-1-1",
+                "", "", 9, False,
+            )
+            for a in asks
+        ]  # fmt: skip
+
+    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(60)
+    spec = replace(p.questions[0].spec, expect=None)
+    questions = tuple(replace(p.questions[0], spec=spec, settings=object()) for _ in range(2))  # type: ignore[arg-type]
+    pool: Any = object()
+    checked: Any = (None, None)
+    study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
+    study = Work(1, pool, Stores(), Here(1), Progress(), rung).made(study)
+    for both in study.combined:
+        assert both is not None
+        (difference,) = both.differences
+        assert difference.sample == 45
+        assert difference.explanation == "another attractor from the nominal orbit"
+
+
+def _first(made: Fixed) -> Any:
+    """Of the first question alone."""
+    return lambda plan, indices: (
+        lambda jobs, step: [a for a in made(plan, indices)(jobs, step) if a.question == 0]
+    )
+
+
 def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """The combined interval counts: exact samples alone cannot make it narrow."""
     monkeypatch.setattr(layers, "Samples", Fixed(10**9))
@@ -149,6 +260,24 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
     assert asked == sorted(asked)
     assert asked[-1] > 100
     assert all(both is not None and both.width < 0.05 for both in study.combined)
+
+
+@pytest.mark.parametrize("spread", [None, Uniform(2e6, 4e6)])
+def test_a_study_says_that_the_bandwidth_does_not_enter(
+    spread: Uniform | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    p = plan(3)
+    p = replace(p, spread=replace(p.spread, gain_bandwidth=spread))
+    monkeypatch.setattr(pipeline, "plan_study", lambda *_, **__: p)
+    notes: list[str] = []
+    said = Progress()
+    monkeypatch.setattr(said, "note", notes.append)
+    made: Any = SimpleNamespace(
+        modelfile=SimpleNamespace(responses=(None,)), design=None, catalog=None
+    )
+    tolerance(made, samples=3, rung="exact", checked=(), progress=said)
+    assert len(notes) == (spread is not None)
+    assert all("gain-bandwidth does not enter the yield" in note for note in notes)
 
 
 # ---------------------------------------------------------------------------------------------
