@@ -14,14 +14,17 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from designer import cli, reproduce_dynamics
 from designer.attractor import settle
 from designer.cascade import cascade
+from designer.catalog import load_catalog
 from designer.errors import InputError
 from designer.flow import Flow
 from designer.orbit import failed
+from designer.paper_design import MODEL
 from designer.paper_statements import AGREES, DISAGREES, IN_PART, main_windows
 from designer.progress import Progress
-from designer.reproduce_dynamics import MODEL, Dynamics, Extent, measure, reproduce
+from designer.reproduce_dynamics import Dynamics, Extent, measure, reproduce
 from designer.system import Drive
 from designer.windows import Window, WindowEnd
 
@@ -82,14 +85,25 @@ def test_statements_say_where_the_paper_is_wrong() -> None:
 
 
 @pytest.mark.slow
-def test_the_folder_holds_what_was_found(tmp_path: Path) -> None:
+def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "paper-dynamics"
-    few = replace(SMALL, low=1.32, depth=2)
+    monkeypatch.setitem(reproduce_dynamics.FIGURES, "fig2c", (1.4, 1.5, 21))
+    few = replace(SMALL, low=1.32, depth=2, figures=("fig2c",))
     found = reproduce(out, extent=few)
     data = json.loads((out / "dynamics.json").read_text(encoding="utf-8"))
     assert data["points"] == [p.as_dict() for p in found.found.points]
     assert len(data["windows"]) == len(found.windows)
     assert data["provenance"]["versions"]["numpy"] == np.__version__
+    said = data["provenance"]
+    assert said["settings"]["dynamics"]["low"] == 1.32
+    assert said["catalogue_sha256"] == load_catalog().hash
+    assert len(said["model_sha256"]) == 64
+    swept = pq.read_table(out / "fig2c.parquet").to_pylist()
+    assert [row["track"] for row in swept] == ["down"] * 21 + ["up"] * 21
+    np.testing.assert_array_equal([row["omega"] for row in swept[:21]], np.linspace(1.4, 1.5, 21))
+    assert json.loads(pq.read_schema(out / "fig2c.parquet").metadata[b"designer"])[
+        "provenance"
+    ] == json.loads(json.dumps(said))
     rows = pq.read_table(out / "branches.parquet").to_pylist()
     assert len(rows) == sum(len(b.points) for b in found.found.branches)
     text = (out / "README.md").read_text(encoding="utf-8")
@@ -100,6 +114,28 @@ def test_the_folder_holds_what_was_found(tmp_path: Path) -> None:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     for statement in found.statements:
         assert statement.found in text
+    assert {path.name for path in out.iterdir()} <= reproduce_dynamics.NAMES
+    reproduce_dynamics._check_ours(out)  # may be replaced
+    (out / "notes.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"notes\.txt"):
+        reproduce(out, extent=few)
+
+
+@pytest.mark.parametrize("name", ["README.md", "fig3.png", "notes.txt", "dynamics.json"])
+def test_files_of_others_are_left_alone(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        reproduce(tmp_path, extent=SMALL)
+    assert name in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text(encoding="utf-8") == "{}"
+
+
+def test_dynamics_is_not_taken_up_again(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert cli.status(["reproduce", "dynamics", "--resume", "--out", str(out)]) == 2
+    assert "--resume" in capfd.readouterr().err
+    assert not out.exists()
 
 
 def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
