@@ -7,10 +7,8 @@ branches and the sweeps as Parquet. A folder that holds anything else is refused
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,9 +28,17 @@ from designer.errors import InputError
 from designer.modelfile import parse_model_file
 from designer.orbit import Orbit
 from designer.paper_design import MODEL
-from designer.paper_statements import Statement, main_cascades, main_windows, statements
+from designer.paper_order import gaps
+from designer.paper_statements import (
+    Statement,
+    main_cascades,
+    main_windows,
+    statements,
+    symmetric_mains,
+)
 from designer.plots import to_png, to_svg
 from designer.progress import Progress
+from designer.report_folder import check_ours, write
 from designer.responses import scale_of
 from designer.survey import Survey, survey
 from designer.sweep_store import write_sweep
@@ -47,7 +53,7 @@ FIRST = 1.55
 """ω at which the branch of symmetric orbits is set out from."""
 DEPTH = 2
 """Branch switches in a row: to the twins, and to their doubled orbits."""
-DATA, PART = "dynamics.json", ".part"
+DATA = "dynamics.json"
 FIGURES = {"fig2a": (0.1, 1.8, 1801), "fig2b": (0.2, 0.6, 801), "fig2c": (1.25, 1.6, 701)}
 """ω from, to and steps of each picture of the paper's Fig. 2."""
 SHARED = (1.55, 1.505, 1.43, 1.35, 0.85, 0.77, 0.54, 0.41, 0.25, 0.225)
@@ -108,7 +114,7 @@ def reproduce(
     said = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _check_ours(out)
+        check_ours(out, NAMES, DATA, COMMAND)
     except OSError as error:
         raise InputError(
             out, "--out", error.strerror or str(error), "a directory that can be written"
@@ -116,51 +122,11 @@ def reproduce(
     dynamics = measure(extent, said)
     source = _provenance(extent)
     text = json.dumps(_plain(dynamics, extent, source), indent=1, sort_keys=True)
-    _write(out / DATA, text + "\n")  # first: it says whose folder this is
+    write(out / DATA, text + "\n")  # first: it says whose folder this is
     _parquet(out / "branches.parquet", dynamics.found, source)
     pictures = _pictures(out, dynamics, extent, jobs, source, said)
-    _write(out / "README.md", _readme(dynamics, pictures))
+    write(out / "README.md", _readme(dynamics, pictures))
     return dynamics
-
-
-def _check_ours(out: Path) -> None:
-    """InputError unless the folder is empty or holds an earlier report and nothing else."""
-    there = sorted(path.name for path in out.iterdir())
-    foreign = [name for name in there if name.removeprefix(".").removesuffix(PART) not in NAMES]
-    if foreign:
-        found = foreign[0]
-    elif there and not _is_report(out / DATA):
-        found = there[0]
-    else:
-        return
-    raise InputError(
-        out / found,
-        "--out",
-        "a file that is not of an earlier report",
-        "an empty folder, or one that this command made",
-    )
-
-
-def _is_report(path: Path) -> bool:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(data, dict) and data.get("command") == COMMAND
-
-
-def _write(path: Path, content: str | bytes) -> None:
-    """All at once."""
-    partial = path.with_name(f".{path.name}{PART}")
-    try:
-        partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
-        os.replace(partial, path)
-    except OSError as error:
-        expected = "a place that can be written"
-        raise InputError(path, "--out", error.strerror or str(error), expected) from None
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def _provenance(extent: Extent) -> dict[str, Any]:
@@ -198,7 +164,9 @@ def measure(extent: Extent, progress: Progress) -> Dynamics:
     step = progress.stage("Coexisting attractors", len(extent.shared))
     shared = {w: tuple(_coexisting(w, step)) for w in extent.shared}
     chatter = tuple((w, settle(over.flow(w), np.zeros(4))) for w in extent.chatter)
-    said = statements(found, windows, chatter)
+    mains = symmetric_mains(windows)
+    between = gaps(MODEL, mains, progress=progress.stage("Between the windows", len(mains) - 1))
+    said = statements(found, windows, between, chatter)
     return Dynamics(
         found, tuple(windows), main_cascades(windows), after, shared, chatter, tuple(said)
     )
@@ -248,8 +216,8 @@ def _pictures(
     for name, figure in drawn.items():
         png = io.BytesIO()
         to_png(figure, png)
-        _write(out / f"{name}.png", png.getvalue())
-        _write(out / f"{name}.svg", to_svg(figure))
+        write(out / f"{name}.png", png.getvalue())
+        write(out / f"{name}.svg", to_svg(figure))
     return list(drawn)
 
 
@@ -327,7 +295,7 @@ def _parquet(path: Path, found: Survey, said: Mapping[str, Any]) -> None:
     note = json.dumps({"format": FORMAT, "provenance": dict(said)}, sort_keys=True)
     content = io.BytesIO()
     pq.write_table(table.replace_schema_metadata({"designer": note}), content)
-    _write(path, content.getvalue())
+    write(path, content.getvalue())
 
 
 def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
