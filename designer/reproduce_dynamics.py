@@ -196,11 +196,6 @@ def _pictures(
         "branches": dynamics_pictures.branches(dynamics.found, extent.low, extent.high),
         "fig3": dynamics_pictures.portraits(_portraits(dynamics)),
     }
-    marks = [
-        bifurcation_plots.Mark(str(p.kind), p.value)
-        for p in dynamics.found.points
-        if p.stable[0] != p.stable[1]
-    ]
     for name in extent.figures:
         low, high, steps = FIGURES[name]
         plan = sweep.SweepPlan(
@@ -211,8 +206,8 @@ def _pictures(
         )
         made = sweep.run(plan, jobs, progress=progress.stage(f"Sweep for {name}"))
         write_sweep(out / f"{name}.parquet", made, source)
-        within = [m for m in marks if low <= m.value <= high]
-        drawn[name] = bifurcation_plots.diagram(made, within if name != "fig2a" else ())
+        marks = bifurcation_plots.marks(dynamics.found.points, low, high)
+        drawn[name] = bifurcation_plots.diagram(made, marks if name != "fig2a" else ())
     for name, figure in drawn.items():
         png = io.BytesIO()
         to_png(figure, png)
