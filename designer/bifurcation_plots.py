@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from designer.basins import Basins
+from designer.basins import SAME, Basins
+from designer.bifurcations import Bifurcation
 from designer.orbit import OrbitStatus
 from designer.parameter_map import Cell, ParameterMap
 from designer.plots import GRID, INK, MUTED, new_figure, style
 from designer.steady import Steady
-from designer.sweep import DOWN, UP, Sweep, Window
+from designer.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.sweep_subject import Subject
 from designer.system import Array
 
@@ -69,6 +70,15 @@ class Mark:
     value: float
 
 
+def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Mark]:
+    """Those of stable orbits, from low to high."""
+    return [
+        Mark(str(p.kind), p.value)
+        for p in points
+        if (p.stable[0] or p.stable[1]) and low <= p.value <= high
+    ]
+
+
 def diagram(sweep: Sweep, points: Sequence[Mark] = ()) -> Figure:
     """The paper's Fig. 2: least displacement of each period, impact velocity on the upper stop,
     largest Lyapunov exponent, over the swept parameter; windows named above."""
@@ -84,7 +94,8 @@ def diagram(sweep: Sweep, points: Sequence[Mark] = ()) -> Figure:
         least, speed, growth = rows[len(strips) :]
         symbol = plan.subject.states[0][0]
         size = min(3.2, max(1.5, 1000.0 / len(plan.values)))
-        for colour, values, steps in _coloured(sweep):
+        coloured = _coloured(sweep)
+        for colour, values, steps in coloured:
             ink: dict[str, Any] = {"color": colour, "ls": "", "rasterized": True, "ms": size}
             _cloud(least, values, [s.minima for s in steps], ink)
             _cloud(speed, values, [s.velocities for s in steps], ink)
@@ -105,7 +116,7 @@ def diagram(sweep: Sweep, points: Sequence[Mark] = ()) -> Figure:
         span = float(plan.values[-1] - plan.values[0])
         growth.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
         growth.set_xlabel(_axis(plan.subject, plan.parameter))
-        handles = _key(sweep)
+        handles = _key(sweep, coloured)
         for kind in dict.fromkeys(p.kind for p in points):
             marker, colour = MARKS.get(kind, ("|", INK))
             at = [p.value for p in points if p.kind == kind]
@@ -175,7 +186,10 @@ def basins(made: Basins) -> Figure:
 # ---------------------------------------------------------------------------------------------
 
 
-def _coloured(sweep: Sweep) -> list[tuple[str, Array, list[Steady]]]:
+Coloured = tuple[str, Array, list[Steady]]
+
+
+def _coloured(sweep: Sweep) -> list[Coloured]:
     """(colour, values, steps): followed tracks one each; of fixed starts the attractor from the
     first start black, its mirror twin red, the others by response."""
     plan = sweep.plan
@@ -193,7 +207,7 @@ def _coloured(sweep: Sweep) -> list[tuple[str, Array, list[Steady]]]:
             met.append(step)
             if len(met) == 1:
                 colour = BLACK
-            elif _family(step) == _family(met[0]):
+            elif _twins(plan, float(value), met[0], step):
                 colour = RED
             else:
                 colour = names.setdefault(_family(step), DOTS[len(names) % len(DOTS)])
@@ -207,6 +221,19 @@ def _family(step: Steady) -> str:
     """The response up to its mirror image."""
     p, q = sorted((step.p, step.q))
     return f"{step.n}-{p}-{q}" if step.status is OrbitStatus.PERIODIC else step.response
+
+
+def _twins(plan: SweepPlan, value: float, a: Steady, b: Steady) -> bool:
+    """Whether b is the mirror image of a: one of a's strobes half a period on, reflected."""
+    alike = a.status is OrbitStatus.PERIODIC and (a.n, a.p, a.q) == (b.n, b.q, b.p)
+    if not alike or a.symmetric or b.symmetric:
+        return False
+    flow = plan.subject.settings([{plan.parameter: value}])[0].flow()
+    if flow.system.mirror is None:
+        return False
+    trace = flow.run(a.start, a.n, points=2).strobes
+    image = trace[1:-1:2] @ flow.system.mirror.T
+    return bool((np.abs(image - b.start).max(axis=1) <= SAME * np.abs(image).max()).any())
 
 
 def _same(a: Steady, b: Steady) -> bool:
@@ -261,7 +288,7 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
             last = centre + 0.008 * span
 
 
-def _key(sweep: Sweep) -> list[Any]:
+def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
     plan = sweep.plan
     dot: dict[str, Any] = {"ls": "", "marker": ".", "ms": 7}
     handles: list[Any] = []
@@ -270,10 +297,9 @@ def _key(sweep: Sweep) -> list[Any]:
             handles.append(Line2D([], [], color=colour, label=f"followed {track}", **dot))
     elif not plan.followed and len(plan.tracks) > 1:
         handles.append(Line2D([], [], color=BLACK, label="from rest", **dot))
-        colours = [c for c, _, _ in _coloured(sweep)]
-        if RED in colours:
+        if RED in [c for c, _, _ in coloured]:
             handles.append(Line2D([], [], color=RED, label="its mirror twin", **dot))
-        for colour, _, steps in _coloured(sweep):
+        for colour, _, steps in coloured:
             if colour not in (BLACK, RED):
                 families = list(dict.fromkeys(_family(s) for s in steps))
                 some = ", ".join(families[:3]) + (" …" if len(families) > 3 else "")

@@ -67,6 +67,9 @@ def reproduce(
             for name, value in (("--samples", samples), ("--seed", seed)):
                 if value is not None:
                     raise InputError(None, name, value, "nothing: dynamics draws no boards")
+            if resume:
+                expected = "nothing: dynamics is made anew each time"
+                raise InputError(None, "--resume", "given", expected)
             reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
         else:
             from designer import reproduce_tolerance

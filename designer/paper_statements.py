@@ -10,10 +10,14 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from designer.bifurcations import Bifurcation, Kind
 from designer.cascade import Cascade, cascade
 from designer.orbit import Orbit
+from designer.paper_order import Gap, faults, strays
 from designer.survey import Survey
+from designer.system import Array
 from designer.windows import Window
 
 AGREES, IN_PART, DISAGREES = "agrees", "in part", "disagrees"
@@ -46,19 +50,29 @@ def main_windows(windows: Sequence[Window], p: int) -> tuple[Window | None, Wind
     return out[0], out[1]
 
 
+def symmetric_mains(windows: Sequence[Window]) -> list[tuple[int, Window]]:
+    """p and the widest symmetric window of 1-p-p, for those of p = 1 … 8 that there are."""
+    tops = [(p, main_windows(windows, p)[0]) for p in range(1, 9)]
+    return [(p, w) for p, w in tops if w is not None]
+
+
 def statements(
-    found: Survey, windows: Sequence[Window], chatter: Sequence[tuple[float, Orbit]]
+    found: Survey,
+    windows: Sequence[Window],
+    gaps: Sequence[Gap],
+    chatter: Sequence[tuple[float, Orbit]],
 ) -> list[Statement]:
     """Every statement, in the paper's order.
 
-    chatter : frequencies with the orbit reached from rest there, highest first.
+    gaps : what lies between the main windows. chatter : frequencies with the orbit reached from
+    rest there, highest first.
     """
     symmetric, twins = main_windows(windows, 1)
     assert symmetric is not None
     assert twins is not None
     out = [_pitchfork(symmetric), _first_end(found, windows, twins)]
-    out += [_doublings(windows), _second(windows), _twins(windows), _order(windows)]
-    out.append(_chattering(windows, chatter))
+    out += [_doublings(windows), _second(windows), _twins(windows), _order(windows, gaps)]
+    out.append(_chattering(found, windows, chatter))
     return out
 
 
@@ -83,8 +97,8 @@ def _first_end(found: Survey, windows: Sequence[Window], twins: Window) -> State
     if touch is not None:
         state = "stable" if touch.stable[0] and touch.stable[1] else "unstable"
         grazed = (
-            f". The 1-1-1AS orbit itself touches the stop only at ω = {touch.value:.5f}, "
-            f"{state} by then"
+            ". The 1-1-1AS orbit itself first touches the stop once more at "
+            f"ω = {touch.value:.5f}, {state} by then"
         )
     return Statement(
         "Sec. 4: grazing turns 1-1-1AS into 1-1-2, whose period doublings lead to chaos",
@@ -100,7 +114,15 @@ def _grazing(found: Survey, twins: Window) -> Bifurcation | None:
     end = twins.low.point
     if end is None:
         return None
-    touches = [p for p in found.on(twins.branch) if p.kind is Kind.GRAZING]
+    before, after = end.stable
+    if before == after:  # the counts change there: the window lies at the higher values
+        before = found.branches[twins.branch].points[int(end.position)].value > end.value
+    touches = [
+        p
+        for p in found.on(twins.branch)
+        if p.kind is Kind.GRAZING
+        and (p.position > end.position if before else p.position < end.position)
+    ]
     return min(touches, key=lambda p: abs(p.position - end.position), default=None)
 
 
@@ -147,7 +169,7 @@ def _twins(windows: Sequence[Window]) -> Statement:
         (lacking if main_windows(windows, p)[1] is None else having).append(p)
     words = f"Stable 1-p-p twins were found for p = {_list(having)}"
     if lacking:
-        words += f"; none for p = {_list(lacking)}"
+        words += f"; none for p = {_list(lacking)} on the branches followed"
     return Statement(
         "Sec. 4 and Fig. 3: for p ≥ 2 as well two antisymmetric trajectories appear, by the start",
         words,
@@ -156,40 +178,57 @@ def _twins(windows: Sequence[Window]) -> Statement:
     )
 
 
-def _order(windows: Sequence[Window]) -> Statement:
-    tops = [(p, main_windows(windows, p)[0]) for p in range(1, 9)]
-    there = [(p, w) for p, w in tops if w is not None]
+def _order(windows: Sequence[Window], gaps: Sequence[Gap]) -> Statement:
+    there = symmetric_mains(windows)
     falling = all(a[1].high.value > b[1].high.value for a, b in itertools.pairwise(there))
-    gaps = all(a[1].low.value > b[1].high.value for a, b in itertools.pairwise(there))
-    complete = len(there) == len(tops)
+    apart = all(a[1].low.value > b[1].high.value for a, b in itertools.pairwise(there))
+    looked = [(g.p, g.after) for g in gaps] == [(a[0], b[0]) for a, b in itertools.pairwise(there)]
+    wrong = [said for said in (faults(windows, gap) for gap in gaps) if said]
+    wrong += strays(windows, there)
+    chaos = ", ".join(f"{g.p}–{g.after}: {g.chaotic} of {len(g.seen)}" for g in gaps)
+    complete = [p for p, _ in there] == list(range(1, 9))
     return Statement(
         "Sec. 4: 1-1-1, chaos, 1-2-2, chaos, … 1-p-p in turn as ω falls",
         f"Symmetric windows of p = {_list([p for p, _ in there])}, "
         + ("each below the one before" if falling else "not in this order")
-        + ("; their main windows do not overlap" if gaps else "; some overlap")
+        + ("; their main windows do not overlap" if apart else "; some overlap")
         + ". What begins each of them from above: "
-        + ", ".join(f"{p}: {w.high.why}" for p, w in there),
-        AGREES if complete and falling and gaps else IN_PART,
+        + ", ".join(f"{p}: {w.high.why}" for p, w in there)
+        + (f". Aperiodic from rest between them: {chaos}" if gaps else "")
+        + (f". Not as said: {'; '.join(wrong)}" if wrong else ""),
+        AGREES if complete and falling and apart and looked and not wrong else IN_PART,
         f"{SWEEP} --from 0.1 --to 1.8 --steps 1801 --down --out out/fig2",
     )
 
 
-def _chattering(windows: Sequence[Window], chatter: Sequence[tuple[float, Orbit]]) -> Statement:
+def _chattering(
+    found: Survey, windows: Sequence[Window], chatter: Sequence[tuple[float, Orbit]]
+) -> Statement:
     shown = ", ".join(f"{orbit.response} at {w:g}" for w, orbit in chatter)
     most = max((w for w in windows if w.symmetric), key=lambda w: int(w.response.split("-")[1]))
+    down_to = min(p.value for branch in found.branches for p in branch.points)
     lowest, orbit = chatter[-1]
-    speeds = orbit.impact_velocities[orbit.impact_sides > 0.0]
+    speeds = np.abs(orbit.impact_velocities[orbit.impact_sides > 0.0])
+    dying = _dying(speeds)
     grows = orbit.p >= int(most.response.split("-")[1])
     return Statement(
         "Sec. 4: as ω falls further p grows until the impacts become chattering",
-        f"The most impacts of a symmetric response are those of {most.response} (ω = "
-        f"{most.low.value:.4f} to {most.high.value:.4f}). From rest: {shown}. At ω = {lowest:g} "
-        f"contact with the upper stop begins with the speeds "
-        f"{', '.join(f'{abs(v):.2g}' for v in speeds)}: bounces that die out, finite in number, as "
-        "they must be on a soft stop, after which the mass stays on it until the force turns",
-        AGREES if grows else IN_PART,
+        f"The most impacts of a symmetric response on the branches followed, for ω ≥ {down_to:g}, "
+        f"are those of {most.response} (ω = {most.low.value:.6f} to {most.high.value:.6f}). From "
+        f"rest: {shown}. At ω = {lowest:g} contact with the upper stop begins with the speeds "
+        f"{', '.join(f'{v:.2g}' for v in speeds) or 'of no impact'}: "
+        + ("bounces that die out, finite in number" if dying else "not bounces that die out"),
+        AGREES if grows and dying else IN_PART,
         f"designer simulate examples/paper.toml --omega {lowest:g}",
     )
+
+
+def _dying(speeds: Array) -> bool:
+    """Whether there are several impacts in a period, each slower than the one before; the period
+    may begin anywhere among them."""
+    if len(speeds) < 2:
+        return False
+    return bool((np.diff(np.roll(speeds, -int(np.argmax(speeds)))) < 0.0).all())
 
 
 def _list(numbers: Sequence[int]) -> str:

@@ -2,14 +2,15 @@
 
 ``reproduce`` writes one folder: README.md with the command at its top, pictures as PNG and SVG,
 dynamics.json with windows, points, cascades, coexisting attractors and statements, and the followed
-branches and the sweep as Parquet.
+branches and the sweeps as Parquet. A folder that holds anything else is refused.
 """
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,35 +21,50 @@ import pyarrow.parquet as pq
 from designer import bifurcation_plots, dynamics_pictures, family, provenance, sweep
 from designer.attractor import coexisting, settle, starts, twin
 from designer.cascade import Cascade
+from designer.catalog import load_catalog
 from designer.continuation import End
 from designer.dynamics_pictures import Portrait
 from designer.errors import InputError
-from designer.model import Dimensionless
+from designer.modelfile import parse_model_file
 from designer.orbit import Orbit
-from designer.paper_statements import Statement, main_cascades, main_windows, statements
+from designer.paper_design import MODEL
+from designer.paper_order import gaps
+from designer.paper_statements import (
+    Statement,
+    main_cascades,
+    main_windows,
+    statements,
+    symmetric_mains,
+)
 from designer.plots import to_png, to_svg
 from designer.progress import Progress
+from designer.report_folder import check_ours, write
 from designer.responses import scale_of
 from designer.survey import Survey, survey
+from designer.sweep_store import write_sweep
 from designer.sweep_subject import ModelSubject
 from designer.windows import Window, all_windows, outside
 
 FORMAT = 1
 COMMAND = "designer reproduce dynamics --out reports/paper-dynamics"
-MODEL = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
-"""The paper's case, Sec. 4."""
 LOW, HIGH = 0.2, 1.8
 """Of ω: where branches are followed."""
 FIRST = 1.55
 """ω at which the branch of symmetric orbits is set out from."""
 DEPTH = 2
 """Branch switches in a row: to the twins, and to their doubled orbits."""
+DATA = "dynamics.json"
 FIGURES = {"fig2a": (0.1, 1.8, 1801), "fig2b": (0.2, 0.6, 801), "fig2c": (1.25, 1.6, 701)}
 """ω from, to and steps of each picture of the paper's Fig. 2."""
 SHARED = (1.55, 1.505, 1.43, 1.35, 0.85, 0.77, 0.54, 0.41, 0.25, 0.225)
 """ω at which coexisting attractors are looked for."""
 STARTS = 64
 """Initial states tried at each of them."""
+NAMES = frozenset(
+    ["README.md", DATA, "branches.parquet", *(f"{name}.parquet" for name in FIGURES)]
+    + [f"{name}.{kind}" for name in ("branches", "fig3", *FIGURES) for kind in ("png", "svg")]
+)
+"""Of the report's files."""
 CHATTER = (0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
 """ω at which the impacts of the response from rest are counted."""
 
@@ -85,30 +101,47 @@ def reproduce(
     progress: Progress | None = None,
     extent: Extent | None = None,
 ) -> Dynamics:
-    """Write the report into a folder, which is made; files of the report's names are replaced.
+    """Write the report into a folder, which is made; an earlier report in it is replaced.
 
     jobs : threads of the sweeps. progress : is told the stages. extent : the report's by default.
 
     Raises
     ------
-    InputError : the folder cannot be written.
+    InputError : the folder cannot be written, or holds files that are not an earlier report's.
+        Nothing is written then.
     """
     extent = Extent() if extent is None else extent
     said = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
+        check_ours(out, NAMES, DATA, COMMAND)
     except OSError as error:
         raise InputError(
             out, "--out", error.strerror or str(error), "a directory that can be written"
         ) from None
     dynamics = measure(extent, said)
-    pictures = _pictures(out, dynamics, extent, jobs, said)
-    versions = provenance.versions()
-    _parquet(out / "branches.parquet", dynamics.found, versions)
-    text = json.dumps(_plain(dynamics, extent, versions), indent=1, sort_keys=True)
-    (out / "dynamics.json").write_text(text + "\n", encoding="utf-8")
-    (out / "README.md").write_text(_readme(dynamics, pictures), encoding="utf-8")
+    source = _provenance(extent)
+    text = json.dumps(_plain(dynamics, extent, source), indent=1, sort_keys=True)
+    write(out / DATA, text + "\n")  # first: it says whose folder this is
+    _parquet(out / "branches.parquet", dynamics.found, source)
+    pictures = _pictures(out, dynamics, extent, jobs, source, said)
+    write(out / "README.md", _readme(dynamics, pictures))
     return dynamics
+
+
+def _provenance(extent: Extent) -> dict[str, Any]:
+    text = "format = 1\n[model]\n" + "".join(
+        f"{name} = {json.dumps(value)}\n" for name, value in MODEL.__dict__.items()
+    )
+    settings = {
+        **asdict(extent),
+        "figures": {name: list(FIGURES[name]) for name in extent.figures},
+        "first": FIRST,
+        "starts": STARTS,
+    }
+    return provenance.provenance(
+        parse_model_file(text), load_catalog().hash, seed=0, settings={"dynamics": settings}
+    )
 
 
 def measure(extent: Extent, progress: Progress) -> Dynamics:
@@ -131,7 +164,9 @@ def measure(extent: Extent, progress: Progress) -> Dynamics:
     step = progress.stage("Coexisting attractors", len(extent.shared))
     shared = {w: tuple(_coexisting(w, step)) for w in extent.shared}
     chatter = tuple((w, settle(over.flow(w), np.zeros(4))) for w in extent.chatter)
-    said = statements(found, windows, chatter)
+    mains = symmetric_mains(windows)
+    between = gaps(MODEL, mains, progress=progress.stage("Between the windows", len(mains) - 1))
+    said = statements(found, windows, between, chatter)
     return Dynamics(
         found, tuple(windows), main_cascades(windows), after, shared, chatter, tuple(said)
     )
@@ -149,18 +184,18 @@ def _named(orbit: Orbit) -> str:
 
 
 def _pictures(
-    out: Path, dynamics: Dynamics, extent: Extent, jobs: int, progress: Progress
+    out: Path,
+    dynamics: Dynamics,
+    extent: Extent,
+    jobs: int,
+    source: Mapping[str, Any],
+    progress: Progress,
 ) -> list[str]:
-    """Draw everything; names of the pictures without their endings."""
+    """Draw everything; names of the pictures without their endings. Sweeps are written too."""
     drawn = {
         "branches": dynamics_pictures.branches(dynamics.found, extent.low, extent.high),
         "fig3": dynamics_pictures.portraits(_portraits(dynamics)),
     }
-    marks = [
-        bifurcation_plots.Mark(str(p.kind), p.value)
-        for p in dynamics.found.points
-        if p.stable[0] != p.stable[1]
-    ]
     for name in extent.figures:
         low, high, steps = FIGURES[name]
         plan = sweep.SweepPlan(
@@ -170,11 +205,14 @@ def _pictures(
             **sweep.follow("down", "up"),
         )
         made = sweep.run(plan, jobs, progress=progress.stage(f"Sweep for {name}"))
-        within = [m for m in marks if low <= m.value <= high]
-        drawn[name] = bifurcation_plots.diagram(made, within if name != "fig2a" else ())
+        write_sweep(out / f"{name}.parquet", made, source)
+        marks = bifurcation_plots.marks(dynamics.found.points, low, high)
+        drawn[name] = bifurcation_plots.diagram(made, marks if name != "fig2a" else ())
     for name, figure in drawn.items():
-        to_png(figure, out / f"{name}.png")
-        (out / f"{name}.svg").write_text(to_svg(figure), encoding="utf-8")
+        png = io.BytesIO()
+        to_png(figure, png)
+        write(out / f"{name}.png", png.getvalue())
+        write(out / f"{name}.svg", to_svg(figure))
     return list(drawn)
 
 
@@ -226,7 +264,7 @@ def _plain(dynamics: Dynamics, extent: Extent, said: Mapping[str, Any]) -> dict[
         "coexisting": {f"{w:g}": list(names) for w, names in dynamics.shared.items()},
         "from_rest": {f"{w:g}": orbit.response for w, orbit in dynamics.chatter},
         "statements": [s.as_dict() for s in dynamics.statements],
-        "provenance": {"versions": dict(said), "seed": 0},
+        "provenance": dict(said),
     }
 
 
@@ -249,8 +287,10 @@ def _parquet(path: Path, found: Survey, said: Mapping[str, Any]) -> None:
         for point in branch.points
     ]
     table = pa.Table.from_pylist(rows)
-    note = json.dumps({"format": FORMAT, "provenance": {"versions": dict(said)}}, sort_keys=True)
-    pq.write_table(table.replace_schema_metadata({"designer": note}), path)
+    note = json.dumps({"format": FORMAT, "provenance": dict(said)}, sort_keys=True)
+    content = io.BytesIO()
+    pq.write_table(table.replace_schema_metadata({"designer": note}), content)
+    write(path, content.getvalue())
 
 
 def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
@@ -273,8 +313,10 @@ def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
     ]
     lines += ["", "## Windows of 1-p-p", ""]
     lines += [
-        "The widest window of each kind. What lies outside is what the last orbit settles to "
-        "5e-4 (relative) past the end.",
+        "The widest window of each kind on the branches followed: the symmetric branch through "
+        f"1-1-1 at ω = {FIRST}, and what leaves it. Responses that these do not lead to are not "
+        "looked for here; *What coexists* shows some. What lies outside is what the last orbit "
+        "settles to 5e-4 (relative) past the end.",
         "",
         "| p | kind | from ω | ended by | outside | to ω | ended by | outside |",
         "|---|---|---|---|---|---|---|---|",
@@ -282,7 +324,7 @@ def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
     for p in range(1, 9):
         for one, kind in zip(main_windows(dynamics.windows, p), ("S", "AS"), strict=True):
             if one is None:
-                lines.append(f"| {p} | {kind} | none found | | | | | |")
+                lines.append(f"| {p} | {kind} | none on the branches followed | | | | | |")
                 continue
             low, high = dynamics.after[p, f"{kind} low"], dynamics.after[p, f"{kind} high"]
             lines.append(

@@ -10,7 +10,7 @@ whatever the fast path does not fit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,6 +58,8 @@ class Course:
 class Steady:
     """What a start leads to.
 
+    status : periodic, aperiodic, not settled or diverged; of a board also clipped (an op-amp is at
+    its limit). Never grazing: a count within rounding of a tangency is given as it was run.
     n, p, q : 0 unless periodic. symmetric : None unless periodic. lyapunov : largest exponent per
     unit of the system's time; of a periodic motion, by its multipliers. radius : largest modulus
     of the multipliers (nan unless periodic). start : (states,) a strobe of the orbit, or where
@@ -140,8 +142,11 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
         status = OrbitStatus.APERIODIC
     else:
         orbit = settle(flow, end)
+        if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
+            orbit = replace(orbit, status=OrbitStatus.PERIODIC)
         status, spent = orbit.status, spent + orbit.periods
-        n, p, q, symmetric, radius = orbit.n, orbit.p, orbit.q, orbit.symmetric, orbit.radius
+        if status is OrbitStatus.PERIODIC:
+            n, p, q, symmetric, radius = orbit.n, orbit.p, orbit.q, orbit.symmetric, orbit.radius
         if np.isfinite(orbit.lyapunov):
             exponent = orbit.lyapunov
         start = orbit.start if len(orbit.start) else end

@@ -34,6 +34,8 @@ from designer.system import Array
 
 FORMAT = 1
 MOST_STEPS, MOST_STARTS, MOST_PERIODS = 100_000, 64, 1_000_000
+MOST_CELLS = 4_000_000
+"""Of a map or a basin."""
 BASIN_STEPS = 200
 """Of each axis of a basin where nothing is said."""
 
@@ -95,8 +97,11 @@ def answer(
     inputs = {
         "model": modelfile.sha256,
         "version": __version__,
+        "subject": "circuit" if request.circuit else "model",
         "work": work_hash(_decides(plan, request)),
     }
+    if request.circuit:
+        inputs["catalogue"] = load_catalog().hash
     wanted: dict[StageName, Any] = {request.kind: (inputs, _names(request.kind, plan))}
     todo = folder.decide(wanted, overwrite=request.overwrite, resume=request.resume)
     if todo:
@@ -136,6 +141,7 @@ def plan_of(request: Request, subject: Subject, modelfile: ModelFile) -> Plan:
         for value in (start, stop):
             subject.check("--map", name, value)
         ys = np.linspace(*_axis("--map", "--map", "--map", start, stop, count))
+        _check_cells(steps, count)
         swept.append(name)
     subject = _at_frequency(request, subject, modelfile, swept)
     values = np.linspace(low, high, steps)
@@ -200,6 +206,12 @@ def _axis(
     return min(low, high), max(low, high), steps
 
 
+def _check_cells(columns: int, rows: int) -> None:
+    if columns * rows > MOST_CELLS:
+        found = f"{columns} x {rows} points"
+        raise InputError(None, "--map", found, f"at most {MOST_CELLS} points in all")
+
+
 def _course(request: Request, usual: Course) -> Course:
     settle = usual.settle if request.periods is None else request.periods
     keep = usual.keep if request.keep is None else request.keep
@@ -232,13 +244,16 @@ def _basin_plan(request: Request, subject: Subject, modelfile: ModelFile) -> Bas
             )
         )
 
+    xs = axis(over, "--over", request.low, request.high, request.steps)
+    ys = axis(name, "--map", start, stop, count)
+    _check_cells(len(xs), len(ys))
     return BasinPlan(
         subject,
         changes,
         over,
-        axis(over, "--over", request.low, request.high, request.steps),
+        xs,
         name,
-        axis(name, "--map", start, stop, count),
+        ys,
         np.zeros(len(states)),
         _course(request, parameter_map.COURSE),
     )
@@ -344,7 +359,7 @@ def _make(
             "points": [p.as_dict() for p in points],
         }
         cost = {"periods": made.periods}
-        marks = [bifurcation_plots.Mark(str(p.kind), p.value) for p in points]
+        marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
         return plain({**head, **body, **tail, "cost": cost}), lambda: bifurcation_plots.diagram(
             made, marks
         )

@@ -1,7 +1,8 @@
 """Bifurcation points at the ends of a sweep's windows, located by continuation.
 
 From the orbit in the middle of each periodic window its branch is followed a little past both ends
-of the window. Windows of a few steps, and of long periods, are left out: a finer sweep has them.
+of the window, though never out of the sweep: points outside it are none of the sweep's. Windows of
+a few steps, and of long periods, are left out: a finer sweep has them.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def _ends(sweep: Sweep, window: Window, over: Family) -> list[Bifurcation]:
                 continue
             orbit = attractor.describe(flow, found[0], step.n, found[1])
             margin = BEYOND * (values[1] - values[0])
-            low, high = max(window.low - margin, over.low), min(window.high + margin, over.high)
+            low, high = max(window.low - margin, values[0]), min(window.high + margin, values[-1])
             made = survey.survey(over, [(values[k], orbit)], low, high, depth=0)
-            return list(made.points)
+            return [p for p in made.points if values[0] <= p.value <= values[-1]]
     return []

@@ -23,10 +23,11 @@ from designer.errors import InputError
 from designer.orbit import OrbitStatus
 from designer.parameter_map import Cell
 from designer.steady import Steady
+from designer.sweep import Sweep
 from designer.system import Array
 
 FORMAT = 1
-RULES = 1
+RULES = 2
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
 _KEY = b"designer"
 _COLUMNS = [
@@ -51,6 +52,37 @@ def work_hash(said: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
+def write_sweep(path: Path, made: Sweep, provenance: Mapping[str, Any]) -> None:
+    """A whole sweep as one Parquet file, with the columns of the blocks: track after track, the
+    values ascending.
+
+    Raises
+    ------
+    InputError : it cannot be written.
+    """
+    parameter = made.plan.parameter
+    rows = [
+        row
+        for track, steps in made.steps.items()
+        for row in _rows(parameter, track, [float(v) for v in made.plan.values], steps)
+    ]
+    said = {"format": FORMAT, "work": work_hash(made.plan.as_dict())}
+    write_rows(path, rows, _sweep_schema(parameter), said, provenance)
+
+
+def _sweep_schema(parameter: str) -> pa.Schema:
+    return pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
+
+
+def _rows(
+    parameter: str, track: str, values: Sequence[float], steps: Sequence[Steady]
+) -> list[dict[str, Any]]:
+    return [
+        {"track": track, parameter: v, **s.__dict__, "status": str(s.status)}
+        for v, s in zip(values, steps, strict=True)
+    ]
+
+
 @dataclass(frozen=True)
 class SweepStore:
     """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``.
@@ -71,7 +103,7 @@ class SweepStore:
 
     def read(self, track: str, block: int) -> list[Steady] | None:
         """The steps of a finished block of this very work, or None."""
-        schema = pa.schema([("track", pa.string()), (self.parameter, pa.float64()), *_COLUMNS])
+        schema = _sweep_schema(self.parameter)
         rows = read_rows(self.root / self.name(track, block), schema, self._said(track, block))
         if rows is None:
             return None
@@ -86,11 +118,8 @@ class SweepStore:
 
     def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
         """Keep a finished block; rows in the order in which the steps were made."""
-        schema = pa.schema([("track", pa.string()), (self.parameter, pa.float64()), *_COLUMNS])
-        rows = [
-            {"track": track, self.parameter: v, **s.__dict__, "status": str(s.status)}
-            for v, s in zip(values, steps, strict=True)
-        ]
+        schema = _sweep_schema(self.parameter)
+        rows = _rows(self.parameter, track, values, steps)
         said = self._said(track, block)
         write_rows(self.root / self.name(track, block), rows, schema, said, self.provenance)
 

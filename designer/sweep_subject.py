@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -147,11 +148,13 @@ class BoardSubject:
         return out
 
     def as_dict(self) -> dict[str, object]:
-        """What decides the flow, for hashes and provenance."""
-        values = self.design.circuit.values
+        """What decides the flow, for hashes and provenance. The hash is of the whole circuit: of
+        the op-amps' gain, bias currents and limits and the diodes' curves too."""
+        circuit = self.design.circuit
         return {
             "board": "nominal",
-            "parts": dict(sorted(values.items())),
+            "parts": dict(sorted(circuit.values.items())),
+            "circuit_sha256": hashlib.sha256(repr(circuit).encode("utf-8")).hexdigest(),
             "frequency": self.frequency,
             "amplitude": self.amplitude,
             "offset": self.offset,

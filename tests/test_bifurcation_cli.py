@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,8 @@ BAD: list[tuple[str, str, str]] = [
     ("--from 1 --to 2 --steps 3 --map b 1 1 3", "--map", "another value"),
     ("--from 1 --to 2 --steps 3 --map b -1 1 3", "--map", "> 0"),
     ("--from 1 --to 2 --steps 3 --map b 1 2 3 --down", "--down", "none with --map"),
+    ("--from 1 --to 2 --steps 9000 --map b 1 2 9000", "--map", "points in all"),
+    ("--basins --steps 9000 --map x1' -1 1 9000", "--map", "points in all"),
     ("--basins --over b", "--over", "x1"),
     ("--basins --map x1 -1 1 3", "--map", "another state"),
     ("--circuit --from 1 --to 2 --steps 3", "--circuit", "design folder"),
@@ -245,6 +248,36 @@ def test_map_and_basins(model: Path, tmp_path: Path, capfd: pytest.CaptureFixtur
     table = pq.read_table(out / "basins.parquet" / "row-000002.parquet", partitioning=None)
     assert {"x1", "x1'", "status"} <= set(table.column_names)
     assert {"map.png", "map.svg", "map.json", "basins.png", "basins.svg"} <= set(_tree(out))
+
+
+def test_a_model_and_its_circuit_need_a_folder_each(
+    design: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert cli.status(["bifurcation", str(design), *SWEEP, "--no-points", "--out", str(out)]) == 0
+    before = _tree(out)
+    words = ["--circuit", "--from", "300", "--to", "310", "--steps", "3", "--no-points"]
+    capfd.readouterr()
+    assert cli.status(["bifurcation", str(design), *words, "--out", str(out)]) == 2
+    said = capfd.readouterr().err
+    assert "subject model" in said
+    assert "another folder" in said
+    assert _tree(out) == before
+
+
+def test_old_blocks_of_another_circuit_are_not_taken(design: Path) -> None:
+    """The part values are the same; what the catalogue says of the op-amps is not."""
+    modelfile = read_model_file(design / "model.toml")
+    made, again = (load(Folder(design), modelfile, load_catalog()).design for _ in range(2))
+    said = BoardSubject(made).as_dict()
+    assert said == BoardSubject(again).as_dict()
+    changes: tuple[dict[str, Any], ...] = ({"gain": 1e4}, {"bias": 1e-6}, {"saturation": 9.0})
+    for change in changes:
+        circuit = replace(made.circuit, **change)
+        other = BoardSubject(made)
+        other.design = replace(made, circuit=circuit)
+        assert other.as_dict()["parts"] == said["parts"]
+        assert other.as_dict() != said
 
 
 def test_circuit_in_hertz_and_volts(design: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -182,6 +183,29 @@ def test_names_what_settling_names(omega: float) -> None:
         assert seen.status in (OrbitStatus.APERIODIC, OrbitStatus.NOT_SETTLED)
         later = setting(omega).steady(orbit.start, Course(50, 30))
         assert later.response == orbit.response
+
+
+@pytest.mark.parametrize(
+    ("settled", "shown"),
+    [
+        (OrbitStatus.PERIODIC, "1-1-1"),
+        (OrbitStatus.GRAZING, "1-1-1"),  # as it was run, as in the compiled engine
+        (OrbitStatus.CLIPPED, "clipped"),
+        (OrbitStatus.NOT_SETTLED, "not settled"),
+    ],
+)
+def test_only_periodic_motions_are_counted(
+    settled: OrbitStatus, shown: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    orbit = replace(attractor.settle(flow(1.55), np.zeros(4)), status=settled)
+    monkeypatch.setattr(steady, "settle", lambda *_: orbit)
+    got = by_flow(flow(1.55), orbit.start, Course(4, 2))
+    assert got.response == shown
+    if shown == "1-1-1":
+        assert (got.n, got.p, got.q, got.symmetric) == (1, 1, 1, True)
+    else:
+        assert (got.n, got.p, got.q, got.symmetric) == (0, 0, 0, None)
+        assert math.isnan(got.radius)
 
 
 def test_one_sided_and_free_models() -> None:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from designer import attractor, basins, parameter_map, sweep
+from designer import attractor, basins, bifurcation_plots, parameter_map, sweep, sweep_points
 from designer.basins import BasinPlan
 from designer.errors import InputError
 from designer.flow import Flow
 from designer.orbit import OrbitStatus
 from designer.parameter_map import MapPlan
-from designer.steady import Course, by_flow
+from designer.steady import Course, Steady, by_flow
 from designer.sweep import Sweep, SweepPlan
 from designer.sweep_store import GridStore, SweepStore, work_hash
 from designer.sweep_subject import BoardSubject, ModelSubject
@@ -99,6 +102,47 @@ def test_any_parameter() -> None:
         assert step.response == other.response
         if step.status is OrbitStatus.PERIODIC:
             np.testing.assert_allclose(step.minima, other.minima * value / PAPER.b, atol=1e-7)
+
+
+def test_points_lie_within_the_sweep() -> None:
+    """The pitchfork at 1.46052 is within two steps of the first sweep, and inside the second."""
+    kinds = {}
+    for low in (1.462, 1.458):
+        made = sweep.run(_plan(low, 1.492, 11, "down"))
+        kinds[low] = [(str(p.kind), round(p.value, 5)) for p in sweep_points.locate(made)]
+    assert kinds == {1.462: [], 1.458: [("pitchfork", 1.46052)]}
+
+
+def test_marks_are_of_stable_orbits_within_the_sweep() -> None:
+    def point(value: float, *stable: bool) -> Any:
+        return SimpleNamespace(kind="fold", value=value, stable=stable)
+
+    points = [point(1.0, True, False), point(1.1, False, False), point(1.2, True, True)]
+    points.append(point(1.3, True, False))
+    found = bifurcation_plots.marks(points, 1.0, 1.25)
+    assert [m.value for m in found] == [1.0, 1.2]
+
+
+def test_only_a_mirror_image_is_red() -> None:
+    """The twins at 1.43 are black and red. A motion of the same name that is not the mirror image,
+    made by stretching the first, gets another colour."""
+    omega = np.array([1.429, 1.43])
+    orbits = [attractor.settle(_flow(float(w)), np.zeros(4)) for w in omega]
+    twins = [attractor.twin(_flow(float(w)), o) for w, o in zip(omega, orbits, strict=True)]
+    plan = _plan(1.429, 1.43, 2, "start 0", "start 1")
+
+    def steps(starts: list[Any]) -> tuple[Steady, ...]:
+        settings = plan.subject.settings([{"omega": float(w)} for w in omega])
+        return tuple(s.steady(x, SHORT) for s, x in zip(settings, starts, strict=True))
+
+    first, second = steps([o.start for o in orbits]), steps([t.start for t in twins if t])
+    made = Sweep(plan, {"start 0": first, "start 1": second})
+    colours = {c for c, _, _ in bifurcation_plots._coloured(made)}
+    assert colours == {bifurcation_plots.BLACK, bifurcation_plots.RED}
+    other = tuple(replace(s, start=1.01 * s.start, minima=1.01 * s.minima) for s in first)
+    made = Sweep(plan, {"start 0": first, "start 1": other})
+    colours = {c for c, _, _ in bifurcation_plots._coloured(made)}
+    assert colours == {bifurcation_plots.BLACK, bifurcation_plots.DOTS[0]}
 
 
 def test_starts_show_what_coexists() -> None:
