@@ -13,6 +13,9 @@ from designer.system import Array
 ASIDE = (3e-3, 1e-3, 1e-2, 3e-4, 3e-2, 1e-4, 3e-5, 1e-5)
 """Arclengths, in scaled units, at which the other branch is looked for, in this order."""
 
+NEAR = 2.0
+"""Of such an arclength: farther from the parent than this lies another branch's orbit."""
+
 
 def switch(
     parent: Branch, where: Bifurcation, low: float, high: float, aside: tuple[float, ...] = ASIDE
@@ -21,7 +24,8 @@ def switch(
 
     At a pitchfork one of the two asymmetric twins (its mirror image is the other), at a period
     doubling the orbits of twice the period; they set out along the eigenvector of the multiplier
-    -1. None where none is found, or its period passes ``MAX_PERIOD``.
+    -1. None where none is found, or its period passes ``MAX_PERIOD``. The branch is measured in the
+    size of the orbit that it leaves, so it is the same wherever the parent was begun.
     """
     curve = parent.curve
     x, value = where.point.solved.x, where.value
@@ -31,14 +35,15 @@ def switch(
     n = 2 * curve.n if doubled else curve.n
     if n > MAX_PERIOD:
         return None
-    other = Curve(curve.family, n, False, curve.scale)
-    border = np.append(_leaving(where.point.solved.jacobian, curve.scale[:-1]), 0.0)
+    other = Curve.through(curve.family, x, value, n, False)
+    border = np.append(_leaving(where.point.solved.jacobian, other.scale[:-1]), 0.0)
     centre = np.append(x, value)
     for reach in aside:
-        guess = centre + reach * curve.scale * border
-        solved = other.correct(guess, border)
-        point = None if solved is None else at(other, solved)
-        if point is None or abs(point.value - value) > 0.1 * float(curve.scale[-1]):
+        solved = other.correct(centre + reach * other.scale * border, border)
+        if solved is None or _length(other, solved.y - centre) > NEAR * reach:
+            continue  # another branch crosses the hyperplane too
+        point = at(other, solved)
+        if point is None:
             continue
         if float(np.linalg.norm(apart(other, point))) < 0.5 * reach:
             continue  # fell back onto the parent
@@ -48,8 +53,16 @@ def switch(
     return None
 
 
+def _length(curve: Curve, step: Array) -> float:
+    return float(np.linalg.norm(step / curve.scale))
+
+
 def _leaving(jacobian: Array, scale: Array) -> Array:
-    """(states,) unit eigenvector, in scaled units, of the multiplier nearest to -1."""
+    """(states,) unit eigenvector, in scaled units, of the multiplier nearest to -1.
+
+    Its greatest component is positive: which of two twins is followed is not left to rounding.
+    """
     values, vectors = np.linalg.eig(jacobian * scale / scale[:, None])
     vector = vectors[:, np.argmin(np.abs(values + 1.0))].real
-    return np.asarray(vector / np.linalg.norm(vector))
+    size = float(np.linalg.norm(vector))
+    return np.asarray(vector / (size if vector[np.argmax(np.abs(vector))] > 0.0 else -size))
