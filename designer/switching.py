@@ -97,7 +97,8 @@ def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint
     image = curve.image(x, where.value)
     if image is None or not 0.0 < length < REACH:
         return None
-    return at(curve, Solved(y, image[1], step / length, 0))
+    residual = float(np.abs((image[0] - x) / curve.scale[:-1]).max())
+    return at(curve, Solved(y, image[1], step / length, 0, residual))
 
 
 def _length(curve: Curve, step: Array) -> float:

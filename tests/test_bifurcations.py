@@ -15,6 +15,7 @@ from designer.attractor import settle
 from designer.bifurcations import Bifurcation, Kind, locate
 from designer.circuit import nominal_board
 from designer.continuation import End, apart, start, trace
+from designer.curve import Curve, Solved
 from designer.extrema import heights
 from designer.family import Family
 from designer.flow import Flow
@@ -79,6 +80,28 @@ def test_grazing_over_the_clearance(omega: float) -> None:
 def test_a_linear_oscillator_has_no_bifurcations() -> None:
     branch = branch_of(replace(PAPER, b=50.0), 1.0, "omega", 0.3, 3.0)
     assert locate(branch) == []
+
+
+class Stalling(Curve):
+    """Its orbits are off by 3e-10 of their size, and say so."""
+
+    def correct(
+        self, y0: Array, border: Array, along: Array | None = None, centre: Array | None = None
+    ) -> Solved | None:
+        solved = super().correct(y0, border, along, centre)
+        off = np.append(3e-10 * solved.x, 0.0) if solved is not None else 0.0
+        return solved and replace(solved, y=solved.y + off, residual=3e-10)
+
+
+def test_error_of_a_point_grows_with_what_newtons_method_left() -> None:
+    exact = amplitude_at(1.55)
+    over = family.of_model(PAPER, 1.55, "b")
+    free = start(over, linear_orbit(1.55), 1.02 * exact, symmetric=True)
+    branch = trace(free, 0.98 * exact, 1.03 * exact)
+    c = branch.curve
+    rough = replace(branch, curve=Stalling(c.family, c.n, c.symmetric, c.scale))
+    (found,) = [p for p in locate(rough) if p.kind is Kind.GRAZING]
+    assert 2e-11 < abs(found.value - exact) < found.error < 1e-8
 
 
 def test_torus_where_an_oscillators_damping_vanishes() -> None:
