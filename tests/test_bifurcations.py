@@ -97,11 +97,13 @@ def test_error_of_a_point_grows_with_what_newtons_method_left() -> None:
     exact = amplitude_at(1.55)
     over = family.of_model(PAPER, 1.55, "b")
     free = start(over, linear_orbit(1.55), 1.02 * exact, symmetric=True)
-    branch = trace(free, 0.98 * exact, 1.03 * exact)
-    c = branch.curve
-    rough = replace(branch, curve=Stalling(c.family, c.n, c.symmetric, c.scale))
-    (found,) = [p for p in locate(rough) if p.kind is Kind.GRAZING]
-    assert 2e-11 < abs(found.value - exact) < found.error < 1e-8
+    c = free.curve
+    rough = replace(free, curve=Stalling(c.family, c.n, c.symmetric, c.scale))
+    branch = trace(rough, 0.98 * exact, 1.03 * exact)
+    found = [p for p in locate(branch) if p.kind is Kind.GRAZING]
+    assert found
+    for p in found:
+        assert 2e-11 < abs(p.value - exact) < p.error < 1e-8
 
 
 def test_torus_where_an_oscillators_damping_vanishes() -> None:
