@@ -24,11 +24,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from designer.continuation import Branch, BranchPoint, at, joined
-from designer.curve import Curve
+from designer.curve import CONVERGED, Curve
 from designer.extrema import heights
 
 ROUNDING = 1e-11
-"""Of the parameter's size: no error is stated below it; orbits converge to 1e-12 of their peak."""
+"""Of the parameter's size: no error is stated below it. Where an orbit stalled before
+``curve.CONVERGED`` of its peak, as many times more."""
 ZERO = 1e-3
 """Of its values on either side: a test function that is more than this at its root jumped."""
 
@@ -176,7 +177,8 @@ def _locate(
         middle = point(root)
         if kind is not Kind.GRAZING and abs(test(middle)) > ZERO * max(abs(test(a)), abs(test(b))):
             return None  # a jump over zero: two complex multipliers that became real
-        error = _width(point, left, root, float(curve.scale[-1]))
+        stalled = max(1.0, middle.solved.residual / CONVERGED)
+        error = _width(point, left, root, stalled * ROUNDING * float(curve.scale[-1]))
     except ArithmeticError:
         return None
     return Bifurcation(
@@ -209,15 +211,16 @@ def _width(
     point: Callable[[float], BranchPoint],
     left: Callable[[BranchPoint], bool],
     root: float,
-    size: float,
+    least: float,
 ) -> float:
-    """Half the width in the parameter of the least bracket around the root that is seen as one."""
+    """Half the width in the parameter of the least bracket around the root that is seen as one, or
+    ``least`` if that is more."""
     reach = 1e-12
     while reach < 1.0:
         low, high = max(root - reach, 0.0), min(root + reach, 1.0)
         before, after = point(low), point(high)
         if left(before) and not left(after):
             ends = [before.value, after.value, point(root).value]
-            return max(0.5 * (max(ends) - min(ends)), ROUNDING * size)
+            return max(0.5 * (max(ends) - min(ends)), least)
         reach *= 8.0
     return 0.5 * abs(point(1.0).value - point(0.0).value)

@@ -32,6 +32,8 @@ NEAREST = 1e-9
 """Arclength to which a grazing point is closed in on."""
 FINEST = 2e-5
 """Arclength below which a jump of the multipliers is left as it is."""
+CLOSE = 1e-3
+"""Arclength from a branch's last point, at most, to where it joins its parent."""
 SAME = 1e-7
 """Of the peak: an orbit no farther than this from its mirror image is symmetric."""
 POINTS = 4000
@@ -191,9 +193,11 @@ def follow(
                 break
             continue
         if joined(curve, here, new):
-            end = End.JOINED
-            points.append(new)
-            break
+            step *= 0.5
+            if step < CLOSE:
+                end = End.JOINED
+                break
+            continue
         points += [*_between(curve, here, new), new]
         if until(new):
             end = End.STOPPED
@@ -254,6 +258,11 @@ def _between(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[BranchPoint]:
         else:
             out.append(b)
     return out[:-1]
+
+
+def linked(curve: Curve, a: BranchPoint, b: BranchPoint) -> tuple[BranchPoint, ...]:
+    """Two neighbouring points of a branch and those between them that tell its events apart."""
+    return (a, *_between(curve, a, b), b)
 
 
 def apart(curve: Curve, point: BranchPoint) -> Array:

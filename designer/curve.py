@@ -38,12 +38,15 @@ class Solved:
 
     y : (states + 1,) state and parameter. jacobian : (states, states) of the map. tangent :
     (states + 1,) unit tangent in scaled units, oriented as it was asked for. iterations : spent.
+    residual : how far the map moves x, or y lies off its hyperplane, in scaled units; more than
+    ``CONVERGED`` where Newton's method stalled.
     """
 
     y: Array
     jacobian: Array
     tangent: Array
     iterations: int
+    residual: float
 
     @property
     def value(self) -> float:
@@ -143,7 +146,7 @@ class Curve:
             error = max(float(np.abs(gap).max()), abs(aside))
             if error < CONVERGED or (error < STALLED and error >= 0.5 * last):
                 tangent = _null(matrix[:size], border if along is None else along)
-                return Solved(y, image[1], tangent, iteration)
+                return Solved(y, image[1], tangent, iteration, error)
             try:
                 step = np.linalg.solve(matrix, np.append(gap, aside))
             except np.linalg.LinAlgError:

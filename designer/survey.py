@@ -13,7 +13,7 @@ from designer.continuation import Branch, start, trace
 from designer.curve import Curve
 from designer.family import Family
 from designer.orbit import Orbit, OrbitStatus
-from designer.switching import switch
+from designer.switching import close, switch
 from designer.system import Array
 
 DEPTH = 2
@@ -81,7 +81,7 @@ def survey(
             for where in [p for p in points if p.branch == number]:
                 child = switch(branches[number], where, low, high) if _leads(where) else None
                 if child is not None and not _known(branches, child):
-                    queue.append((add(child, number), deep + 1))
+                    queue.append((add(close(child, points), number), deep + 1))
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
 

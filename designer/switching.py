@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from designer.attractor import mirrored_strobes
 from designer.bifurcations import Bifurcation, Kind
-from designer.continuation import Branch, End, apart, at, follow
-from designer.curve import Curve
+from designer.continuation import Branch, BranchPoint, End, apart, at, follow, linked
+from designer.curve import Curve, Solved
 from designer.orbit import MAX_PERIOD
 from designer.system import Array
 
 ASIDE = (3e-3, 1e-3, 1e-2, 3e-4, 3e-2, 1e-4, 3e-5, 1e-5)
 """Arclengths, in scaled units, at which the other branch is looked for, in this order."""
+
+REACH = 5e-2
+"""Arclength, in scaled units, from a branch's last point to where it joins another."""
+NEAR = 2.0
+"""Of such an arclength: farther from the parent than this lies another branch's orbit."""
 
 
 def switch(
@@ -21,7 +29,9 @@ def switch(
 
     At a pitchfork one of the two asymmetric twins (its mirror image is the other), at a period
     doubling the orbits of twice the period; they set out along the eigenvector of the multiplier
-    -1. None where none is found, or its period passes ``MAX_PERIOD``.
+    -1. The first point is the one it leaves at. None where none is found, or its period passes
+    ``MAX_PERIOD``. The branch is measured in the size of the orbit that it leaves, so it is the
+    same wherever the parent was begun.
     """
     curve = parent.curve
     x, value = where.point.solved.x, where.value
@@ -31,25 +41,76 @@ def switch(
     n = 2 * curve.n if doubled else curve.n
     if n > MAX_PERIOD:
         return None
-    other = Curve(curve.family, n, False, curve.scale)
-    border = np.append(_leaving(where.point.solved.jacobian, curve.scale[:-1]), 0.0)
+    other = Curve.through(curve.family, x, value, n, False)
+    border = np.append(_leaving(where.point.solved.jacobian, other.scale[:-1]), 0.0)
     centre = np.append(x, value)
     for reach in aside:
-        guess = centre + reach * curve.scale * border
-        solved = other.correct(guess, border)
-        point = None if solved is None else at(other, solved)
-        if point is None or abs(point.value - value) > 0.1 * float(curve.scale[-1]):
+        solved = other.correct(centre + reach * other.scale * border, border)
+        if solved is None or _length(other, solved.y - centre) > NEAR * reach:
+            continue  # another branch crosses the hyperplane too
+        point = at(other, solved)
+        if point is None:
             continue
         if float(np.linalg.norm(apart(other, point))) < 0.5 * reach:
             continue  # fell back onto the parent
         origin = Branch(other, (point,), (End.JOINED, End.STOPPED))
         grown = follow(origin, low, high, 1.0, border=border)
-        return Branch(other, grown.points, (End.JOINED, grown.ends[1]))
+        root = _meeting(other, where, grown.points[0])
+        points = () if root is None else linked(other, root, grown.points[0])[:-1]
+        return Branch(other, points + grown.points, (End.JOINED, grown.ends[1]))
     return None
 
 
+def close(branch: Branch, points: Sequence[Bifurcation]) -> Branch:
+    """A branch whose far end joins another, led on to the pitchfork or doubling where it does.
+
+    points : those where it may. Unchanged where none of them lies near.
+    """
+    if branch.ends[1] is not End.JOINED:
+        return branch
+    last = branch.points[-1]
+    for where in sorted(points, key=lambda p: abs(p.value - last.value)):
+        if abs(where.value - last.value) > REACH * float(branch.curve.scale[-1]):
+            break
+        root = _meeting(branch.curve, where, last)
+        if root is not None:
+            more = linked(branch.curve, last, root)[1:]
+            return Branch(branch.curve, branch.points + more, branch.ends)
+    return branch
+
+
+def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint | None:
+    """The orbit of a bifurcation point as one of a curve that leaves there, or None if ``near``,
+    the curve's point next to it, is far from it in all of its periods and their mirror images."""
+    flow = curve.family.flow(where.value)
+    n = where.point.orbit.n
+    wanted = n if where.kind is Kind.PITCHFORK else 2 * n
+    if where.kind not in (Kind.PITCHFORK, Kind.DOUBLING) or wanted != curve.n:
+        return None
+    laps = list(flow.run(where.point.solved.x, n).strobes[:-1])
+    if flow.system.mirror is not None:
+        laps += list(mirrored_strobes(flow, where.point.orbit))
+    x = min(laps, key=lambda lap: float(np.abs((lap - near.solved.x) / curve.scale[:-1]).max()))
+    y = np.append(x, where.value)
+    step = (near.solved.y - y) / curve.scale
+    length = float(np.linalg.norm(step))
+    image = curve.image(x, where.value)
+    if image is None or not 0.0 < length < REACH:
+        return None
+    residual = float(np.abs((image[0] - x) / curve.scale[:-1]).max())
+    return at(curve, Solved(y, image[1], step / length, 0, residual))
+
+
+def _length(curve: Curve, step: Array) -> float:
+    return float(np.linalg.norm(step / curve.scale))
+
+
 def _leaving(jacobian: Array, scale: Array) -> Array:
-    """(states,) unit eigenvector, in scaled units, of the multiplier nearest to -1."""
+    """(states,) unit eigenvector, in scaled units, of the multiplier nearest to -1.
+
+    Its greatest component is positive: which of two twins is followed is not left to rounding.
+    """
     values, vectors = np.linalg.eig(jacobian * scale / scale[:, None])
     vector = vectors[:, np.argmin(np.abs(values + 1.0))].real
-    return np.asarray(vector / np.linalg.norm(vector))
+    size = float(np.linalg.norm(vector))
+    return np.asarray(vector / (size if vector[np.argmax(np.abs(vector))] > 0.0 else -size))

@@ -15,8 +15,8 @@ from designer.survey import Survey
 
 OUTSIDE = 5e-4
 """Of the parameter's size: how far past the end of a window its orbit is let go."""
-MEETING = 2e-3
-"""Of the parameter: how far from its parent's bifurcation point a branch's last orbit may be."""
+NOT_LOCATED = "not located"
+"""Why a window ends between two points of a branch where no bifurcation point was located."""
 
 
 @dataclass(frozen=True)
@@ -72,51 +72,55 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
     """The windows on a branch, in its order.
 
     points : the branch's bifurcation points (``bifurcations.locate``). A stretch between two of
-    them that holds no point of the branch is too short to be judged, and is left out.
+    them that holds no point of the branch is too short to be judged, and is left out. Where
+    stability or the counts change within a stretch, the window ends there as ``NOT_LOCATED``.
     """
     out = []
+    # Where branches meet a multiplier is 1 but for rounding: that orbit judges nothing.
+    meets = [int(end is End.JOINED) for end in branch.ends]
     ends = [None, *sorted(points, key=lambda p: p.position), None]
     for before, after in itertools.pairwise(ends):
-        first = 0 if before is None else int(before.position) + 1
-        last = len(branch.points) - 1 if after is None else int(after.position)
-        inside = branch.points[first : last + 1]
-        if not inside or not all(p.stable for p in inside):
-            continue
-        a = _end(branch, before, branch.points[0], 0)
-        b = _end(branch, after, branch.points[-1], 1)
-        low, high = (a, b) if a.value <= b.value else (b, a)
-        symmetric = branch.curve.symmetric
-        out.append(Window(branch.parameter, inside[0].response, symmetric, low, high, number))
+        first = meets[0] if before is None else int(before.position) + 1
+        last = len(branch.points) - 1 - meets[1] if after is None else int(after.position)
+        for i, j in _alike(branch, first, last):
+            if not branch.points[i].stable:
+                continue
+            a = _end(branch, before, 0) if i == first else _unlocated(branch, i - 1, i)
+            b = _end(branch, after, 1) if j == last else _unlocated(branch, j + 1, j)
+            low, high = (a, b) if a.value <= b.value else (b, a)
+            response, symmetric = branch.points[j].response, branch.curve.symmetric
+            out.append(Window(branch.parameter, response, symmetric, low, high, number))
     return out
+
+
+def _alike(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
+    """First and last number of each run of points that agree in stability and counts."""
+
+    def key(i: int) -> tuple[bool, tuple[int, int, int]]:
+        return branch.points[i].stable, branch.points[i].counts
+
+    runs = [list(run) for _, run in itertools.groupby(range(first, last + 1), key)]
+    return [(run[0], run[-1]) for run in runs]
 
 
 def all_windows(found: Survey) -> list[Window]:
     """The windows on every branch; one that reaches to the parent branch ends at its point."""
     out: list[Window] = []
     for number, branch in enumerate(found.branches):
-        above = found.parents[number]
-        meetings = [] if above < 0 else _meetings(branch, found.branches[above], found.on(above))
         out += [
-            replace(w, low=_met(w.low, meetings), high=_met(w.high, meetings))
+            replace(w, low=_met(w.low, found.points), high=_met(w.high, found.points))
             for w in windows(branch, found.on(number), number)
         ]
     return sorted(out, key=lambda w: w.low.value)
 
 
-def _meetings(branch: Branch, parent: Branch, points: Sequence[Bifurcation]) -> list[Bifurcation]:
-    """Where branches of this one's period may leave the parent."""
-    kind = Kind.PITCHFORK if branch.curve.n == parent.curve.n else Kind.DOUBLING
-    return [p for p in points if p.kind is kind]
-
-
-def _met(end: WindowEnd, meetings: Sequence[Bifurcation]) -> WindowEnd:
-    """The parent's bifurcation point, for an end where a branch joins its parent."""
+def _met(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
+    """The bifurcation point that a branch was led on to where it joins another."""
     if end.why != End.JOINED:
         return end
-    for p in sorted(meetings, key=lambda p: abs(p.value - end.value)):
-        if abs(p.value - end.value) < MEETING * abs(p.value):
+    for p in points:
+        if p.value == end.value and p.kind in (Kind.PITCHFORK, Kind.DOUBLING):
             return WindowEnd(p.value, p.error, str(p.kind), p, p.point.orbit)
-        break
     return end
 
 
@@ -150,7 +154,17 @@ def outside(family: Family, end: WindowEnd, direction: float) -> tuple[float, Or
     return value, settle(family.flow(value), end.orbit.start)
 
 
-def _end(branch: Branch, where: Bifurcation | None, point: BranchPoint, side: int) -> WindowEnd:
+def _unlocated(branch: Branch, outer: int, inner: int) -> WindowEnd:
+    """Between two neighbouring points, the second of which still belongs to the window."""
+    a, b = branch.points[outer], branch.points[inner]
+    half = 0.5 * abs(a.value - b.value)
+    return WindowEnd(0.5 * (a.value + b.value), half, NOT_LOCATED, None, b.orbit)
+
+
+def _end(branch: Branch, where: Bifurcation | None, side: int) -> WindowEnd:
     if where is None:
+        point, inner = branch.points[-side], side * (len(branch.points) - 3) + 1
+        if branch.ends[side] is End.JOINED and branch.points[inner].counts != point.counts:
+            return _unlocated(branch, -side, inner)
         return WindowEnd(point.value, 0.0, str(branch.ends[side]), None, point.orbit)
     return WindowEnd(where.value, where.error, str(where.kind), where, where.point.orbit)

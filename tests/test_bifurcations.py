@@ -15,6 +15,7 @@ from designer.attractor import settle
 from designer.bifurcations import Bifurcation, Kind, locate
 from designer.circuit import nominal_board
 from designer.continuation import End, apart, start, trace
+from designer.curve import Curve, Solved
 from designer.extrema import heights
 from designer.family import Family
 from designer.flow import Flow
@@ -23,7 +24,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.survey import Survey, passes, survey
 from designer.system import Array, Drive
-from designer.windows import all_windows, outside, window, windows
+from designer.windows import NOT_LOCATED, all_windows, outside, window, windows
 from tests.oracles import Plain, integrate, response_amplitude
 from tests.paper_cases import subject
 from tests.test_continuation import PAPER, PLAIN, branch_of, monodromy
@@ -79,6 +80,30 @@ def test_grazing_over_the_clearance(omega: float) -> None:
 def test_a_linear_oscillator_has_no_bifurcations() -> None:
     branch = branch_of(replace(PAPER, b=50.0), 1.0, "omega", 0.3, 3.0)
     assert locate(branch) == []
+
+
+class Stalling(Curve):
+    """Its orbits are off by 3e-10 of their size, and say so."""
+
+    def correct(
+        self, y0: Array, border: Array, along: Array | None = None, centre: Array | None = None
+    ) -> Solved | None:
+        solved = super().correct(y0, border, along, centre)
+        off = np.append(3e-10 * solved.x, 0.0) if solved is not None else 0.0
+        return solved and replace(solved, y=solved.y + off, residual=3e-10)
+
+
+def test_error_of_a_point_grows_with_what_newtons_method_left() -> None:
+    exact = amplitude_at(1.55)
+    over = family.of_model(PAPER, 1.55, "b")
+    free = start(over, linear_orbit(1.55), 1.02 * exact, symmetric=True)
+    c = free.curve
+    rough = replace(free, curve=Stalling(c.family, c.n, c.symmetric, c.scale))
+    branch = trace(rough, 0.98 * exact, 1.03 * exact)
+    found = [p for p in locate(branch) if p.kind is Kind.GRAZING]
+    assert found
+    for p in found:
+        assert 2e-11 < abs(p.value - exact) < p.error < 1e-8
 
 
 def test_torus_where_an_oscillators_damping_vanishes() -> None:
@@ -176,7 +201,7 @@ def test_no_branch_falls_back_onto_its_parent() -> None:
     assert len(found.branches) > 1
     for branch, parent in zip(found.branches, found.parents, strict=True):
         if parent >= 0:
-            away = [np.abs(apart(branch.curve, p)).max() for p in branch.points]
+            away = [np.abs(apart(branch.curve, p)).max() for p in branch.points[1:-1]]
             assert min(away) > 1e-7
     named = [(w.response, w.symmetric) for w in all_windows(found) if w.width > 1e-2]
     assert named == [("1-5-5", False), ("1-5-5", True)]
@@ -285,6 +310,69 @@ def test_window_of_a_response_and_what_lies_outside() -> None:
     plain = one.as_dict()
     assert plain["from"] == one.low.value
     assert plain["to_kind"] == "grazing"
+
+
+@cache
+def below_1_6_6() -> Survey:
+    """Symmetric 1-6-6 about ω = 0.28, and the twins that leave it at both ends."""
+    over = family.of_model(PAPER, 0.28, "omega")
+    return survey(over, [(0.28, settle(over.flow(0.28), np.zeros(4)))], 0.27, 0.3, depth=1)
+
+
+def test_a_branch_begins_with_the_counts_of_the_orbit_that_it_leaves() -> None:
+    found = below_1_6_6()
+    children = [
+        (b, found.branches[q]) for b, q in zip(found.branches, found.parents, strict=True) if q >= 0
+    ]
+    assert len(children) == 2
+    for child, parent in children:
+        assert child.ends[0] is End.JOINED
+        assert np.abs(apart(child.curve, child.points[0])).max() < 1e-8
+        assert passes(parent, child.points[0].value, child.points[0].orbit)
+        assert child.points[0].response == "1-6-6"
+    # Every change of counts on the way is a grazing point.
+    for number, (child, _) in enumerate(children, 1):
+        pairs = zip(child.points, child.points[1:], strict=False)
+        changes = sum(a.counts != b.counts for a, b in pairs)
+        assert sum(p.kind is Kind.GRAZING for p in found.on(number)) == changes
+
+
+def test_window_behind_a_grazing_does_not_begin_at_the_pitchfork() -> None:
+    one = next(w for w in all_windows(below_1_6_6()) if w.response in ("1-6-5", "1-5-6"))
+    fork = next(
+        p for p in below_1_6_6().points if p.kind is Kind.PITCHFORK and p.stable == (True, False)
+    )
+    assert one.low.why == Kind.FOLD
+    assert one.low.value < fork.value - 1e-8
+    # Both are attractors between the fold and the pitchfork, by running the flow.
+    middle = 0.5 * (one.low.value + fork.value)
+    flow = Flow(PAPER.second_order().piecewise_linear(), Drive(middle))
+    for x, response in ((one.low.orbit.start, one.response), (fork.point.orbit.start, "1-6-6")):
+        assert settle(flow, x).response == response
+
+
+def test_windows_end_where_a_change_of_stability_was_not_located() -> None:
+    branch = branch_of(PAPER, 1.55, "omega", 1.4, 1.6)
+    fork = next(p for p in locate(branch) if p.kind is Kind.PITCHFORK)
+    (known,) = windows(branch, [fork])
+    (guessed,) = windows(branch, [])
+    assert known.high == guessed.high
+    assert (known.low.why, guessed.low.why) == (Kind.PITCHFORK, NOT_LOCATED)
+    assert abs(guessed.low.value - fork.value) <= guessed.low.error
+    assert guessed.low.error < 1e-2
+
+
+def test_windows_have_one_response_where_a_grazing_was_not_located() -> None:
+    branch = branch_of(PAPER, 0.85, "omega", 0.76, 0.95)
+    points = locate(branch)
+    grazing = [p for p in points if p.kind is Kind.GRAZING and p.stable == (True, True)]
+    assert grazing
+    whole = windows(branch, points)
+    split = windows(branch, [p for p in points if p not in grazing])
+    assert [w.response for w in split] == [w.response for w in whole]
+    for p in grazing:
+        ends = [e for w in split for e in (w.low, w.high) if e.why == NOT_LOCATED]
+        assert min(abs(e.value - p.value) for e in ends) < 1e-8
 
 
 def test_window_of_an_unstable_orbit_is_refused() -> None:
