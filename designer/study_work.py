@@ -190,13 +190,21 @@ class Work:
         asks = [a for a in asks if plan.questions[a.question].settings is not None]
         if self.pool is None or not asks:
             return ()
-        step = self.said.stage(f"ngspice, {len(asks)} runs", len(asks))
         store = self.stores.ngspice(plan)
+        new = len(asks) - layers.held(asks, store, study.heard)
+        step: layers.Step = _nothing
+        if new:
+            old = f", {len(asks) - new} more are there" if new < len(asks) else ""
+            step = self.said.stage(f"ngspice, {new} runs{old}", len(asks))
         return tuple(
             layers.listen(
                 plan, asks, store, self.pool, self.jobs, step, known=study.heard, last=last
             )
         )
+
+
+def _nothing() -> None:
+    return None
 
 
 def _widths(study: Study) -> list[float]:
