@@ -1,8 +1,10 @@
-"""Says when the exact engine is about to be compiled: a start that takes seconds, not a hang.
+"""Says when a part of the exact engine is about to be compiled: a start that takes a while, not a
+hang.
 
-The compiled code is kept in a cache, so this happens at the first use after an installation or an
-update, and at every use where nowhere may be written. numba announces each compilation, and only
-those: what is loaded from the cache is silent.
+Each part is compiled when something first needs it, so another verb may compile another one. The
+compiled code is kept in a cache: this happens once after an installation or an update, and at every
+use where nowhere may be written. numba announces each compilation, and only those: what is loaded
+from the cache is silent.
 """
 
 from __future__ import annotations
@@ -15,25 +17,37 @@ from types import FrameType
 from typing import Any
 
 CALLS_BACK = "llvmlite.binding.executionengine"
-TEXT = "compiling the exact engine (first use, up to half a minute)…"
+PARTS = {
+    "linear_kernel": "search for parts",
+    "nodal_kernel": "equations of boards",
+    "circuit_kernel": "circuits",
+    "sweep_kernel": "sweeps",
+}
+"""What a kernel's module is for; all others are the ``MOTION``."""
+MOTION = "motion between the stops"
+TEXT = (
+    "compiling the exact engine's part for {part} "
+    "(first use of this part; up to half a minute, longer on a busy machine)…"
+)
 
 
 @contextmanager
 def announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Calls ``say`` with one line when the first kernel of this package is compiled inside."""
+    """Calls ``say`` with one line when the first kernel of a part is compiled inside."""
     from numba.core import event
 
     lock = threading.Lock()
-    said: list[str] = []
+    said: set[str] = set()
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
-            module = event.data["dispatcher"].py_func.__module__
+            package, _, module = str(event.data["dispatcher"].py_func.__module__).partition(".")
+            part = PARTS.get(module, MOTION)
             with lock:
-                if said or not str(module).startswith("designer."):
+                if part in said or package != "designer":
                     return
-                said.append(module)
-            say(TEXT)
+                said.add(part)
+            say(TEXT.format(part=part))
 
         def on_end(self, event: Any) -> None:
             return None

@@ -173,10 +173,14 @@ class Folder:
         self.manifest.files[name] = (stage, file_hash(name, data))
 
     def rewrite(self, name: str, content: str | bytes) -> None:
-        """Write a file of a finished stage anew; at no time does the manifest state a hash that
-        is not the file's."""
+        """Write a file of a finished stage anew, unless it is that already; at no time does the
+        manifest state a hash that is not the file's."""
         assert self.manifest is not None
-        stage, _ = self.manifest.files[name]
+        stage, known = self.manifest.files[name]
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        path = self / name
+        if known == file_hash(name, data) and path.is_file() and path.read_bytes() == data:
+            return
         self.manifest.files[name] = (stage, None)
         self._save()
         self.write(name, content)

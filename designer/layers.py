@@ -168,5 +168,19 @@ def listen(
     return rows
 
 
+def held(
+    asks: Iterable[Ask], store: BlockStore[Hearing] | None, known: Iterable[Hearing] = ()
+) -> int:
+    """How many of these `listen` would not have to ask again."""
+    wanted = {_order(ask) for ask in asks}
+    found = {_order(h) for h in known}
+    if store is not None:
+        for number in {sample // CHUNK for sample, _, _ in wanted}:
+            block = range(number * CHUNK, (number + 1) * CHUNK)
+            found |= {_order(h) for h in store.read(block)}
+            store.forget()
+    return len(wanted & found)
+
+
 def _order(row: Ask | Hearing) -> tuple[int, int, str]:
     return row.sample, row.question, str(row.kind)

@@ -1,7 +1,8 @@
 """What a run says while it works, on standard error only.
 
 On a terminal a bar for each stage, with rate and time left; elsewhere a line for each, and one
-more from time to time while it lasts; with ``-q`` nothing.
+more from time to time while it lasts; with ``-q`` nothing. Time left is said from a tenth of a
+stage on: the longest steps often come first, and the first of all may wait for a compiler.
 """
 
 from __future__ import annotations
@@ -60,8 +61,6 @@ class Lines(Progress):
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         print(f"{text} …", file=sys.stderr, flush=True)
         super().stage(text, total)
-        if not total:
-            return _nothing
         began = said = self._clock()
         done, lock = 0, threading.Lock()
 
@@ -70,7 +69,7 @@ class Lines(Progress):
             with lock:
                 done += 1
                 now = self._clock()
-                if now - said < EVERY or done >= total:
+                if now - said < EVERY or (total is not None and done >= total):
                     return
                 said = now
                 print(f"  {how_far(done, total, now - began)}", file=sys.stderr, flush=True)
@@ -93,7 +92,6 @@ class Terminal(Progress):
             SpinnerColumn,
             TextColumn,
             TimeElapsedColumn,
-            TimeRemainingColumn,
         )
         from rich.progress import Progress as Bars
 
@@ -104,7 +102,6 @@ class Terminal(Progress):
             MofNCompleteColumn(),
             TimeElapsedColumn(),
             TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(elapsed_when_finished=False),
             console=Console(stderr=True),
         )
         self._open: list[Callable[[], None]] = []
@@ -116,15 +113,17 @@ class Terminal(Progress):
 
         def finish() -> None:
             steps = next(t.completed for t in bars.tasks if t.id == task)
-            bars.update(task, total=total or 1, completed=total or max(steps, 1))
+            # Of how many was not known before: now it is.
+            end = total or max(int(steps), 1)
+            bars.update(task, total=end, completed=end)
 
         self._open.append(finish)
 
         def step() -> None:
             bars.advance(task)
             now = next(t for t in bars.tasks if t.id == task)
-            if now.speed:
-                bars.update(task, rate=f"{rate(now.speed)}, left:")
+            if now.elapsed:
+                bars.update(task, rate=pace(int(now.completed), total, now.elapsed))
 
         return step
 
@@ -151,12 +150,20 @@ class Terminal(Progress):
             self._open.pop()()
 
 
-def how_far(done: int, total: int, seconds: float) -> str:
-    """Steps, rate and time left, at the rate so far."""
+def how_far(done: int, total: int | None, seconds: float) -> str:
+    """Steps, of how many if that is known, and their pace."""
+    steps = f"{done} steps" if total is None else f"{done}/{total}"
+    return f"{steps}, {pace(done, total, seconds)}"
+
+
+def pace(done: int, total: int | None, seconds: float) -> str:
+    """Rate so far, and time left at that rate once a tenth of the steps is done."""
     speed = done / seconds
+    if total is None or 10 * done < total:
+        return rate(speed)
     left = round((total - done) / speed)
     hours, minutes = divmod(left // 60, 60)
-    return f"{done}/{total}, {rate(speed)}, {hours}:{minutes:02d}:{left % 60:02d} left"
+    return f"{rate(speed)}, {hours}:{minutes:02d}:{left % 60:02d} left"
 
 
 def rate(speed: float) -> str:

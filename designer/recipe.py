@@ -7,14 +7,18 @@ from where only one exists does not leave it to chance. ``designer.recipe_search
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from designer.deck import Excitation
 from designer.exact import drive_of
-from designer.quantity import format_quantity
 from designer.system import Drive
+
+SLOWER = 10
+"""How many times slower than it says a recipe is tried as well."""
+FINER = 5
+"""Into so many parts each step of a sweep is cut where it stands for a smooth one."""
 
 
 class Way(StrEnum):
@@ -33,8 +37,9 @@ class Recipe:
 
     steps : of the sweep, ``hold`` drive periods each, the one at ``first`` included; 0 without
     one. wait : drive periods at the target. omega : dimensionless frequency of the target.
-    reached, trials : on the nominal circuit; board_reached, board_trials : on sample boards that
-    show the response as built.
+    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : sample
+    boards that show the response as built, of ``boards`` drawn. smooth, slower : whether a sweep
+    without steps, and one ``SLOWER`` times as slow, did as well.
     """
 
     way: Way
@@ -48,6 +53,9 @@ class Recipe:
     trials: int = 0
     board_reached: int = 0
     board_trials: int = 0
+    boards: int = 0
+    smooth: bool = False
+    slower: bool = False
 
     def stages(self) -> Iterator[tuple[Excitation, int]]:
         """Settings of the generator in order, each with its whole drive periods."""
@@ -82,27 +90,54 @@ class Recipe:
         trials = self.trials + self.board_trials
         return (self.reached + self.board_reached) / trials if trials else 0.0
 
-    @property
-    def text(self) -> str:
-        """The recipe in words, for ``setup.csv``."""
-        said = f"reached in {self.reached} of {self.trials} trials"
-        if self.board_trials:
-            said += f" and on sample boards in {self.board_reached} of {self.board_trials}"
-        wait = f"wait {_seconds(self.wait_seconds)}"
-        if self.way is Way.DIRECT:
-            return f"switch on at this setting; {wait}; {said}"
-        at, to = self._setting(self.first), self._setting(self.target)
-        return (
-            f"switch on at {at}; to {to} in {self.steps} steps of equal ratio, "
-            f"{self.hold} periods each ({_seconds(self.sweep_seconds)} in all); {wait}; {said}"
+    def refined(self, slower: int = 1) -> Recipe:
+        """The same sweep in steps ``FINER`` times as fine, ``slower`` times as long in all."""
+        return replace(
+            self, steps=FINER * self.steps, hold=max(1, slower * self.hold // FINER), reached=0
         )
 
+    @property
+    def text(self) -> str:
+        """The recipe in words, for ``setup.csv``: what a person sets on a generator."""
+        said = [f"wait {seconds(self.wait_seconds)} or longer", *self._success()]
+        if self.way is Way.DIRECT:
+            return "; ".join(["switch on at this setting", *said])
+        return "; ".join([f"set {self._setting(self.first)}, switch on", self._sweep(), *said])
+
+    def _sweep(self) -> str:
+        """What is turned, to where, in what time."""
+        took = seconds(self.sweep_seconds)
+        steps = f"in {self.steps} steps of equal ratio, {self.hold} periods each ({took} in all)"
+        slower = f" (up to {SLOWER} times slower is fine)" if self.slower else ""
+        if self.way is Way.AMPLITUDE:
+            how = f"in {took}" if self.smooth else steps
+            return f"raise the amplitude to {volts(self.target.amplitude)} V peak {how}{slower}"
+        to = f"{self._hertz(self.target)}"
+        if not self.smooth:
+            return f"step to {to} {steps}, without a break in phase{slower}"
+        return f"sweep logarithmically to {to} in {took}, once, then hold{slower}"
+
+    def _success(self) -> Iterator[str]:
+        """How often it led to the response, and a warning where little is known of boards."""
+        if not self.trials:
+            return
+        tried = f"it worked from {self.reached} of {self.trials} switch-on phases"
+        if self.board_trials:
+            tried += f", on {self.board_reached} of {self.board_trials} sample boards"
+        yield tried
+        if 2 * self.board_trials < self.boards:
+            shows = self.board_trials or "none"
+            yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"
+
     def _setting(self, at: Excitation) -> str:
-        """Frequency, in Hz and dimensionless, and amplitude."""
-        omega = ""
-        if self.omega is not None:
-            omega = f" (omega {self.omega * at.frequency / self.target.frequency:.4g})"
-        return f"{at.frequency:.5g} Hz{omega}, {at.amplitude:.4g} V peak"
+        return f"{self._hertz(at)}, {volts(at.amplitude)} V peak"
+
+    def _hertz(self, at: Excitation) -> str:
+        """In Hz and dimensionless."""
+        said = f"{hertz(at.frequency)} Hz"
+        if self.omega is None:
+            return said
+        return f"{said} (omega {self.omega * at.frequency / self.target.frequency:.4g})"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: settings in Hz and V, times in drive periods and seconds."""
@@ -121,6 +156,9 @@ class Recipe:
             "trials": self.trials,
             "board_reached": self.board_reached,
             "board_trials": self.board_trials,
+            "boards": self.boards,
+            "smooth": self.smooth,
+            "slower": self.slower,
             "text": self.text,
         }
 
@@ -129,5 +167,16 @@ def _between(first: float, last: float, part: float) -> float:
     return first if first == last else first * (last / first) ** part
 
 
-def _seconds(value: float) -> str:
-    return format_quantity(value, "s", 2)
+def hertz(value: float) -> str:
+    """A frequency [Hz] as it is typed into a generator."""
+    return f"{float(f'{value:.6g}'):.12g}"
+
+
+def volts(value: float) -> str:
+    """A voltage [V] as it is typed into a generator."""
+    return f"{float(f'{value:.5g}'):.12g}"
+
+
+def seconds(value: float) -> str:
+    """A time on the bench: two digits are enough."""
+    return f"{float(f'{value:.2g}'):.12g} s"

@@ -2,7 +2,8 @@
 
 Each is tried on the nominal circuit and on sample boards of its own, from discharged
 capacitors, with phases of the generator that fill the circle. The first that always worked is
-taken, else the one that worked most often.
+taken, else the one that worked most often. Its sweep is then tried without steps, and
+slower: what a person does with a generator.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from designer.ensemble import Ensemble
 from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.reached import switched_on
-from designer.recipe import Recipe, Way
+from designer.recipe import SLOWER, Recipe, Way
 from designer.spread import draw_many
 from designer.system import PiecewiseLinearSystem
 from designer.verdict import Question, StudyPlan, Verdict, judge
@@ -94,20 +95,41 @@ def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) ->
         jobs=jobs,
     )
     able = [i for i, o in enumerate(as_built) if judge(o, question.spec, question.start)[0] == "ok"]
-    options = list(candidates(question, nominal.reduction(0).system()))
     tried = []
-    for option in options:
-        known = _on_nominal(option, question, nominal, jobs)
+    for option in candidates(question, nominal.reduction(0).system()):
+        known = _on_nominal(replace(option, boards=BOARDS), question, nominal, jobs)
         if known.rate == 1.0:
             known = _on_boards(known, question, sample, able, jobs)
             if known.rate == 1.0:
-                return known
+                return _by_hand(known, question, nominal, sample, able, jobs)
         tried.append(known)
     # None is certain: then all are tried on the boards, and the one that did best is taken.
     whole = [
         t if t.reached == t.trials else _on_boards(t, question, sample, able, jobs) for t in tried
     ]
-    return max(whole, key=lambda recipe: recipe.rate)
+    best = max(whole, key=lambda recipe: recipe.rate)
+    return _by_hand(best, question, nominal, sample, able, jobs)
+
+
+def _by_hand(
+    recipe: Recipe,
+    question: Question,
+    nominal: Ensemble,
+    sample: Ensemble,
+    able: Sequence[int],
+    jobs: int,
+) -> Recipe:
+    """The recipe with how freely its sweep may be done: without steps, and slower."""
+    if recipe.way is Way.DIRECT:
+        return recipe
+
+    def as_well(other: Recipe) -> bool:
+        met = _on_boards(_on_nominal(other, question, nominal, jobs), question, sample, able, jobs)
+        return met.reached >= recipe.reached and met.board_reached >= recipe.board_reached
+
+    smooth = as_well(recipe.refined())
+    slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)
+    return replace(recipe, smooth=smooth, slower=as_well(slow))
 
 
 def _on_nominal(recipe: Recipe, question: Question, nominal: Ensemble, jobs: int) -> Recipe:

@@ -11,7 +11,7 @@ from designer.bom import csv_text
 from designer.design import Design
 from designer.modelfile import ModelFile
 from designer.orbit import OrbitStatus
-from designer.recipe import Recipe
+from designer.recipe import Recipe, hertz, volts
 from designer.recipe_search import find_recipes
 from designer.responses import ModelResponse
 
@@ -56,15 +56,17 @@ def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[Setting, .
 def setup_csv(
     design: Design, found: Sequence[ModelResponse], recipes: Sequence[Recipe | None]
 ) -> str:
-    """``setup.csv``. recipes : how to start each response; None where the nominal circuit does not
-    show it."""
+    """``setup.csv``, in digits that a generator takes; ``design.json`` has all of them.
+
+    recipes : how to start each response; None where the nominal circuit does not show it.
+    """
     rows = [
         {
             "omega": repr(s.omega),
             "expect": s.expect or "",
-            "frequency_hz": repr(s.frequency_hz),
-            "amplitude_v_peak": repr(s.amplitude_v_peak),
-            "amplitude_vpp": repr(2.0 * s.amplitude_v_peak),
+            "frequency_hz": hertz(s.frequency_hz),
+            "amplitude_v_peak": volts(s.amplitude_v_peak),
+            "amplitude_vpp": repr(2.0 * float(volts(s.amplitude_v_peak))),
             "offset_v": repr(s.offset_v),
             "load": LOAD,
             "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),

@@ -220,25 +220,29 @@ class Work:
         asks = [a for a in asks if plan.questions[a.question].settings is not None]
         if self.pool is None or not asks:
             return ()
-        have = {(h.sample, h.question, h.kind) for h in (*known, *study.heard)}
-        fresh = any((a.sample, a.question, a.kind) not in have for a in asks)
-        step = self.said.stage(f"ngspice, {len(asks)} runs", len(asks)) if fresh else _nothing
+        kept = self.stores.ngspice(plan) if store else None
+        heard = (*known, *study.heard)
+        new = len(asks) - layers.held(asks, kept, heard)
+        step: layers.Step = _nothing
+        if new:
+            old = f", {len(asks) - new} more are there" if new < len(asks) else ""
+            step = self.said.stage(f"ngspice, {new} runs{old}", len(asks))
         return tuple(
             layers.listen(
                 plan,
                 asks,
-                self.stores.ngspice(plan) if store else None,
+                kept,
                 self.pool,
                 self.jobs,
                 step,
-                known=(*known, *study.heard),
+                known=heard,
                 last=last,
             )
         )
 
 
 def _nothing() -> None:
-    pass
+    return None
 
 
 def _decided(study: Study) -> list[bool]:

@@ -34,7 +34,7 @@ zeta = 0.1
 f20 = 0.0
 b = 0.25
 """
-COMPILING = "compiling the exact engine (first use, up to half a minute)"
+COMPILING = "compiling the exact engine's part for motion between the stops (first use of this part"
 PROMPT = 30.0
 """Seconds: on a busy machine too, what is not answered by then never is. Some 0.3 to 0.8 s were
 measured on an idle one; the runs that are interrupted here would take minutes."""

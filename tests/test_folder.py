@@ -165,7 +165,14 @@ def test_a_rewritten_file_is_no_changed_file(tmp_path: Path) -> None:
     folder = _fill(tmp_path)
     folder.rewrite("model.toml", "better")
     assert _decide(tmp_path, STUDY) == []
-    assert (tmp_path / "model.toml").read_text() == "better"
+    path = tmp_path / "model.toml"
+    assert path.read_text() == "better"
+    before = path.stat().st_mtime_ns, path.stat().st_ino
+    folder.rewrite("model.toml", "better")
+    assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
+    path.write_text("spoilt")
+    folder.rewrite("model.toml", "better")
+    assert path.read_text() == "better"
 
 
 def test_no_folder_below_a_file(tmp_path: Path) -> None:

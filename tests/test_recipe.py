@@ -18,7 +18,7 @@ from designer.exact import drive_of
 from designer.flow import Flow
 from designer.power_up import until_strobe
 from designer.reached import Reached, phases, reached_block, switched_on
-from designer.recipe import Recipe, Way
+from designer.recipe import FINER, SLOWER, Recipe, Way, hertz, volts
 from designer.recipe_search import (
     ASIDE,
     HOLD,
@@ -85,21 +85,61 @@ def test_the_long_sweep_begins_above_the_model_s_resonances() -> None:
 
 def test_a_recipe_in_words_and_in_json() -> None:
     tried = replace(
-        recipes(1)[Way.FROM_ABOVE], reached=12, trials=12, board_reached=5, board_trials=6
+        recipes(1)[Way.FROM_ABOVE],
+        reached=12,
+        trials=12,
+        board_reached=5,
+        board_trials=6,
+        boards=6,
+        smooth=True,
+        slower=True,
     )
-    frequency = tried.target.frequency
     text = tried.text
-    assert f"switch on at {1.1 * frequency:.5g} Hz (omega 1.705)" in text
-    assert f"to {frequency:.5g} Hz (omega 1.55)" in text
-    assert "12 of 12" in text
-    assert "5 of 6" in text
+    high, low = (float(f"{factor * tried.target.frequency:.6g}") for factor in (1.1, 1.0))
+    assert f"set {high:g} Hz (omega 1.705), " in text
+    swept = f"{float(f'{tried.sweep_seconds:.2g}'):g} s"
+    assert f"sweep logarithmically to {low:g} Hz (omega 1.55) in {swept}, once, then hold" in text
+    assert "up to 10 times slower is fine" in text
+    assert "from 12 of 12 switch-on phases, on 5 of 6 sample boards" in text
+    assert "caution" not in text
     said = json.loads(json.dumps(tried.as_dict()))
     assert said["text"] == text
-    assert said["to_frequency_hz"] == frequency
+    assert said["to_frequency_hz"] == tried.target.frequency
     assert said["sweep_seconds"] > 0.0
     direct = recipes(1)[Way.DIRECT]
     assert direct.sweep_seconds == 0.0
     assert "at this setting" in direct.text
+
+
+def test_only_what_was_tried_is_promised() -> None:
+    sweep = recipes(1)[Way.FROM_ABOVE]
+    assert "in 10 steps of equal ratio, 20 periods each" in sweep.text
+    assert "slower" not in sweep.text
+    assert "worked" not in sweep.text
+    few = replace(sweep, reached=12, trials=12, board_reached=1, board_trials=1, boards=6)
+    assert "caution: 1 of 6 sample boards" in few.text
+    assert "caution: none of 6" in replace(few, board_trials=0, board_reached=0).text
+    raised = replace(recipes(1)[Way.AMPLITUDE], smooth=True).text
+    assert "raise the amplitude to " in raised
+    assert "steps" not in raised
+
+
+@pytest.mark.parametrize("value", [300.109685878878, 4.952314987479351, 0.0123456789, 98765.4321])
+def test_a_generator_takes_the_numbers(value: float) -> None:
+    for text, digits in ((hertz(value), 6), (volts(value), 5)):
+        assert len(text.replace(".", "").lstrip("0")) <= digits
+        assert float(text) == pytest.approx(value, rel=0.5 * 10.0 ** (1 - digits))
+
+
+@pytest.mark.parametrize("slower", [1, SLOWER])
+def test_a_finer_sweep_is_the_same_one(slower: int) -> None:
+    sweep = recipes(2)[Way.FROM_BELOW]
+    fine = sweep.refined(slower)
+    assert fine.sweep_seconds == pytest.approx(slower * sweep.sweep_seconds, rel=0.01)
+    assert (fine.first, fine.target, fine.wait) == (sweep.first, sweep.target, sweep.wait)
+    frequencies = [setting.frequency for setting, _ in fine.stages()]
+    coarse = [setting.frequency for setting, _ in sweep.stages()]
+    assert frequencies[::FINER] == pytest.approx(coarse)
 
 
 def test_phases_fill_the_half_circle_too() -> None:
@@ -144,6 +184,13 @@ def test_recipes_found_keep_their_word_at_other_phases() -> None:
         assert recipe.rate == 1.0
         starts = [(0, question(p), recipe, 0.1 + 0.77 * k) for k in range(8)]
         assert {e.verdict for e in switched_on(nominal(p), starts)} == {Verdict.OK}
+    # What the text allows a person to do, one period at a step, and ten times slower.
+    assert found[0].smooth
+    assert found[0].slower
+    for periods in (1, SLOWER):
+        by_hand = replace(found[0], steps=found[0].steps * HOLD, hold=periods)
+        starts = [(0, question(1), by_hand, 0.1 + 0.77 * k) for k in range(8)]
+        assert {e.verdict for e in switched_on(nominal(1), starts)} == {Verdict.OK}
     other = replace(of, seed=99, samples=1000, questions=of.questions[1:])
     assert find_recipes(other, 1) == found[1:]
 

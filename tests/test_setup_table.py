@@ -6,6 +6,8 @@ import csv
 import io
 from pathlib import Path
 
+import pytest
+
 from designer.api import synthesise
 from designer.modelfile import parse_model_file
 from designer.setup_table import COLUMNS, NO_RECIPE, settings, setup_csv, start_recipes
@@ -26,8 +28,8 @@ def test_every_response_has_a_start() -> None:
     assert tuple(rows[0]) == COLUMNS
     first, second, third = (row["start"] for row in rows)
     # 1-1-1 coexists with 3-3-3, so it is not left to chance; 1-3-3 is alone.
-    assert first.startswith("switch on at ")
-    assert "steps of equal ratio" in first
+    assert first.startswith("set ")
+    assert "sweep logarithmically to " in first
     assert "3-3-3" in first
     assert second.startswith("switch on at this setting; wait ")
     assert third.startswith(NO_RECIPE)
@@ -36,3 +38,11 @@ def test_every_response_has_a_start() -> None:
         assert recipe is not None
         assert recipe.target.frequency == setting.frequency_hz
         assert recipe.target.amplitude == setting.amplitude_v_peak
+    for row, setting in zip(rows, settings(made.design, made.found), strict=True):
+        for name, value in (
+            ("frequency_hz", setting.frequency_hz),
+            ("amplitude_v_peak", setting.amplitude_v_peak),
+        ):
+            assert float(row[name]) == pytest.approx(value, rel=5e-5)
+            assert len(row[name]) <= 8
+        assert float(row["amplitude_vpp"]) == 2.0 * float(row["amplitude_v_peak"])

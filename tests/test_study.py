@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,14 +19,16 @@ from typing import Any
 
 import pytest
 
-from designer import cli, layers, pipeline, study_json, study_work
+from designer import cli, confirmation, layers, pipeline, study_json, study_work
+from designer.blocks import BlockStore
 from designer.errors import InputError
 from designer.folder import Folder
-from designer.hearing import Hearing, Kind, Why
+from designer.hearing import Hearing, Kind, Why, ask_random
 from designer.laws import Uniform
-from designer.layers import Here, Samples
+from designer.layers import CHUNK, Here, Samples
 from designer.progress import Progress
 from designer.study import Stores, Study, tolerance
+from designer.study_folder import NGSPICE
 from designer.study_work import Work
 from designer.verdict import BLOCK, Answer, Verdict
 from tests.test_verdict import plan
@@ -278,6 +281,54 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
     tolerance(made, samples=3, rung="exact", checked=(), progress=said)
     assert len(notes) == (spread is not None)
     assert all("gain-bandwidth does not enter the yield" in note for note in notes)
+
+
+class Listener(Progress):
+    """Keeps what is said."""
+
+    def __init__(self) -> None:
+        self.stages: list[str] = []
+
+    def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
+        self.stages.append(text)
+        return lambda: None
+
+
+@pytest.mark.parametrize(
+    ("there", "said"),
+    [(0, ["ngspice, 180 runs"]), (20, ["ngspice, 100 runs, 80 more are there"]), (50, [])],
+)
+def test_only_runs_that_are_not_on_disk_are_announced(
+    there: int, said: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """90 boards a response: 40 from their own orbit, 50 from the nominal one."""
+    p = plan(200)
+    setting: Any = object()
+    p = replace(p, questions=tuple(replace(q, settings=setting) for q in p.questions))
+    store = BlockStore(
+        tmp_path, NGSPICE, Hearing, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
+    )
+
+    def hear(_plan: Any, asks: Any, *_: Any) -> list[Hearing]:
+        return [
+            Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
+        ]
+
+    monkeypatch.setattr(confirmation, "hear", hear)
+    answers = Fixed(10**9)(None, range(200))(1, None)
+    asks = ask_random(answers)
+    layers.listen(p, [a for a in asks if a.sample < there], store, None, 1, lambda: None)  # type: ignore[arg-type]
+
+    class Kept(Stores):
+        def ngspice(self, plan: Any) -> BlockStore[Hearing]:
+            return store
+
+    progress, pool = Listener(), object()
+    work = Work(1, pool, Kept(), Here(1), progress, "auto")  # type: ignore[arg-type]
+    checked: Any = (None, None)
+    study = Study(checked, p, (0, 1), {}, tuple(answers))
+    assert len(work._heard(study, asks)) == len(asks) == 180
+    assert progress.stages == said
 
 
 # ---------------------------------------------------------------------------------------------
