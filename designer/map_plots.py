@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -72,10 +74,12 @@ def _marks(axes: Axes, found: YieldMap, scale: float) -> None:
 
 def _hertz(axes: Axes, found: YieldMap) -> None:
     """The generator's frequency above ω."""
-    if found.axes[0].name != "omega" or not np.isfinite(found.frequency):
+    if found.axes[0].name != "omega" or found.frequency is None:
         return
     scale = found.frequency / found.used
-    top = axes.secondary_xaxis("top", functions=(lambda w: scale * w, lambda f: f / scale))
+    top = axes.secondary_xaxis(
+        "top", functions=(partial(np.multiply, scale), partial(np.multiply, 1.0 / scale))
+    )
     top.set_xlabel("drive frequency [Hz]")
 
 

@@ -85,7 +85,7 @@ class YieldMap:
     open: tuple[bool, bool]
     attractors: int
     seconds: float
-    frequency: float = float("nan")
+    frequency: float | None = None
 
     def at(self, *index: int) -> Yield:
         """The yield at one point."""

@@ -181,9 +181,10 @@ def test_the_recommended_setting_is_the_one_in_use_unless_another_is_better() ->
 
 def test_the_frequency_axis_is_in_hertz_too() -> None:
     found = replace(over_omega(), frequency=500.0)
-    (axes,) = map_chart("ω = 0.85", found).axes
+    figure = map_chart("ω = 0.85", found)
+    (axes,) = figure.axes
     (top,) = axes.child_axes
-    axes.figure.draw_without_rendering()
+    figure.draw_without_rendering()
     assert top.get_xlabel() == "drive frequency [Hz]"
     assert np.allclose(top.get_xlim(), np.array(axes.get_xlim()) * 500.0 / 0.85)
 
