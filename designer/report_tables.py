@@ -54,6 +54,10 @@ _CONDITIONS = {
     "generator_peak_v": ("generator amplitude (peak), at most", "V"),
     "signal_level_ratio": ("ratio of the states' peaks that belong together, at most", ""),
     "signal_share_ratio": ("another state's peak over that of x₁, at most", ""),
+    "signal_offset_ratio": ("peak of x₁ over the op-amps' largest offset, at least", ""),
+    "noise_gain": ("noise gain of a stage, at most", ""),
+    "noise_gain_bandwidth_hz": ("noise gain times the fastest harmonic, at most", "Hz"),
+    "output_current_a": ("current of an output (peak), at most", "A"),
     "load_ohm": ("load of an output, at least", "Ω"),
     "signal_resistor_low_ohm": ("signal resistors, at least", "Ω"),
     "signal_resistor_high_ohm": ("signal resistors, at most", "Ω"),
@@ -212,7 +216,7 @@ def ngspice_table(data: ReportData) -> Table | None:
     return Table(
         (
             "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
-            "circuit but ngspice; reasons",
+            "exact circuit but ngspice (boards); why without answer",
         ),
         tuple(rows),
         (2, 3, 4, 5, 6),
