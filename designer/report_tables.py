@@ -14,12 +14,14 @@ import numpy as np
 from designer import report_words as words
 from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
 from designer.design import Design
+from designer.folder import TOLERANCE
 from designer.gate import shortest_contact
 from designer.hearing import UNDECIDED, Kind
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
 from designer.plots import EXACT
 from designer.report_data import ReportData
+from designer.spreadwords import words_of
 from designer.verdict import Answer, Verdict, Yield
 
 REASONS_SHOWN = 5
@@ -344,7 +346,12 @@ def condition_table(design: Design) -> Table:
 
 
 def provenance_table(data: ReportData) -> Table:
-    return Table(("what", "value"), tuple(_flat(data.provenance)))
+    said = {k: v for k, v in data.provenance.items() if k != "spread" or data.plan is None}
+    rows = [*_flat(said)]
+    if data.plan is not None:
+        varies = words_of(data.plan.spread, data.design.circuit)
+        rows.append(("spread", f"{data.plan.spread.name}: {varies} (part by part in {TOLERANCE})"))
+    return Table(("what", "value"), tuple(rows))
 
 
 def _expected(c: Checked) -> str:

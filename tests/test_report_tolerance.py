@@ -21,7 +21,7 @@ from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
 from designer.report_data import ReportData
 from designer.report_layers import Layers
-from designer.report_tables import condition_table
+from designer.report_tables import condition_table, provenance_table
 from designer.report_tolerance import facts
 from designer.verdict import Verdict
 from designer.yield_maps import Axis, YieldMap
@@ -184,6 +184,14 @@ def test_conditions_have_words_and_units(plain: ReportData) -> None:
     rows = condition_table(plain.design).rows
     assert rows
     assert not {name for name, _ in rows} & {k.replace("_", " ") for k in plain.design.conditions}
+
+
+def test_the_provenance_has_the_spread_in_words(plain: ReportData) -> None:
+    assert plain.plan is not None
+    data = replace(plain, provenance={"seed": 1, "spread": plain.plan.spread.as_dict()})
+    rows = {row[0]: row[1] for row in provenance_table(data).rows}
+    assert set(rows) == {"seed", "spread"}
+    assert rows["spread"].startswith("bench-1: resistors uniform within ± 1 %")
 
 
 def test_an_interval_near_the_end_keeps_its_ends_apart() -> None:
