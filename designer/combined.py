@@ -117,7 +117,11 @@ def wilson(count: float, of: int) -> tuple[float, float]:
     p, n, z2 = count / of, float(of), Z * Z
     centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
     half = Z * math.sqrt(max(p * (1.0 - p), 0.0) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
-    return max(centre - half, 0.0), min(centre + half, 1.0)
+    # At the ends the limit is exact, and the difference of equals only rounding.
+    return (
+        0.0 if count <= 0.0 else max(centre - half, 0.0),
+        1.0 if count >= n else min(centre + half, 1.0),
+    )
 
 
 def combine(

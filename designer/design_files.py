@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -28,6 +29,7 @@ from designer.responses import find, on_circuit, peaks
 from designer.selection import SOLVER
 from designer.setup_table import scales_csv, setup_csv, start_recipes
 
+SETUP = "setup.csv"
 DECK_PERIODS = 20
 """Drive periods that ``circuit.cir`` runs for."""
 
@@ -39,7 +41,7 @@ def texts(made: Synthesis) -> dict[str, str]:
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(made),
         "bom.csv": bill_csv(bill(design.circuit, modelfile.circuit, made.catalog)),
-        "setup.csv": setup_csv(design, made.found, start_recipes(made, cores())),
+        SETUP: setup_csv(design, made.found, start_recipes(made, cores())),
         "scales.csv": scales_csv(modelfile, design, made.found),
     }
 
@@ -115,6 +117,12 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             file, "parts", f"{type(error).__name__}: {error}", "the design of this folder's model"
         ) from None
     return Synthesis(modelfile, catalog, found, design)
+
+
+def starts(folder: Folder) -> tuple[str, ...]:
+    """How to start each response, by the folder's ``setup.csv``."""
+    with (folder / SETUP).open(encoding="utf-8", newline="") as stream:
+        return tuple(row.get("start") or "" for row in csv.DictReader(stream))
 
 
 def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:

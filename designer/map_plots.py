@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -41,6 +43,7 @@ def map_chart(label: str, found: YieldMap) -> Figure:
     axes.set_ylim(0.0, 103.0)
     axes.set_ylabel("yield with its 95 % interval [%]")
     axes.set_xlabel(_AXES[name])
+    _hertz(axes, found)
     axes.grid(color=GRID, lw=0.7)
     axes.set_title(f"{label}; {found.samples} boards a point", loc="left", color=INK, size=9)
     handles, names = axes.get_legend_handles_labels()
@@ -51,14 +54,17 @@ def map_chart(label: str, found: YieldMap) -> Figure:
 
 def _marks(axes: Axes, found: YieldMap, scale: float) -> None:
     word = "coarsest of the best" if found.over == "grade" else "recommended"
-    if found.recommended is None:
+    best = None if found.recommended is None else scale * found.recommended[0]
+    if best is None:
         axes.plot([], [], color=_BEST, lw=1.2, label=f"{word}: nowhere")
+    elif best == found.used and found.over != "grade":
+        axes.axvline(best, color=_BEST, lw=1.2, label=f"recommended, in use: {best:.4g}")
     else:
-        best = scale * found.recommended[0]
         axes.axvline(best, color=_BEST, lw=1.2, label=f"{word}: {best:.4g}")
     if found.over == "grade":
         return
-    axes.axvline(found.used, color=INK, lw=0.9, ls="--", label=f"in use: {found.used:.4g}")
+    if best != found.used:
+        axes.axvline(found.used, color=INK, lw=0.9, ls="--", label=f"in use: {found.used:.4g}")
     if found.window is not None:
         for edge, open_ in zip(found.window, found.open, strict=True):
             if not open_:
@@ -66,6 +72,17 @@ def _marks(axes: Axes, found: YieldMap, scale: float) -> None:
         axes.plot([], [], color=MUTED, lw=0.9, ls=":", label="edge of the nominal window")
     if (~found.there).any():
         axes.plot([], [], "x", color=MUTED, label="not there nominally")
+
+
+def _hertz(axes: Axes, found: YieldMap) -> None:
+    """The generator's frequency above ω."""
+    if found.axes[0].name != "omega" or found.frequency is None:
+        return
+    scale = found.frequency / found.used
+    top = axes.secondary_xaxis(
+        "top", functions=(partial(np.multiply, scale), partial(np.multiply, 1.0 / scale))
+    )
+    top.set_xlabel("drive frequency [Hz]")
 
 
 def _heat(label: str, found: YieldMap) -> Figure:
@@ -79,6 +96,7 @@ def _heat(label: str, found: YieldMap) -> Figure:
     )
     axes.set_yticks(range(len(grade)), [f"{100 * g:g}" for g in grade])
     axes.set_xlabel(_AXES["omega"])
+    _hertz(axes, found)
     axes.set_ylabel(_AXES["grade"])
     axes.axvline(found.used, color="white", lw=1.0, ls="--")
     best = found.recommended

@@ -23,6 +23,8 @@ def inside(folder: Path, name: str, field: str) -> Path:
     path = root / relative
     if path.resolve() != path:
         raise InputError(None, field, name, expected)
+    if not path.exists():
+        raise InputError(None, field, f"{name}, which does not exist", f"a file in {folder}")
     if not path.is_file():
         raise InputError(None, field, name, expected)
     return path

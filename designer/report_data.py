@@ -12,6 +12,7 @@ from designer.bom import bill
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
+from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
 from designer.report_layers import Layers
 from designer.verdict import Answer, StudyPlan, Yield
@@ -30,6 +31,7 @@ class ReportData:
     one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
     command : the command line that makes these results again. equations : the equation check.
     heard : what ngspice said about boards of the study. layers : what else the study has.
+    starts : how to start each response, from ``setup.csv``; empty where there is none.
     """
 
     modelfile: ModelFile
@@ -44,9 +46,10 @@ class ReportData:
     equations: EquationCheck | None = None
     heard: tuple[Hearing, ...] = ()
     layers: Layers = field(default_factory=Layers)
+    starts: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, result: RunResult, command: str) -> ReportData:
+    def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
         """The data of a finished run."""
         lines = bill(result.design.circuit, result.modelfile.circuit, result.catalog)
         return cls(
@@ -61,6 +64,7 @@ class ReportData:
             command=command,
             equations=result.equations,
             heard=result.study.heard,
+            starts=tuple(starts),
             layers=Layers(
                 tuned=result.study.tuned,
                 reached=result.study.reached,
@@ -87,6 +91,14 @@ class ReportData:
                 del free[number]
             found.append(number)
         return tuple(found)
+
+    @property
+    def ngspice_asked(self) -> bool:
+        """Whether ngspice was asked about every response that the nominal circuit shows."""
+        shown = [c for c in self.checked if c.circuit.status is OrbitStatus.PERIODIC]
+        return any(c.gate is not None for c in self.checked) and all(
+            c.gate is not None for c in shown
+        )
 
     def answers_to(self, response: int) -> tuple[Answer, ...]:
         """Answers for response number ``response``, by sample."""

@@ -100,7 +100,7 @@ def _summary(data: ReportData) -> list[str]:
         bad = [c for c in data.checked if words.problem(c)]
         engines = (
             "the model, the exact circuit and ngspice"
-            if any(c.gate is not None for c in data.checked)
+            if data.ngspice_asked
             else "the model and the exact circuit (ngspice was not asked)"
         )
         if not bad:
@@ -179,7 +179,8 @@ def _tiles(data: ReportData) -> list[tuple[str, str]]:
     good = sum(not words.problem(c) for c in data.checked)
     out = []
     if data.checked:
-        out.append((f"{good} of {len(data.checked)}", "responses found, all engines agree"))
+        asked = "all engines agree" if data.ngspice_asked else "ngspice was not asked"
+        out.append((f"{good} of {len(data.checked)}", f"responses found, {asked}"))
     worst = data.design.errors.max_error
     out.append(("exact" if worst < EXACT else words.error(worst), "largest coefficient error"))
     out.append((str(data.design.distinct_values), "different R and C values"))
@@ -187,12 +188,12 @@ def _tiles(data: ReportData) -> list[tuple[str, str]]:
     known = [y for y in rates if math.isfinite(y.rate)]
     if known:
         least = min(known, key=lambda y: y.rate)
-        low, high = (100 * v for v in least.interval)
-        out.append((f"{100 * least.rate:.0f} %", f"least yield ({low:.0f} to {high:.0f} %)"))
+        low, high = words.span(*least.interval)
+        out.append((f"{100 * least.rate:.0f} %", f"least yield ({low} to {high} %)"))
     whole = data.all_on_one_board
     if whole is not None and math.isfinite(whole.rate):
-        low, high = (100 * v for v in whole.interval)
-        out.append((f"{100 * whole.rate:.0f} %", f"all on one board ({low:.0f} to {high:.0f} %)"))
+        low, high = words.span(*whole.interval)
+        out.append((f"{100 * whole.rate:.0f} %", f"all on one board ({low} to {high} %)"))
     return out
 
 

@@ -14,12 +14,14 @@ import numpy as np
 from designer import report_words as words
 from designer.circuit import Capacitor, Diode, Reference, Resistor, Section
 from designer.design import Design
+from designer.folder import TOLERANCE
 from designer.gate import shortest_contact
 from designer.hearing import UNDECIDED, Kind
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
 from designer.plots import EXACT
 from designer.report_data import ReportData
+from designer.spreadwords import words_of
 from designer.verdict import Answer, Verdict, Yield
 
 REASONS_SHOWN = 5
@@ -54,6 +56,10 @@ _CONDITIONS = {
     "generator_peak_v": ("generator amplitude (peak), at most", "V"),
     "signal_level_ratio": ("ratio of the states' peaks that belong together, at most", ""),
     "signal_share_ratio": ("another state's peak over that of x₁, at most", ""),
+    "signal_offset_ratio": ("peak of x₁ over the op-amps' largest offset, at least", ""),
+    "noise_gain": ("noise gain of a stage, at most", ""),
+    "noise_gain_bandwidth_hz": ("noise gain times the fastest harmonic, at most", "Hz"),
+    "output_current_a": ("current of an output (peak), at most", "A"),
     "load_ohm": ("load of an output, at least", "Ω"),
     "signal_resistor_low_ohm": ("signal resistors, at least", "Ω"),
     "signal_resistor_high_ohm": ("signal resistors, at most", "Ω"),
@@ -212,7 +218,7 @@ def ngspice_table(data: ReportData) -> Table | None:
     return Table(
         (
             "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
-            "circuit but ngspice; reasons",
+            "exact circuit but ngspice (boards); why without answer",
         ),
         tuple(rows),
         (2, 3, 4, 5, 6),
@@ -340,7 +346,12 @@ def condition_table(design: Design) -> Table:
 
 
 def provenance_table(data: ReportData) -> Table:
-    return Table(("what", "value"), tuple(_flat(data.provenance)))
+    said = {k: v for k, v in data.provenance.items() if k != "spread" or data.plan is None}
+    rows = [*_flat(said)]
+    if data.plan is not None:
+        varies = words_of(data.plan.spread, data.design.circuit)
+        rows.append(("spread", f"{data.plan.spread.name}: {varies} (part by part in {TOLERANCE})"))
+    return Table(("what", "value"), tuple(rows))
 
 
 def _expected(c: Checked) -> str:

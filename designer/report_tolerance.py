@@ -13,6 +13,7 @@ from typing import Any
 from designer import report_words as words
 from designer.all_on_one import all_on_one
 from designer.blame import Blame, ResponseBlame, Subject
+from designer.hearing import Kind
 from designer.report_data import ReportData
 from designer.report_layers import Benched, Both, Judged
 from designer.report_tables import Table
@@ -20,6 +21,7 @@ from designer.verdict import Verdict, Yield, count
 
 PARTS_SHOWN = 4
 DIFFERENCES_SHOWN = 20
+STARTED: dict[str, str] = {Kind.OWN: "its own orbit", Kind.NOMINAL: "the nominal orbit"}
 
 
 def facts(data: ReportData) -> dict[str, Any]:
@@ -138,7 +140,8 @@ def _differences(data: ReportData) -> Table | None:
         d = both.disagreement
         low, high = d.interval
         said = [
-            f"board {x.sample}: {x.exact} but {x.ngspice} ({x.explanation})"
+            f"board {x.sample} from {STARTED[x.kind]}: exact circuit {x.exact}, "
+            f"ngspice {x.ngspice} ({x.explanation})"
             for x in both.differences[:DIFFERENCES_SHOWN]
         ]
         more = len(both.differences) - len(said)
@@ -148,17 +151,25 @@ def _differences(data: ReportData) -> Table | None:
     if not rows:
         return None
     return Table(
-        ("response", "other n-p-q on the random boards", "where the engines differ"), tuple(rows)
+        (
+            "response",
+            "another n-p-q in ngspice, of the random boards",
+            "boards, and where ngspice started",
+        ),
+        tuple(rows),
     )
 
 
 def _recipes(data: ReportData) -> Table | None:
-    rows = [
-        (words.name(c), data.layers.recipes[number].text)
-        for i, c in enumerate(data.checked)
-        for number in [data.question_of[i]]
-        if number is not None and number < len(data.layers.recipes)
-    ]
+    if data.starts:
+        rows = [(words.name(c), s) for c, s in zip(data.checked, data.starts, strict=True) if s]
+    else:
+        rows = [
+            (words.name(c), data.layers.recipes[number].text)
+            for i, c in enumerate(data.checked)
+            for number in [data.question_of[i]]
+            if number is not None and number < len(data.layers.recipes)
+        ]
     return Table(("response", "how to reach it"), tuple(rows)) if rows else None
 
 
@@ -172,7 +183,7 @@ def _limits(data: ReportData) -> Table | None:
         decided = p.ok + p.lost
         said = words.NONE
         if decided:
-            said = f"{p.right} of {decided}"
+            said = f"{p.right} of {decided}" if p.lost else "no board was lost"
             if p.right < decided:
                 said += f" (lost boards missed: {p.missed}, false alarms: {p.alarms})"
         rows.append((words.name(c), b.limited_by, said))

@@ -77,6 +77,16 @@ def number(value: object, digits: int = 4) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else NONE
 
 
+def span(low: float, high: float) -> tuple[str, str]:
+    """The ends of an interval of shares in per cent: whole, with decimals where whole ones would
+    not tell the ends apart."""
+    for digits in range(4):
+        ends = (f"{100 * low:.{digits}f}", f"{100 * high:.{digits}f}")
+        if ends[0] != ends[1] or low == high:
+            break
+    return (ends[0], f"{100 * high:g}" if high in (0.0, 1.0) else ends[1])
+
+
 def error(value: float) -> str:
     """A coefficient error, a logarithm, in per cent."""
     if not math.isfinite(value):

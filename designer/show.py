@@ -58,8 +58,10 @@ def synthesised(answer: Mapping[str, Any]) -> None:
 def tolerance(answer: Mapping[str, Any]) -> None:
     """The responses on each engine, and their yields."""
     console = _console()
+    spread = (answer.get("provenance", {}).get("spread") or {}).get("name", "")
     table = _table(
-        f"Responses, {answer['samples']} samples",
+        f"Responses, {answer['samples']} samples"
+        + (f", spread of the {spread}" if spread == "model file" else ""),
         "ω",
         "expected",
         "model",
@@ -95,6 +97,9 @@ def tolerance(answer: Mapping[str, Any]) -> None:
             *counted,
         )
     console.print(table)
+    if answer.get("until") is not None:
+        reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
+        _line(console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
     _further(console, answer)
 
 

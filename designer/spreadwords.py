@@ -36,8 +36,7 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         low, high = spread.temperature
         said.append(f"temperature uniform from {low:g} to {high:g} °C")
     if spread.ageing:
-        most = max(max(abs(v) for v in _ends(law)) for law in spread.ageing.values())
-        said.append(f"ageing by up to {_percent(most)}")
+        said.append(f"ageing of {_ageing(spread)}")
     own = sorted({*spread.grades, *spread.shapes}, key=natural)
     said += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
     networks = [g for g in spread.groups if not g.reel]
@@ -49,6 +48,20 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         of = f" of {boards} boards, taken in turn" if boards > 1 else ""
         said.append(f"{parts} measured value{'s' * (parts != 1)}{of}")
     return "; ".join(said)
+
+
+def _ageing(spread: Spread) -> str:
+    """Ranges of ageing, and the kinds of part that have each."""
+    kinds = {"R": "resistors", "C": "capacitors", "V": "references"}
+    by: dict[tuple[str, str], list[str]] = {}
+    for part, law in sorted(spread.ageing.items(), key=lambda item: natural(item[0])):
+        low, high = (f"{100 * end:.4g}" for end in _ends(law))
+        by.setdefault((kinds.get(part[0], part), f"from {low} to {high} %"), []).append(part)
+    of = [kind for kind, _ in by]
+    return ", ".join(
+        f"{kind if of.count(kind) == 1 else ' '.join(parts)} {within}"
+        for (kind, within), parts in by.items()
+    )
 
 
 def _grade(shape: Law, grade: float) -> str:

@@ -94,7 +94,8 @@ def run_into(
     from designer.report import write_report  # matplotlib is not needed before this
     from designer.report_data import ReportData
 
-    write_report(ReportData.of(result, command(options)), *(folder / name for name in REPORTS))
+    data = ReportData.of(result, command(options), design_files.starts(folder))
+    write_report(data, *(folder / name for name in REPORTS))
     assert folder.manifest is not None
     folder.manifest.provenance = said
     folder.finish("study", blocks)

@@ -45,6 +45,8 @@ REACH = 0.3
 """Relative: how far from the setting in use a window is followed."""
 HALVINGS = 6
 """Of the last step, at each edge."""
+NEARLY_SYMMETRIC = 0.01
+"""Of the peak: a nominal orbit below it is past its pitchfork; bias currents leave it so much."""
 SEED_SHIFT = 1_000_003
 """Added to the study's seed: a setting that was chosen on a map is judged on boards it has not
 seen."""
@@ -62,9 +64,10 @@ class Axis:
 class YieldMap:
     """Counts of a response on a grid of settings; every array has the axes' shape.
 
-    question : of the plan. there : whether the nominal circuit shows the response. window : edges
-    of the nominal circuit's window in the first axis's unit, None over the grade; an edge at the
-    reach of the search is marked in ``open`` (below, above). used : the setting of the plan.
+    question : of the plan. there : whether the nominal circuit shows the response, with the
+    symmetry that is asked for. window : edges of the nominal circuit's window in the first axis's
+    unit, None over the grade; an edge at the reach of the search is marked in ``open`` (below,
+    above). used : the setting of the plan, at which the generator runs at ``frequency`` [Hz].
     """
 
     over: Over
@@ -82,6 +85,7 @@ class YieldMap:
     open: tuple[bool, bool]
     attractors: int
     seconds: float
+    frequency: float | None = None
 
     def at(self, *index: int) -> Yield:
         """The yield at one point."""
@@ -104,27 +108,32 @@ class YieldMap:
 
     @property
     def recommended(self) -> tuple[float, ...] | None:
-        """The setting whose interval has the highest lower end, on every axis; None where no board
-        is ok anywhere.
+        """The setting in use if none is better, else the best one, on every axis; None where no
+        board is ok anywhere.
 
-        Of neighbours in the first axis that are equal to it, the middle of the longest row; over
-        the grade and of grades, the coarsest of equals. The nominal circuit shows the response
-        there.
+        The best has the interval with the highest lower end; a setting whose interval overlaps it
+        is as good. Of the rows of such neighbours that hold a best one, the middle of the longest.
+        Over the grade and of grades, the coarsest of those with the highest lower end. The nominal
+        circuit shows the response there.
         """
-        if not (self.there & (self.ok > 0)).any():
+        counts = self.there & (self.ok > 0)
+        if not counts.any():
             return None
-        low = np.where(self.there & (self.ok > 0), self.low, -1.0)
+        low, high = (np.where(counts, end, -1.0) for end in (self.low, self.high))
         best = float(low.max())
         grade: tuple[float, ...] = ()
         if low.ndim == 2:
             column = int(np.flatnonzero((low == best).any(axis=0))[-1])
             grade = (self.axes[1].values[column],)
-            low = low[:, column]
-        equal = np.flatnonzero(low == best)
+            low, high = low[:, column], high[:, column]
         if self.over == "grade":
-            return (self.axes[0].values[int(equal[-1])],)
-        rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)
+            return (self.axes[0].values[int(np.flatnonzero(low == best)[-1])],)
         values = np.array(self.axes[0].values)
+        equal = np.flatnonzero(high >= best)
+        if self.used in values[equal]:
+            return (self.used, *grade)
+        rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)
+        rows = [row for row in rows if (low[row] == best).any()]
         longest = max(rows, key=lambda row: float(values[row[-1]] - values[row[0]]))
         middle = 0.5 * (values[longest[0]] + values[longest[-1]])
         nearest = longest[int(np.argmin(np.abs(values[longest] - middle)))]
@@ -143,6 +152,7 @@ class YieldMap:
             "samples": self.samples,
             "seed": self.seed,
             "used": self.used,
+            "frequency_hz": self.frequency,
             "window": None if self.window is None else list(self.window),
             "open": list(self.open),
             "recommended": None if self.recommended is None else list(self.recommended),
@@ -247,6 +257,7 @@ def yield_map(
         open=open_,
         attractors=walk.spent,
         seconds=time.perf_counter() - began,
+        frequency=question.excitation.frequency,
     )
 
 
@@ -295,7 +306,10 @@ class _Walk:
             orbit = settle(Flow(self._system, self.drive(value)), self._known[near].start)
         except ArithmeticError:
             return None
-        if judge(orbit, self.question.spec, self.question.start)[0] is not Verdict.OK:
+        spec = self.question.spec
+        if judge(orbit, spec, self.question.start)[0] is not Verdict.OK:
+            return None
+        if spec.symmetric is False and orbit.asymmetry < NEARLY_SYMMETRIC:
             return None
         self._known[value] = orbit
         return orbit

@@ -32,6 +32,12 @@ def test_wilson_is_that_of_a_yield(of: int, count: int) -> None:
     assert wilson(float(count), of) == pytest.approx(Yield(count, of - count, 0, 0).interval)
 
 
+@given(of=st.integers(1, 5000))
+def test_an_interval_of_none_or_all_ends_without_rounding(of: int) -> None:
+    assert wilson(0.0, of)[0] == 0.0
+    assert wilson(float(of), of)[1] == 1.0
+
+
 def world(
     rng: np.random.Generator, boards: int, rate: float, gain: float, loss: float
 ) -> tuple[list[Answer], dict[int, bool]]:

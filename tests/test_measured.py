@@ -192,6 +192,7 @@ def test_the_list_lies_beside_the_model_file(tmp_path: Path, name: str) -> None:
         read_model_file(model)
     assert caught.value.field == "spread.measured"
     assert str(caught.value.file) == str(model)
+    assert ("does not exist" in str(caught.value.found)) is (name == "none.csv")
 
 
 def test_too_long_a_list(tmp_path: Path) -> None:

@@ -308,6 +308,8 @@ def test_without_ngspice(whole: ReportData) -> None:
     text = Page(render_html(replace(whole, checked=checked, heard=()))).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text
+    assert "responses found, ngspice was not asked" in text
+    assert "all engines agree" not in text
 
 
 def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportData) -> None:

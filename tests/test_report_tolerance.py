@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from designer import pipeline
+from designer import report_words as words
 from designer.blame import Blame, NearLimit, ResponseBlame, Subject
 from designer.catalog import load_catalog
 from designer.corners import Corner
@@ -20,6 +21,7 @@ from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
 from designer.report_data import ReportData
 from designer.report_layers import Layers
+from designer.report_tables import condition_table, provenance_table
 from designer.report_tolerance import facts
 from designer.verdict import Verdict
 from designer.yield_maps import Axis, YieldMap
@@ -47,6 +49,7 @@ class Share:
 @dataclass(frozen=True)
 class Other:
     sample: int = 7
+    kind: str = "own"
     exact: str = "1-1-1"
     ngspice: str = "3-3-3"
     explanation: str = "grazing margin"
@@ -113,11 +116,11 @@ def blamed(question: int, lost: int) -> ResponseBlame:
 
 
 def mapped(question: int) -> YieldMap:
-    ok = np.array([0, 8, 10])
+    ok = np.array([0, 80, 100])
     nothing = np.zeros_like(ok)
     return YieldMap(
         "omega", question, (Axis("omega", (0.8, 0.85, 0.9)),), np.array([False, True, True]), ok,
-        np.array([0, 2, 0]), nothing, nothing, 10, 1, 0.85, (0.82, 0.9), (False, True), 30, 0.1,
+        np.array([0, 20, 0]), nothing, nothing, 100, 1, 0.85, (0.82, 0.9), (False, True), 30, 0.1,
     )  # fmt: skip
 
 
@@ -167,6 +170,41 @@ def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
     assert whole[2].startswith("75 %")
 
 
+def test_a_difference_says_where_ngspice_started(full: ReportData) -> None:
+    row = facts(full)["difference_table"].rows[0]
+    assert row[2] == (
+        "board 7 from its own orbit: exact circuit 1-1-1, ngspice 3-3-3 (grazing margin)"
+    )
+
+
+def test_every_response_has_its_start_recipe_without_power_ups(plain: ReportData) -> None:
+    assert facts(plain)["recipe_table"] is None
+    text = render_markdown(replace(plain, starts=("sweep down to 500 Hz", "switch on there")))
+    assert "How to reach a response" in text
+    assert "sweep down to 500 Hz" in text
+    assert "switch on there" in text
+
+
+def test_conditions_have_words_and_units(plain: ReportData) -> None:
+    rows = condition_table(plain.design).rows
+    assert rows
+    assert not {name for name, _ in rows} & {k.replace("_", " ") for k in plain.design.conditions}
+
+
+def test_the_provenance_has_the_spread_in_words(plain: ReportData) -> None:
+    assert plain.plan is not None
+    data = replace(plain, provenance={"seed": 1, "spread": plain.plan.spread.as_dict()})
+    rows = {row[0]: row[1] for row in provenance_table(data).rows}
+    assert set(rows) == {"seed", "spread"}
+    assert rows["spread"].startswith("bench-1: resistors uniform within ± 1 %")
+
+
+def test_an_interval_near_the_end_keeps_its_ends_apart() -> None:
+    assert words.span(0.99904, 1.0) == ("99.9", "100")
+    assert words.span(0.51, 1.0) == ("51", "100")
+    assert words.span(0.0, 0.0001) == ("0.00", "0.01")
+
+
 def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
     said = facts(full)
     assert len(said["avoided_table"].rows) == 1
@@ -214,4 +252,4 @@ def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: Re
     assert sum("losses" in a for a in alts) == 1
     assert sum("Sobol" in a for a in alts) == 1
     assert sum(a.startswith("Yield over omega") for a in alts) == 1
-    assert "board 7: 1-1-1 but 3-3-3 (grazing margin)" in page.text
+    assert "exact circuit 1-1-1, ngspice 3-3-3 (grazing margin)" in page.text

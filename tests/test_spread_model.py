@@ -315,7 +315,7 @@ share = 0.8
         "normal with σ = 0.3333 %",
         "± 0.3 %",
         "0 to 50 °C",
-        "by up to 2 %",
+        "from -2 to 0 %",
     ):
         assert part in words_of(spread, SOLD), part
 
@@ -428,3 +428,13 @@ def test_more_is_more(data: st.DataObject) -> None:
 
 def test_no_board_is_measured_here() -> None:
     assert BOARD not in EVERYTHING.coordinates(CIRCUIT)
+
+
+def test_ageing_in_words_is_that_of_each_kind_of_part() -> None:
+    """Blurred into one figure, -0.5 % of the capacitors would be taken for the resistors'."""
+    resistors = {r.name: Uniform(-0.002, 0.002) for r in SOLD.resistors}
+    capacitors = {c.name: Uniform(-0.005, 0.0) for c in SOLD.capacitors}
+    spread = Spread(0.01, 0.01, 1e-3, 4e-3, ageing={**resistors, **capacitors})
+    said = words_of(spread, SOLD)
+    assert "resistors from -0.2 to 0.2 %" in said
+    assert "capacitors from -0.5 to 0 %" in said
