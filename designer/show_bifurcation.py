@@ -35,7 +35,8 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     if answer["points"]:
         table = _table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
         for p in answer["points"][:LONGEST]:
-            for k, c in enumerate(p["changes"]):
+            branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
+            for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
                 first = ("", "") if k else (p["kind"], f"{p['value']:.9g}")
                 _row(table, *first, c["track"] or "-", c["text"])
         console.print(table)

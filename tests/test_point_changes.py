@@ -17,13 +17,15 @@ from designer import (
     point_changes,
     sweep,
     sweep_points,
+    sweep_titles,
 )
 from designer.basins import BasinPlan
+from designer.bifurcations import Bifurcation
 from designer.flow import Flow
 from designer.parameter_map import MapPlan
 from designer.steady import Course
 from designer.sweep import Sweep, SweepPlan
-from designer.sweep_subject import ModelSubject
+from designer.sweep_subject import UNITS, BoardSubject, ModelSubject
 from designer.system import Drive
 from tests.test_modal import PAPER
 
@@ -37,17 +39,21 @@ def both() -> Sweep:
     return sweep.run(SweepPlan(ModelSubject(PAPER), "omega", values, ("down", "up")), jobs=2)
 
 
+@pytest.fixture(scope="module")
+def points(both: Sweep) -> list[Bifurcation]:
+    return sweep_points.locate(both, jobs=2)
+
+
 def _settled(omega: float, start: Any) -> tuple[str, bool | None]:
     flow = Flow(PAPER.second_order().piecewise_linear(), Drive(omega))
     orbit = attractor.settle(flow, start)
     return orbit.response, orbit.symmetric
 
 
-def test_what_changes_is_told_for_each_direction(both: Sweep) -> None:
+def test_what_changes_is_told_for_each_direction(both: Sweep, points: list[Bifurcation]) -> None:
     """At the pitchfork a track loses or gains the symmetry; a fold ends an orbit for the track
     that comes from it, and the other does not meet it. Settling from the orbit's own state, past
     the point, says the same."""
-    points = sweep_points.locate(both)
     (fork,) = [p for p in points if p.kind == "pitchfork" and p.value > 1.4]
     symmetric, asymmetric = "1-1-1 symmetric", "1-1-1 asymmetric"
     told = {c.track: c.text for c in point_changes.changes(both, fork)}
@@ -75,9 +81,9 @@ def test_what_changes_is_told_for_each_direction(both: Sweep) -> None:
         assert point_changes.label(*gone) != change.before
 
 
-def test_a_point_that_no_track_meets_has_no_track(both: Sweep) -> None:
+def test_a_point_that_no_track_meets_has_no_track(points: list[Bifurcation]) -> None:
     """By a sweep that stays above the pitchfork, its point is only the branch's."""
-    (fork,) = [p for p in sweep_points.locate(both) if p.kind == "pitchfork" and p.value > 1.4]
+    (fork,) = [p for p in points if p.kind == "pitchfork" and p.value > 1.4]
     values = np.linspace(1.50, 1.55, 3)
     above = sweep.run(SweepPlan(ModelSubject(PAPER), "omega", values, ("up",), course=QUICK))
     (change,) = point_changes.changes(above, fork)
@@ -115,6 +121,17 @@ def test_pictures_can_be_read_alone(both: Sweep) -> None:
     assert "by the initial x₁ and x₁′" in said
     assert "ω = 1.43" in said
     assert "b = 0.25" in said
+
+
+def test_a_board_is_told_in_hertz_and_volts() -> None:
+    board: Any = BoardSubject.__new__(BoardSubject)
+    board.frequency, board.amplitude, board.offset, board.units = None, 0.5, 0.0, UNITS
+    said = sweep_titles.title("Small", SweepPlan(board, "frequency", np.array([200.0, 320.0])))
+    assert said.splitlines() == [
+        "Small",
+        "bifurcation diagram of the nominal board over generator frequency, followed down",
+        "held: generator amplitude (peak) = 0.5 V, generator offset = 0 V",
+    ]
 
 
 def test_aperiodic_stretches_are_in_the_table_and_the_legend(
