@@ -21,6 +21,7 @@ from designer.plots import GRID, INK, MUTED, new_figure, style
 from designer.steady import Steady
 from designer.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.sweep_subject import Subject
+from designer.sweep_titles import NAMES, title
 from designer.system import Array
 
 BLACK, RED = "#000000", "#d40000"
@@ -43,23 +44,6 @@ MARKS = {
     "grazing": ("x", "#cc79a7"),
     "torus": ("D", "#7f3fbf"),
 }
-NAMES = {
-    "omega": "ω",
-    "zeta": "ζ",
-    "k0": "k₀",
-    "f20": "f₂₀",
-    "frequency": "generator frequency",
-    "amplitude": "generator amplitude (peak)",
-    "offset": "generator offset",
-    "x1": "x₁",
-    "x1'": "x₁′",
-    "x2": "x₂",
-    "x2'": "x₂′",
-    "v1": "v₁",
-    "v2": "v₂",
-    "v3": "v₃",
-    "v4": "v₄",
-}
 
 
 @dataclass(frozen=True)
@@ -79,14 +63,16 @@ def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Mark]:
     ]
 
 
-def diagram(sweep: Sweep, points: Sequence[Mark] = ()) -> Figure:
+def diagram(sweep: Sweep, points: Sequence[Mark] = (), name: str = "") -> Figure:
     """The paper's Fig. 2: least displacement of each period, impact velocity on the upper stop,
-    largest Lyapunov exponent, over the swept parameter; windows named above."""
+    largest Lyapunov exponent, over the swept parameter; windows named above. name : the model's
+    title."""
     plan, units = sweep.plan, sweep.plan.subject.units
     strips = list(plan.tracks) if plan.followed else ["starts"]
     with style():
         figure = new_figure(9.6, 7.6 + 0.24 * len(strips))
         heights = [0.24] * len(strips) + [2.4, 2.4, 1.6]
+        _head(figure, title(name, plan, 120))
         rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         for axes, track in zip(rows, strips, strict=False):
             shown = [w for w in sweep.windows if w.track == track or not plan.followed]
@@ -101,10 +87,11 @@ def diagram(sweep: Sweep, points: Sequence[Mark] = ()) -> Figure:
             _cloud(speed, values, [s.velocities for s in steps], ink)
             growth.plot(values, [s.lyapunov for s in steps], marker=".", mew=0, **ink)
         growth.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
-        least.set_ylabel(_label(f"{symbol}₁ min in each period", units.get("x", "")))
+        least.set_ylabel(_label(f"least {symbol}₁ in each period", units.get("x", "")))
         rate = f"{symbol}₁′" if symbol == "x" else f"{symbol}₂"
-        speed.set_ylabel(_label(f"{rate} where contact with A1 begins", units.get("v", "")))
-        growth.set_ylabel(_label("λ max", units.get("λ", "")))
+        said = f"impact velocity {rate}\non the upper stop (A1)"
+        speed.set_ylabel(_label(said, units.get("v", "")))
+        growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
         finite = np.array([s.lyapunov for steps in sweep.steps.values() for s in steps])
         finite = finite[np.isfinite(finite)]
         if len(finite):
@@ -132,12 +119,13 @@ def diagram(sweep: Sweep, points: Sequence[Mark] = ()) -> Figure:
     return figure
 
 
-def parameter_map(made: ParameterMap) -> Figure:
-    """Colours name the response at every point."""
+def parameter_map(made: ParameterMap, name: str = "") -> Figure:
+    """Colours name the response at every point. name : the model's title."""
     plan = made.plan
     with style():
         figure = new_figure(7.6, 5.4)
         axes = figure.subplots()
+        _head(figure, title(name, plan, 92))
         looks = _palette(made.cells, made.counts)
         _grid(axes, made.cells, plan.xs, plan.ys, looks)
         axes.set_xlabel(_axis(plan.subject, plan.x))
@@ -146,12 +134,14 @@ def parameter_map(made: ParameterMap) -> Figure:
     return figure
 
 
-def basins(made: Basins) -> Figure:
-    """Colours name the attractor that each start goes to; dots are the attractors' strobes."""
+def basins(made: Basins, name: str = "") -> Figure:
+    """Colours name the attractor that each start goes to; dots are the attractors' strobes.
+    name : the model's title."""
     plan = made.plan
     with style():
         figure = new_figure(7.2, 5.2)
         axes = figure.subplots()
+        _head(figure, title(name, plan, 86))
         colours = _attractor_colours(made)
         grid = np.array([c.attractor for c in made.cells]).reshape(len(plan.ys), len(plan.xs))
         _cells(axes, plan.xs, plan.ys, grid, colours)
@@ -159,10 +149,10 @@ def basins(made: Basins) -> Figure:
         column = (plan.subject.states.index(plan.x), plan.subject.states.index(plan.y))
         flow = plan.subject.settings([plan.changes])[0].flow()
         for a, colour in zip(made.attractors, colours, strict=True):
-            title = a.response + {True: " symmetric", False: "", None: ""}[a.symmetric]
+            said = a.response + {True: " symmetric", False: "", None: ""}[a.symmetric]
             if a.twin is not None and a.twin < a.number:
-                title += f", twin of {made.attractors[a.twin].response}"
-            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{title}: {a.share:.1%}"))
+                said += f", twin of {made.attractors[a.twin].response}"
+            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{said}: {a.share:.1%}"))
             if a.response.count("-") != 2:
                 continue
             laps = int(a.response.split("-")[0])
@@ -174,8 +164,6 @@ def basins(made: Basins) -> Figure:
         axes.set_ylim(plan.ys[0], plan.ys[-1])
         axes.set_xlabel(_axis(plan.subject, plan.x) + " at the start")
         axes.set_ylabel(_axis(plan.subject, plan.y) + " at the start")
-        said = ", ".join(f"{NAMES.get(k, k)} = {v:.6g}" for k, v in plan.changes.items())
-        axes.set_title(said, loc="left", weight="bold", color=INK)
         handles.append(
             Line2D([], [], ls="", marker="o", ms=6, mfc=MUTED, mec="white", label="its strobes")
         )
@@ -184,6 +172,10 @@ def basins(made: Basins) -> Figure:
 
 
 # ---------------------------------------------------------------------------------------------
+
+
+def _head(figure: Figure, text: str) -> None:
+    figure.suptitle(text, x=0.012, ha="left", fontsize=8.5, color=INK)
 
 
 Coloured = tuple[str, Array, list[Steady]]
@@ -260,7 +252,7 @@ def _cloud(axes: Axes, values: Array, clouds: Sequence[Array], ink: Mapping[str,
 
 
 def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> None:
-    """Windows as bars with their names; the symmetric ones darker."""
+    """Windows as bars with their names: symmetric or not by colour, aperiodic stretches dark."""
     span = float(values[-1] - values[0])
     half = 0.5 * span / (len(values) - 1)
     axes.set_ylim(0.0, 1.0)
@@ -270,6 +262,12 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
         side.set_visible(False)
     if name:
         axes.set_ylabel({DOWN: "↓", UP: "↑"}.get(name, name), rotation=0, ha="right", va="center")
+    for window in windows:
+        if window.response == OrbitStatus.APERIODIC:
+            # Beside what coexists with it, where several starts share the strip.
+            top = 1.0 if window.track in (DOWN, UP) else 0.3
+            ends = (window.low - half, window.high + half)
+            axes.axvspan(*ends, ymax=top, color=CHAOS, lw=0, zorder=1.5)
     named = [w for w in windows if w.response.count("-") == 2]
     last = -np.inf
     for window in sorted(named, key=lambda w: w.low):
@@ -292,10 +290,10 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
     plan = sweep.plan
     dot: dict[str, Any] = {"ls": "", "marker": ".", "ms": 7}
     handles: list[Any] = []
-    if plan.followed and len(plan.tracks) > 1:
+    if plan.followed:
         for track, colour in zip(plan.tracks, (BLACK, OTHERS[0]), strict=False):
             handles.append(Line2D([], [], color=colour, label=f"followed {track}", **dot))
-    elif not plan.followed and len(plan.tracks) > 1:
+    else:
         handles.append(Line2D([], [], color=BLACK, label="from rest", **dot))
         if RED in [c for c, _, _ in coloured]:
             handles.append(Line2D([], [], color=RED, label="its mirror twin", **dot))
@@ -306,6 +304,8 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
                 handles.append(Line2D([], [], color=colour, label=f"also {some}", **dot))
     handles.append(Patch(fc="#b9cfe4", label="symmetric"))
     handles.append(Patch(fc="#ecd9b4", label="not symmetric"))
+    if any(w.response == OrbitStatus.APERIODIC for w in sweep.windows):
+        handles.append(Patch(fc=CHAOS, label="aperiodic"))
     return handles
 
 
@@ -352,10 +352,10 @@ def _legend(
         if colour not in (REST, OPEN):
             share = counts[response] / total
             handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{response}: {share:.1%}"))
-    for colour, title in ((REST, "other periodic"), (OPEN, "not settled")):
+    for colour, said in ((REST, "other periodic"), (OPEN, "not settled")):
         share = sum(counts[r] for r, c in looks.items() if c == colour) / total
         if share:
-            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{title}: {share:.1%}"))
+            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{said}: {share:.1%}"))
     figure.legend(handles=handles, loc="outside right upper")
 
 

@@ -29,14 +29,19 @@ PLACES = {
 @app.command()
 def reproduce(
     what: Annotated[
-        Subject, typer.Argument(metavar="dynamics|circuit|tolerance", help="Which part.")
+        Subject,
+        typer.Argument(
+            metavar="dynamics|circuit|tolerance",
+            help="Which part; circuit is not yet in this version.",
+        ),
     ],
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
             metavar="DIR",
-            help="Where to [default: reports/paper-dynamics, reports/tolerance].",
+            help="Where to [default: reports/paper-dynamics for dynamics, reports/tolerance "
+            "for tolerance].",
         ),
     ] = None,
     samples: Annotated[

@@ -11,11 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from designer.bifurcation_plots import BLACK, MARKS, NAMES, RED
+from designer.bifurcation_plots import BLACK, MARKS, RED
 from designer.bifurcations import Bifurcation
 from designer.continuation import Branch
 from designer.plots import CONTACT, GRID, MUTED, new_figure, style
 from designer.survey import Survey
+from designer.sweep_titles import NAMES
 from designer.system import Array
 
 COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")

@@ -22,7 +22,7 @@ def show(answer: Mapping[str, Any], out: Path | None, reused: bool) -> None:
 def _sweep(answer: Mapping[str, Any]) -> None:
     console, name = _console(), answer["parameter"]
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
-    wide = [w for w in answer["windows"] if w["response"].count("-") == 2]
+    wide = answer["windows"]
     widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
     table = _table("Windows", "track", f"from{unit}", "to", "response", "symmetric", "steps")
     for w in sorted(widest, key=lambda w: (w["track"], w["from"])):
@@ -33,9 +33,12 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     if len(wide) > len(widest):
         _line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        table = _table("Bifurcation points", "kind", f"{name}{unit}", "from", "to")
+        table = _table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
         for p in answer["points"][:LONGEST]:
-            _row(table, p["kind"], f"{p['value']:.9g}", p["before"], p["after"])
+            branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
+            for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
+                first = ("", "") if k else (p["kind"], f"{p['value']:.9g}")
+                _row(table, *first, c["track"] or "-", c["text"])
         console.print(table)
 
 

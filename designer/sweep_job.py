@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from designer import __version__, basins, parameter_map, sweep, sweep_points
+from designer import __version__, basins, parameter_map, point_changes, sweep, sweep_points
 from designer.basins import BasinPlan
 from designer.catalog import load_catalog
 from designer.design_files import load
@@ -91,7 +91,7 @@ def answer(
     plan = plan_of(request, subject, modelfile)
     said = _provenance(modelfile, request, plan)
     if out is None:
-        made, _ = _make(plan, request, None, said, progress)
+        made, _ = _make(plan, request, modelfile.title, None, said, progress)
         return {**made, "cost": {**made["cost"], "seconds": time.perf_counter() - began}}, False
     folder = Folder(out)
     inputs = {
@@ -107,7 +107,7 @@ def answer(
     if todo:
         kept = None if folder.manifest is None else folder.manifest.provenance
         folder.begin(wanted, kept or said)
-        made, figure = _make(plan, request, folder.path, said, progress)
+        made, figure = _make(plan, request, modelfile.title, folder.path, said, progress)
         progress.stage("pictures")
         for name, content in _drawn(request.kind, figure()).items():
             folder.write(name, content)
@@ -332,7 +332,12 @@ def _names(kind: StageName, plan: Plan) -> list[str]:
 
 
 def _make(
-    plan: Plan, request: Request, root: Path | None, said: Mapping[str, Any], progress: Progress
+    plan: Plan,
+    request: Request,
+    name: str,
+    root: Path | None,
+    said: Mapping[str, Any],
+    progress: Progress,
 ) -> tuple[dict[str, Any], Callable[[], Any]]:
     """The JSON object, and what draws the picture."""
     from designer import bifurcation_plots
@@ -356,12 +361,18 @@ def _make(
             "tracks": list(plan.tracks),
             "steps": len(plan.values),
             "windows": [w.as_dict() for w in made.windows],
-            "points": [p.as_dict() for p in points],
+            "points": [
+                {
+                    **p.as_dict(),
+                    "changes": [c.as_dict() for c in point_changes.changes(made, p)],
+                }
+                for p in points
+            ],
         }
         cost = {"periods": made.periods}
         marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
         return plain({**head, **body, **tail, "cost": cost}), lambda: bifurcation_plots.diagram(
-            made, marks
+            made, marks, name
         )
     grid = None
     if root is not None:
@@ -375,7 +386,7 @@ def _make(
         mapped = parameter_map.run(plan, jobs, grid, step)
         body["counts"] = mapped.counts
         return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.parameter_map(
-            mapped
+            mapped, name
         )
     found = basins.run(plan, jobs, grid, step)
     body |= {
@@ -383,7 +394,9 @@ def _make(
         "attractors": [dict(a.__dict__) for a in found.attractors],
         "cells": [c.attractor for c in found.cells],
     }
-    return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.basins(found)
+    return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.basins(
+        found, name
+    )
 
 
 def _drawn(kind: StageName, figure: Any) -> dict[str, str | bytes]:
