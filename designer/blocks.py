@@ -7,9 +7,7 @@ it stopped and a longer one takes over what is there. A file appears whole or no
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from enum import StrEnum
@@ -19,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, get_type_hint
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from designer.errors import InputError
 from designer.verdict import BLOCK
+from designer.whole_file import appearing
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -121,21 +119,10 @@ class BlockStore(Generic[Row]):
         schema = self._schema.with_metadata({_KEY: json.dumps(said, sort_keys=True)})
         table = pa.Table.from_pylist([self._columns(row) for row in rows], schema=schema)
         path = self._root / name
-        partial = path.with_name(f".{path.name}.part")
-        try:
+        kept = "a place that can be written; finished blocks are kept: --resume goes on"
+        with appearing(path, "the block of samples", kept) as partial:
             path.parent.mkdir(exist_ok=True)
             pq.write_table(table, partial)
-            os.replace(partial, path)
-        except OSError as error:
-            raise InputError(
-                path,
-                "the block of samples",
-                os.strerror(error.errno) if error.errno else str(error),
-                "a place that can be written; finished blocks are kept: --resume goes on",
-            ) from None
-        finally:
-            with contextlib.suppress(OSError):
-                partial.unlink(missing_ok=True)
         self._found[name] = list(rows)
 
     def say_ignored(self) -> None:

@@ -23,6 +23,7 @@ from designer.manifest import OF_DESIGN, Manifest, Stage, State, grown, read_man
 from designer.manifest import StageName as StageName
 from designer.manifest import file_hash as file_hash
 from designer.manifest import read_json as read_json
+from designer.whole_file import partial_of
 
 MODEL = "model.toml"
 DESIGN = "design.json"
@@ -154,7 +155,7 @@ class Folder:
                 for left in (self / name).glob(f".{BLOCKS}.part"):
                     left.unlink(missing_ok=True)
             else:
-                _partial(self / name).unlink(missing_ok=True)
+                partial_of(self / name).unlink(missing_ok=True)
         manifest.provenance = provenance
         self.manifest = manifest
         self._save()
@@ -167,7 +168,7 @@ class Folder:
         path = self / name
         with _writing(path):
             path.parent.mkdir(exist_ok=True)
-            partial = _partial(path)
+            partial = partial_of(path)
             partial.write_bytes(data)
             os.replace(partial, path)
         self.manifest.files[name] = (stage, file_hash(name, data))
@@ -281,7 +282,7 @@ class Folder:
         assert self.manifest is not None
         path = self / MANIFEST
         with _writing(path):
-            partial = _partial(path)
+            partial = partial_of(path)
             with partial.open("w", encoding="ascii") as stream:
                 stream.write(dumps(self.manifest.as_dict()))
                 stream.flush()
@@ -302,11 +303,6 @@ class Folder:
         )
 
 
-def _partial(path: Path) -> Path:
-    """Where a file is written before it is put in its place."""
-    return path.with_name(f".{path.name}.part")
-
-
 def is_design_folder(path: Path) -> bool:
     """Whether there is a folder with a manifest."""
     return (path / MANIFEST).is_file()
@@ -316,7 +312,7 @@ def _check_free(path: Path) -> None:
     """InputError unless a folder can be made here, or an empty one is here."""
     if path.is_dir():
         try:
-            taken = any(p.name != _partial(path / MANIFEST).name for p in path.iterdir())
+            taken = any(p.name != partial_of(path / MANIFEST).name for p in path.iterdir())
         except OSError as error:
             raise _cannot_write(path, error) from None
         if taken:

@@ -7,7 +7,6 @@ results and command lines.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,11 +15,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from designer.errors import InputError
 from designer.report_data import ReportData
 from designer.report_facts import facts
 from designer.report_pictures import pictures
 from designer.report_tables import Table
+from designer.whole_file import write
 
 
 def write_report(data: ReportData, html: Path, markdown: Path) -> None:
@@ -32,14 +31,7 @@ def write_report(data: ReportData, html: Path, markdown: Path) -> None:
     """
     said = facts(data)
     for path, text in ((markdown, _markdown(said)), (html, _html(data, said))):
-        partial = path.with_name(f".{path.name}.part")
-        try:
-            partial.write_text(text, encoding="utf-8", newline="\n")
-            os.replace(partial, path)
-        except OSError as error:
-            raise InputError(
-                path, "--out", error.strerror or str(error), "a place that can be written"
-            ) from None
+        write(path, text)
 
 
 def render_html(data: ReportData) -> str:

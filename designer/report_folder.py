@@ -1,17 +1,13 @@
-"""A report's folder: files of others are left alone, and each file appears whole or not at all."""
+"""A report's folder: files of others are left alone."""
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 from collections.abc import Collection
 from pathlib import Path
 
 from designer.errors import InputError
-
-PART = ".part"
-"""Ends the name of a file that is being written."""
+from designer.whole_file import PART
 
 
 def check_ours(out: Path, names: Collection[str], data: str, command: str) -> None:
@@ -38,25 +34,6 @@ def check_ours(out: Path, names: Collection[str], data: str, command: str) -> No
         "a file that is not of an earlier report",
         "an empty folder, or one that this command made",
     )
-
-
-def write(path: Path, content: str | bytes) -> None:
-    """Write a file all at once.
-
-    Raises
-    ------
-    InputError : it cannot be written.
-    """
-    partial = path.with_name(f".{path.name}{PART}")
-    try:
-        partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
-        os.replace(partial, path)
-    except OSError as error:
-        expected = "a place that can be written"
-        raise InputError(path, "--out", error.strerror or str(error), expected) from None
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def _says(path: Path, command: str) -> bool:

@@ -38,11 +38,12 @@ from designer.paper_statements import (
 )
 from designer.plots import to_png, to_svg
 from designer.progress import Progress
-from designer.report_folder import check_ours, write
+from designer.report_folder import check_ours
 from designer.responses import scale_of
 from designer.survey import Survey, survey
 from designer.sweep_store import write_sweep
 from designer.sweep_subject import ModelSubject
+from designer.whole_file import write
 from designer.windows import Window, all_windows, outside
 
 FORMAT = 1

@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +31,7 @@ from designer.study_hash import study_hash
 from designer.tolerance_cases import OMEGA, TITLES, Case, cases, model_file
 from designer.tuning import tuned_block
 from designer.verdict import Answer, StudyPlan, Verdict, Yield
+from designer.whole_file import write
 
 FORMAT = 1
 SAMPLES, SEED = 250, 20260
@@ -120,13 +120,13 @@ def reproduce(
         if known is None:
             made = _case(case, min(short, samples), jobs, said)
             known = {"format": FORMAT, "key": keys[case.name], **made}
-            _write(folder / f"{case.name}.json", _json(known))
+            write(folder / f"{case.name}.json", _json(known))
         found.append(known)
     rows = tuple(Row(**row) for known in found for row in known["rows"])
     settings = {"samples": samples, "short": min(short, samples), "bands": Bands().as_dict()}
     source = provenance(model_file(), catalog.hash, seed=seed, settings=settings)
     for name, content in _files(found, rows, source, samples, seed).items():
-        _write(out / name, content)
+        write(out / name, content)
     return rows
 
 
@@ -265,16 +265,4 @@ def _made(folder: Path) -> None:
     except OSError as error:
         raise InputError(
             str(folder), "--out", error.strerror or str(error), "a place that can be written"
-        ) from None
-
-
-def _write(path: Path, content: bytes) -> None:
-    """The file appears whole or not at all."""
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        partial.write_bytes(content)
-        os.replace(partial, path)
-    except OSError as error:
-        raise InputError(
-            str(path), "--out", error.strerror or str(error), "a place that can be written"
         ) from None

@@ -6,10 +6,8 @@ all.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,12 +17,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from designer.errors import InputError
 from designer.orbit import OrbitStatus
 from designer.parameter_map import Cell
 from designer.steady import Steady
 from designer.sweep import Sweep
 from designer.system import Array
+from designer.whole_file import appearing
 
 FORMAT = 1
 RULES = 2
@@ -218,15 +216,7 @@ def write_rows(
     InputError : it cannot be written.
     """
     known = json.dumps({**said, "provenance": provenance}, sort_keys=True)
-    partial = path.with_name(f".{path.name}.part")
-    try:
+    with appearing(path) as partial:
         path.parent.mkdir(exist_ok=True)
         table = pa.Table.from_pylist([dict(r) for r in rows], schema=schema)
         pq.write_table(table.replace_schema_metadata({_KEY: known}), partial)
-        os.replace(partial, path)
-    except OSError as error:
-        expected = "a place that can be written"
-        raise InputError(path, "--out", error.strerror or str(error), expected) from None
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
