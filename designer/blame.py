@@ -127,7 +127,7 @@ class Blame:
             rows.append(row)
         cost = {"attractors": self.attractors, "orbits": self.orbits, "seconds": self.seconds}
         out = {"samples": self.samples, "seed": self.seed, "responses": rows, "cost": cost}
-        plain_out: dict[str, Any] = _finite(out)
+        plain_out: dict[str, Any] = plain(out)
         return plain_out
 
 
@@ -302,13 +302,3 @@ def _sentence(
     if margin.sought and 2 * margin.there > margin.sought:
         said.append("the response exists on most lost boards, but the start leads elsewhere")
     return "; ".join(said)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return str(value) if isinstance(value, Verdict) else value

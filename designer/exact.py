@@ -17,7 +17,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import draw_many
 from designer.system import Array, Drive, PiecewiseLinearSystem
-from designer.verdict import Answer, StudyPlan, judge
+from designer.verdict import Answer, StudyPlan, judge, kept
 
 
 def drive_of(excitation: Excitation) -> Drive:
@@ -76,12 +76,12 @@ def _asked(
             verdict=verdict,
             response=orbit.response,
             reason=reason,
-            radius=_kept(orbit.radius),
-            penetration=_kept(orbit.penetration),
-            miss=_kept(orbit.miss),
-            asymmetry=_kept(orbit.asymmetry),
+            radius=kept(orbit.radius),
+            penetration=kept(orbit.penetration),
+            miss=kept(orbit.miss),
+            asymmetry=kept(orbit.asymmetry),
             periods=orbit.periods,
-            waveform=_kept(waveform),
+            waveform=kept(waveform),
         )
         yield answer, orbit, boards
 
@@ -119,9 +119,3 @@ def _displacement(plan: StudyPlan, number: int) -> Array:
         return displacement(system, drive_of(question.excitation), question.start)
     except ArithmeticError:
         return np.zeros(0)
-
-
-def _kept(value: float) -> float:
-    """A margin to nine digits: its last few depend on how a process lies in memory (which loops of
-    the numerical libraries run), and equal studies are equal files."""
-    return float(f"{value:.9g}")

@@ -10,7 +10,7 @@ from typing import Any
 
 from designer import __version__, confirmation, hearing
 from designer.jsonout import plain
-from designer.verdict import StudyPlan
+from designer.verdict import StudyPlan, kept
 
 RULES = {"samples": 1, "ngspice": 2, "tuned": 2, "reached": 2}
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
@@ -51,7 +51,7 @@ def study_hash(
 def nine_digits(value: Any) -> Any:
     """JSON data with every number in it to nine digits."""
     if isinstance(value, float):
-        return float(f"{value:.9g}")
+        return kept(value)
     if isinstance(value, Mapping):
         return {key: nine_digits(v) for key, v in value.items()}
     return [nine_digits(v) for v in value] if isinstance(value, list | tuple) else value

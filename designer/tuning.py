@@ -25,7 +25,7 @@ from designer.reduction import FloatingCircuit, Reduction
 from designer.setting_search import MOST_TRIES, Case, seek
 from designer.spread import draw_many
 from designer.threads import parallel
-from designer.verdict import Answer, StudyPlan, Verdict, judge
+from designer.verdict import Answer, StudyPlan, Verdict, judge, kept
 
 __all__ = ["MOST_TRIES", "Bands", "Tuned", "tuned_block"]
 
@@ -191,9 +191,9 @@ def _columns(
         "offset": setting.offset,
         "tries": 0 if case is None else len(case.tries),
         "unanswered": 0 if case is None else case.unanswered,
-        "radius": _kept(radius),
-        "penetration": _kept(penetration),
-        "miss": _kept(miss),
+        "radius": kept(radius),
+        "penetration": kept(penetration),
+        "miss": kept(miss),
     }
 
 
@@ -247,8 +247,3 @@ def _on_bench(
             reason = f"not seen at {result.steps} settings"
             out.append((result, Verdict.LOST, answer.response, reason))
     return out
-
-
-def _kept(value: float) -> float:
-    """To nine digits, as the margins of an answer."""
-    return float(f"{value:.9g}")

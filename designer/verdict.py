@@ -152,3 +152,9 @@ def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
     if spec.symmetric and not orbit.symmetric:
         return Verdict.LOST, f"asymmetric by {orbit.asymmetry:.2g} of the peak"
     return Verdict.OK, ""
+
+
+def kept(value: float) -> float:
+    """A figure to nine digits: its last few depend on how a process lies in memory (which loops of
+    the numerical libraries run), and equal studies are equal files."""
+    return float(f"{value:.9g}")
