@@ -29,6 +29,7 @@ from designer.circuit import nominal_board
 from designer.deck import Excitation
 from designer.flow import Flow
 from designer.jsonout import dumps
+from designer.layers import Here, Samples
 from designer.modelfile import Expect, Response, read_model_file
 from designer.preconditions import cores
 from designer.reduction import Reduction
@@ -131,7 +132,8 @@ def memory(plan: StudyPlan, samples: int) -> float:
 
 def _memory(plan: StudyPlan, samples: int) -> float:
     asked = replace(plan, samples=samples)
-    kept = [exact.block(asked, block, cores()) for block in asked.blocks()]
+    tasks = (Samples(asked, block) for block in asked.blocks())
+    kept = [answers for _, answers in Here(cores()).run(tasks, lambda: None)]
     assert sum(len(answers) for answers in kept) == samples * len(plan.questions)
     # Not getrusage: what it tells of a new process includes the one that started it.
     status = Path("/proc/self/status").read_text(encoding="ascii")
@@ -150,10 +152,11 @@ def measure(
             began, spent = time.perf_counter(), time.process_time()
             verdicts: Counter[Verdict] = Counter()
             longest = 0
-            for block in replace(asked, samples=samples).blocks():
-                for answer in exact.block(asked, block, cores()):
-                    verdicts[answer.verdict] += 1
-                    longest = max(longest, answer.periods)
+            wanted = replace(asked, samples=samples)
+            tasks = (Samples(wanted, block) for block in wanted.blocks())
+            for _, answers in Here(cores()).run(tasks, lambda: None):
+                verdicts.update(answer.verdict for answer in answers)
+                longest = max(longest, *(answer.periods for answer in answers))
             seconds, cpu = time.perf_counter() - began, time.process_time() - spent
             rows.append(
                 Row(

@@ -16,6 +16,7 @@ from designer.blocks import BlockStore, Row
 from designer.hearing import Ask, Hearing
 from designer.reached import Reached, reached_block
 from designer.recipe import Recipe
+from designer.threads import parallel
 from designer.tuning import Tuned, tuned_block
 from designer.verdict import Answer, StudyPlan
 from designer.workers import SpicePool
@@ -37,14 +38,14 @@ class Runner(Protocol):
 
 
 class Here:
-    """This process, one task after the other, with ``jobs`` threads."""
+    """This process, with ``jobs`` threads a task. The next task begins before one is done: a block
+    ends with its slowest boards, on fewer threads than there are."""
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
 
     def run(self, tasks: Iterable[Task], step: Step) -> Iterator[tuple[int, Sequence[Any]]]:
-        for index, task in enumerate(tasks):
-            yield index, task(self.jobs, step)
+        yield from enumerate(parallel(lambda task: task(self.jobs, step), tasks, min(self.jobs, 2)))
 
 
 class Samples:
