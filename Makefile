@@ -7,6 +7,8 @@ PYTEST_ARGS ?=
 # Twice quiet: errors only.
 PIP := $(VENV)/bin/python -m pip -qq --no-input --disable-pip-version-check
 LOCK := requirements/constraints.txt
+# A file's tests share what they set up, so a file goes to one process.
+PARALLEL := --numprocesses auto --dist loadfile
 NEEDS_MORE := slow or kicad or browser or wheel or docs
 
 .PHONY: help env ngspice demo test check-all lint format bench reports lock clean
@@ -40,11 +42,11 @@ demo: env ngspice ## run the paper's example with 50 samples into out/paper
 	@find out/paper -type f | LC_ALL=C sort | sed 's/^/  /'
 
 test: env ngspice ## run the quick tests; a skipped test counts as failed
-	@$(VENV)/bin/python -m pytest --no-skips -m "not ($(NEEDS_MORE))" $(PYTEST_ARGS)
+	@$(VENV)/bin/python -m pytest $(PARALLEL) --no-skips -m "not ($(NEEDS_MORE))" $(PYTEST_ARGS)
 
 # The tests come last, so that the output ends with pytest's summary line.
 check-all: lint ngspice ## lint and run all the tests; a skipped test counts as failed
-	@$(VENV)/bin/python -m pytest --no-skips $(PYTEST_ARGS)
+	@$(VENV)/bin/python -m pytest $(PARALLEL) --no-skips $(PYTEST_ARGS)
 
 lint: env ## ruff check, ruff format --check, mypy --strict
 	@$(VENV)/bin/ruff check .
