@@ -12,7 +12,6 @@ from enum import StrEnum
 from typing import Any
 
 from designer.deck import Excitation
-from designer.exact import drive_of
 from designer.system import Drive
 
 SLOWER = 10
@@ -74,7 +73,7 @@ class Recipe:
     @property
     def drives(self) -> list[tuple[Drive, int]]:
         """The stages as the exact circuit sees them."""
-        return [(drive_of(excitation), periods) for excitation, periods in self.stages()]
+        return [(excitation.drive, periods) for excitation, periods in self.stages()]
 
     @property
     def sweep_seconds(self) -> float:

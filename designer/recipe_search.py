@@ -18,7 +18,6 @@ from designer.boards import Boards
 from designer.circuit import nominal_board
 from designer.deck import Excitation
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.reached import switched_on
 from designer.recipe import SLOWER, Recipe, Way
@@ -90,7 +89,7 @@ def highest_resonance(system: PiecewiseLinearSystem) -> float:
 def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
     as_built = sample.settle(
         range(BOARDS),
-        [drive_of(question.excitation)] * BOARDS,
+        [question.excitation.drive] * BOARDS,
         np.tile(question.start.start, (BOARDS, 1)),
         jobs=jobs,
     )

@@ -26,7 +26,6 @@ import numpy as np
 from designer.adjustment import AS_BUILT, Adjustment
 from designer.bands import Bands
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.system import Array
 from designer.verdict import Question, Verdict, judge
@@ -104,7 +103,7 @@ def seek(
             continue
         orbits = ensemble.settle(
             [case.board for case, _, _ in asked],
-            [drive_of(setting.of(case.question.excitation)) for case, setting, _ in asked],
+            [setting.of(case.question.excitation).drive for case, setting, _ in asked],
             np.array([start for _, _, start in asked]),
             jobs=jobs,
         )

@@ -19,7 +19,6 @@ from designer.bench import BenchResult, find_on_bench
 from designer.centring import centring_offset
 from designer.circuit import nominal_board
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.reduction import FloatingCircuit, Reduction
 from designer.setting_search import MOST_TRIES, Case, seek
@@ -226,7 +225,7 @@ def _on_bench(
         settled = ensemble.settle(
             [known[k].sample - indices.start for k in moved],
             [
-                drive_of(results[k].setting.of(plan.questions[known[k].question].excitation))
+                results[k].setting.of(plan.questions[known[k].question].excitation).drive
                 for k in moved
             ],
             np.array([results[k].state for k in moved]),

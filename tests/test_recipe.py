@@ -14,7 +14,6 @@ from designer.boards import Boards
 from designer.circuit import Resistor, nominal_board
 from designer.deck import Excitation
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.power_up import until_strobe
 from designer.reached import Reached, phases, reached_block, switched_on
@@ -208,7 +207,7 @@ def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
     for row in rows:
         board = draw(of.circuit, of.spread, of.seed, row.sample)
         system = Reduction(of.circuit, board).system()
-        drive = drive_of(direct.target)
+        drive = direct.target.drive
         met = until_strobe(system, drive, row.phase)
         assert met is not None
         run = Flow(system, drive).run(met[0], 900)

@@ -15,7 +15,6 @@ from designer.adjustment import AS_BUILT, Adjustment
 from designer.all_on_one import all_on_one
 from designer.bands import Bands
 from designer.circuit import Resistor
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import FloatingCircuit, Reduction
@@ -60,7 +59,7 @@ def test_a_constant_force_is_cured_at_the_first_try() -> None:
     ratio = 0.04
     board = shifted(p, ratio * asked.excitation.amplitude / lever, "U2C")
     boards = ensemble([board], p)
-    (lost,) = boards.settle([0], [drive_of(asked.excitation)], asked.start.start[None, :])
+    (lost,) = boards.settle([0], [asked.excitation.drive], asked.start.start[None, :])
     assert judge(lost, asked.spec, asked.start)[0] is Verdict.LOST
     case = Case(0, asked, ratio)
     seek(boards, [case], Bands())
@@ -102,9 +101,7 @@ def test_every_setting_found_lies_in_the_bands_and_works(
             continue
         asked = of.questions[row.question]
         board = draw(of.circuit, of.spread, of.seed, row.sample)
-        flow = Flow(
-            Reduction(of.circuit, board).system(), drive_of(row.setting.of(asked.excitation))
-        )
+        flow = Flow(Reduction(of.circuit, board).system(), row.setting.of(asked.excitation).drive)
         run = flow.run(asked.start.start, 900)
         found = period_counts(run.strobes, run.counts)
         assert found is not None
@@ -301,7 +298,7 @@ def test_what_the_search_misses_of_a_dense_grid(p: int, sigma: float, most: int)
             ]
             orbits = board.settle(
                 [0] * len(grid),
-                [drive_of(setting.of(asked.excitation)) for setting in grid],
+                [setting.of(asked.excitation).drive for setting in grid],
                 np.tile(asked.start.start, (len(grid), 1)),
                 jobs=2,
             )
