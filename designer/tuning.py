@@ -42,7 +42,8 @@ class Tuned:
     none was found, which is no proof that there is none. response, reason : there, or as
     built where nothing was found. frequency, amplitude, offset : the setting as fractions, see
     ``Adjustment``; zeros where the board works as built and where nothing was found. tries :
-    settings asked, unanswered of them without an answer. radius, penetration, miss : margins of
+    settings asked, unanswered of them without an answer; followed : orbits that were followed to
+    find some of them. radius, penetration, miss : margins of
     the orbit found (nan without one).
 
     bench_verdict : the exact circuit's, at the setting where the simulated person stopped;
@@ -61,6 +62,7 @@ class Tuned:
     offset: float
     tries: int
     unanswered: int
+    followed: int
     radius: float
     penetration: float
     miss: float
@@ -190,6 +192,7 @@ def _columns(
         "offset": setting.offset,
         "tries": 0 if case is None else len(case.tries),
         "unanswered": 0 if case is None else case.unanswered,
+        "followed": 0 if case is None else case.followed,
         "radius": kept(radius),
         "penetration": kept(penetration),
         "miss": kept(miss),
