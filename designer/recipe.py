@@ -36,8 +36,9 @@ class Recipe:
 
     steps : of the sweep, ``hold`` drive periods each, the one at ``first`` included; 0 without
     one. wait : drive periods at the target. omega : dimensionless frequency of the target.
-    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : sample
-    boards that show the response as built, of ``boards`` drawn. smooth, slower : whether a sweep
+    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : starts
+    of the ``able`` sample boards that show the response as built, of ``boards`` drawn. smooth,
+    slower : whether a sweep
     without steps, and one ``SLOWER`` times as slow, did as well.
     """
 
@@ -53,6 +54,7 @@ class Recipe:
     board_reached: int = 0
     board_trials: int = 0
     boards: int = 0
+    able: int = 0
     smooth: bool = False
     slower: bool = False
 
@@ -122,10 +124,13 @@ class Recipe:
             return
         tried = f"it worked from {self.reached} of {self.trials} switch-on phases"
         if self.board_trials:
-            tried += f", on {self.board_reached} of {self.board_trials} sample boards"
+            tried += (
+                f", and at {self.board_reached} of {self.board_trials} starts of "
+                f"{self.able} sample boards"
+            )
         yield tried
-        if 2 * self.board_trials < self.boards:
-            shows = self.board_trials or "none"
+        if 2 * self.able < self.boards:
+            shows = self.able or "none"
             yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"
 
     def _setting(self, at: Excitation) -> str:
@@ -156,6 +161,7 @@ class Recipe:
             "board_reached": self.board_reached,
             "board_trials": self.board_trials,
             "boards": self.boards,
+            "able": self.able,
             "smooth": self.smooth,
             "slower": self.slower,
             "text": self.text,
