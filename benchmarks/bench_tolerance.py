@@ -110,7 +110,7 @@ def plan_of(stage: str, most: int) -> StudyPlan:
 
 def brute(plan: StudyPlan, question: Question, boards: int) -> float:
     """CPU seconds a board: the general kernel for BRUTE_PERIODS, then the orbit it is on."""
-    drive = exact.drive_of(question.excitation)
+    drive = question.excitation.drive
     nominal = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
     describe(Flow(nominal, drive, fast=False), question.start.start, 1, np.eye(4))  # compiled code
     began = time.process_time()

@@ -14,7 +14,6 @@ import numpy as np
 
 from designer.adjustment import AS_BUILT, Adjustment
 from designer.bands import Bands
-from designer.exact import drive_of
 from designer.flow import Flow, FlowStatus
 from designer.system import Array, PiecewiseLinearSystem
 from designer.verdict import Question
@@ -105,7 +104,7 @@ class _Person:
         self.steps += 1
         wanted = self.question.spec.expect or self.question.start
         periods = wanted.n * max(-(-WATCHED // wanted.n), 3)
-        flow = Flow(self.system, drive_of(setting.of(self.question.excitation)))
+        flow = Flow(self.system, setting.of(self.question.excitation).drive)
         waited = flow.run(self.state, DWELL)
         shown = flow.run(waited.strobes[-1], periods, mode=waited.mode, points=POINTS)
         if {waited.status, shown.status} != {FlowStatus.DONE}:

@@ -22,17 +22,16 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from designer import margins as smooth
 from designer.boards import Boards
 from designer.circuit import Capacitor, Reference, Resistor, Section
 from designer.corners import Corner, worst_corners
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.jsonout import plain
 from designer.margin_indices import Index, sobol
 from designer.margins import Margin, Prediction
+from designer.proportion import wilson
 from designer.quantities import exact_in, quantities
 from designer.spread import draw_many
 from designer.verdict import Answer, StudyPlan, Verdict, judge
@@ -70,10 +69,7 @@ class Subject:
     @property
     def interval(self) -> tuple[float, float]:
         """Two-sided 95 % Wilson interval of the share."""
-        if not self.replayed:
-            return (0.0, 1.0)
-        ci = binomtest(self.avoided, self.replayed).proportion_ci(0.95, method="wilson")
-        return (float(ci.low), float(ci.high))
+        return wilson(self.avoided, self.replayed)
 
 
 @dataclass(frozen=True)
@@ -215,7 +211,7 @@ def _replay(
     out: list[list[Subject]] = [[] for _ in rows]
     samples = sorted({sample for _, sample, _ in tasks})
     place = {sample: k for k, sample in enumerate(samples)}
-    drives = [drive_of(q.excitation) for q in plan.questions]
+    drives = [q.excitation.drive for q in plan.questions]
     for name, kind, changed in _exact_ones(boards.take(samples)) if samples else ():
         orbits = Ensemble(changed).settle(
             [place[sample] for _, sample, _ in tasks],

@@ -28,14 +28,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.stats import norm
 
 from designer.hearing import BOUNDARY_SAMPLES, SLOW, Hearing, Kind, Why, distance
 from designer.orbit import OrbitStatus
+from designer.proportion import wilson
 from designer.verdict import Answer, Question, Verdict
 from designer.waveform_orbit import STROBE_TOLERANCE
-
-Z = float(norm.ppf(0.975))
 
 
 class Explanation(StrEnum):
@@ -108,20 +106,6 @@ class Combined:
     @property
     def width(self) -> float:
         return self.high - self.low
-
-
-def wilson(count: float, of: int) -> tuple[float, float]:
-    """Two-sided 95 % Wilson interval of count/of; ``count`` need not be whole."""
-    if of == 0:
-        return 0.0, 1.0
-    p, n, z2 = count / of, float(of), Z * Z
-    centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
-    half = Z * math.sqrt(max(p * (1.0 - p), 0.0) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
-    # At the ends the limit is exact, and the difference of equals only rounding.
-    return (
-        0.0 if count <= 0.0 else max(centre - half, 0.0),
-        1.0 if count >= n else min(centre + half, 1.0),
-    )
 
 
 def combine(

@@ -139,7 +139,7 @@ def _too_long(ask: Ask, way: float) -> Hearing:
 
 
 def _flow(subject: Subject) -> Flow:
-    return Flow(subject.system, exact.drive_of(subject.excitation))
+    return Flow(subject.system, subject.excitation.drive)
 
 
 def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:

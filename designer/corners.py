@@ -15,7 +15,6 @@ import numpy as np
 
 from designer.boards import Boards
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.margin_indices import Index
 from designer.margins import Margin
 from designer.quantities import column
@@ -72,7 +71,7 @@ def worst_corners(
         question = plan.questions[i]
         orbits = Ensemble(boards).settle(
             range(len(boards)),
-            [drive_of(question.excitation)] * len(boards),
+            [question.excitation.drive] * len(boards),
             np.tile(question.start.start, (len(boards), 1)),
             jobs=jobs,
             progress=progress,

@@ -9,7 +9,6 @@ import numpy as np
 
 from designer.boards import Boards
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.quantities import between
 from designer.verdict import Question, Verdict, judge
@@ -64,7 +63,7 @@ def crossings(
         ensemble = Ensemble(between(boards.take([which[k] for k in met]), share))
         found = ensemble.settle(
             range(len(met)),
-            [drive_of(questions[asked[k]].excitation) for k in met],
+            [questions[asked[k]].excitation.drive for k in met],
             np.array([orbits[k].start for k in met]),
             jobs=jobs,
             progress=progress,

@@ -6,23 +6,16 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from designer import ensemble
 from designer.circuit import nominal_board
 from designer.circuit_kernel import POINTS
-from designer.deck import Excitation
-from designer.ensemble import Ensemble
+from designer.ensemble import Ensemble, displacement
 from designer.flow import Flow
 from designer.gate import Subject
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import Reduction
 from designer.spread import draw_many
-from designer.system import Array, Drive, PiecewiseLinearSystem
+from designer.system import Array
 from designer.verdict import Answer, StudyPlan, judge, kept
-
-
-def drive_of(excitation: Excitation) -> Drive:
-    """The generator's setting as the exact circuit sees it (``Excitation`` says why the minus)."""
-    return excitation.drive
 
 
 def block(
@@ -53,7 +46,7 @@ def _asked(
     plan: StudyPlan, indices: range, jobs: int, progress: Callable[[], None]
 ) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
     boards = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs)
-    drives = [drive_of(q.excitation) for q in plan.questions]
+    drives = [q.excitation.drive for q in plan.questions]
     asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
     found = boards.respond(
         [i for i, _ in asked],
@@ -63,7 +56,9 @@ def _asked(
         progress=progress,
     )
     twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
-    wanted = [images(_displacement(plan, k), mirror=twins) for k in range(len(plan.questions))]
+    wanted = [
+        images(_nominal_displacement(plan, k), mirror=twins) for k in range(len(plan.questions))
+    ]
     for (i, number), response in zip(asked, found, strict=True):
         orbit, question = response.orbit, plan.questions[number]
         verdict, reason = judge(orbit, question.spec, question.start)
@@ -86,11 +81,6 @@ def _asked(
         yield answer, orbit, boards
 
 
-def displacement(system: PiecewiseLinearSystem, drive: Drive, orbit: Orbit) -> Array:
-    """(n · POINTS,) the first moving state over the n periods of an orbit."""
-    return ensemble.displacement(Flow(system, drive), orbit)
-
-
 def images(wanted: Array, *, mirror: bool = False) -> Array:
     """(k, n · POINTS) a displacement (n · POINTS,) from each of its n drive periods on.
 
@@ -111,11 +101,11 @@ def waveform_error(shown: Array, wanted: Array) -> float:
     return float(np.sqrt(square) / np.abs(wanted[0]).max())
 
 
-def _displacement(plan: StudyPlan, number: int) -> Array:
+def _nominal_displacement(plan: StudyPlan, number: int) -> Array:
     """Empty where the nominal circuit has no answer; then no board has a waveform error."""
     question = plan.questions[number]
     system = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
     try:
-        return displacement(system, drive_of(question.excitation), question.start)
+        return displacement(Flow(system, question.excitation.drive), question.start)
     except ArithmeticError:
         return np.zeros(0)

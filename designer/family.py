@@ -13,7 +13,6 @@ from typing import Any
 
 from designer.deck import Excitation
 from designer.errors import InputError
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.responses import FASTEST, SLOWEST
@@ -110,6 +109,6 @@ def of_board(system: PiecewiseLinearSystem, excitation: Excitation, parameter: s
         raise InputError(None, "over", parameter, f"one of {', '.join(SETTINGS)}")
 
     def build(value: float) -> Flow:
-        return Flow(system, drive_of(replace(excitation, **{parameter: value})), fast=False)
+        return Flow(system, replace(excitation, **{parameter: value}).drive, fast=False)
 
     return Family(parameter, *SETTINGS[parameter], build)

@@ -7,13 +7,14 @@ becomes negative:
 - for each stop, every local maximum of the displacement past it, and every local minimum inside a
   contact, with the sign it has on the wanted orbit: the depth of a contact, the distance of a miss;
 - with the monodromy matrix M and its multipliers μ: det(I + M) (period doubling), Π(1 - μi μj) over
-  the pairs (torus), and det(I - M)² (fold: the square falls linearly towards it). The last is left
-  out for a symmetric orbit, which may pass a pitchfork and keep its n-p-q.
+  the pairs (torus), and det(I - M)·|det(I - M)| (fold: the square falls linearly towards it, and
+  the sign is that of stability). The last is left out for a symmetric orbit, which may pass a
+  pitchfork and keep its n-p-q.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,11 +42,15 @@ class Extreme:
 
 @dataclass(frozen=True)
 class Followed:
-    """An orbit of ``periods`` drive periods: its extremes and functions of its multipliers."""
+    """An orbit of ``periods`` drive periods: its extremes and functions of its multipliers.
+
+    start : (states,) at a strobe.
+    """
 
     extremes: tuple[Extreme, ...]
     stability: dict[str, float]
     periods: int
+    start: Array
 
 
 @dataclass(frozen=True)
@@ -79,16 +84,29 @@ class Function:
             return None
         if self.extreme is None:
             return orbit.stability[self.kind]
+        same = self._same(orbit)
+        if same is None:
+            return None
+        return same.value if self.extreme.value > 0.0 else -same.value
+
+    def moved_to(self, orbit: Followed) -> Function:
+        """The same function, to be looked for from this orbit on at its extreme's time there."""
+        same = None if self.extreme is None else self._same(orbit)
+        if self.extreme is None or same is None:
+            return self
+        return replace(self, extreme=replace(self.extreme, time=same.time))
+
+    def _same(self, orbit: Followed) -> Extreme | None:
+        """Its extreme on another orbit."""
         own, half = self.extreme, 0.5 * orbit.periods
+        assert own is not None
         met = [
             (abs((e.time - own.time + half) % orbit.periods - half), e)
             for e in orbit.extremes
             if e.stop == own.stop and e.top == own.top
         ]
         away, same = min(met, key=lambda pair: pair[0], default=(np.inf, own))
-        if away > SHIFT:
-            return None
-        return same.value if own.value > 0.0 else -same.value
+        return None if away > SHIFT else same
 
 
 def follow(flow: Flow, start: Array, periods: int) -> Followed | None:
@@ -97,7 +115,7 @@ def follow(flow: Flow, start: Array, periods: int) -> Followed | None:
     if found is None:
         return None
     x, monodromy = found
-    return Followed(_extremes(flow, x, periods), _stability(monodromy), periods)
+    return Followed(_extremes(flow, x, periods), _stability(monodromy), periods, x)
 
 
 def functions(orbit: Followed, symmetric: bool) -> tuple[Function, ...]:
@@ -120,14 +138,23 @@ def functions(orbit: Followed, symmetric: bool) -> tuple[Function, ...]:
     return tuple(out)
 
 
+def valleys(orbit: Followed) -> tuple[Function, ...]:
+    """How far the displacement falls back between two contacts: where one of these becomes
+    negative, the two contacts are one."""
+    return tuple(
+        Function("valley", -e.value, e) for e in orbit.extremes if not e.top and e.value < 0.0
+    )
+
+
 def _stability(monodromy: Array) -> dict[str, float]:
     one = np.eye(len(monodromy))
     mu = np.linalg.eigvals(monodromy).astype(complex)
     pairs = np.triu_indices(len(mu), 1)
+    fold = float(np.linalg.det(one - monodromy))
     return {
         "doubling": float(np.linalg.det(one + monodromy)),
         "torus": float(np.prod(1.0 - np.outer(mu, mu)[pairs]).real),
-        "fold": float(np.linalg.det(one - monodromy)) ** 2,
+        "fold": fold * abs(fold),
     }
 
 

@@ -26,7 +26,6 @@ from designer.boards import Boards
 from designer.circuit import Circuit, nominal_board
 from designer.crossings import Crossing, crossings
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.followed import Followed, Function, follow, functions
 from designer.orbit import SYMMETRY_TOLERANCE, Orbit
@@ -177,7 +176,7 @@ class _Base:
 
     @property
     def drive(self) -> Drive:
-        return drive_of(self.question.excitation)
+        return self.question.excitation.drive
 
     @property
     def symmetric(self) -> bool:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit, failed
 from designer.power_up import Arrival, follow
 from designer.recipe import Recipe
@@ -89,7 +88,7 @@ def switched_on(
     settled = iter(
         ensemble.settle(
             [board for (board, *_), _ in there],
-            [drive_of(recipe.target) for (_, _, recipe, _), _ in there],
+            [recipe.target.drive for (_, _, recipe, _), _ in there],
             np.array([met.state for _, met in there]),
             jobs=jobs,
         )

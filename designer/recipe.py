@@ -12,7 +12,6 @@ from enum import StrEnum
 from typing import Any
 
 from designer.deck import Excitation
-from designer.exact import drive_of
 from designer.system import Drive
 
 SLOWER = 10
@@ -37,8 +36,9 @@ class Recipe:
 
     steps : of the sweep, ``hold`` drive periods each, the one at ``first`` included; 0 without
     one. wait : drive periods at the target. omega : dimensionless frequency of the target.
-    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : sample
-    boards that show the response as built, of ``boards`` drawn. smooth, slower : whether a sweep
+    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : starts
+    of the ``able`` sample boards that show the response as built, of ``boards`` drawn. smooth,
+    slower : whether a sweep
     without steps, and one ``SLOWER`` times as slow, did as well.
     """
 
@@ -54,6 +54,7 @@ class Recipe:
     board_reached: int = 0
     board_trials: int = 0
     boards: int = 0
+    able: int = 0
     smooth: bool = False
     slower: bool = False
 
@@ -74,7 +75,7 @@ class Recipe:
     @property
     def drives(self) -> list[tuple[Drive, int]]:
         """The stages as the exact circuit sees them."""
-        return [(drive_of(excitation), periods) for excitation, periods in self.stages()]
+        return [(excitation.drive, periods) for excitation, periods in self.stages()]
 
     @property
     def sweep_seconds(self) -> float:
@@ -123,10 +124,13 @@ class Recipe:
             return
         tried = f"it worked from {self.reached} of {self.trials} switch-on phases"
         if self.board_trials:
-            tried += f", on {self.board_reached} of {self.board_trials} sample boards"
+            tried += (
+                f", and at {self.board_reached} of {self.board_trials} starts of "
+                f"{self.able} sample boards"
+            )
         yield tried
-        if 2 * self.board_trials < self.boards:
-            shows = self.board_trials or "none"
+        if 2 * self.able < self.boards:
+            shows = self.able or "none"
             yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"
 
     def _setting(self, at: Excitation) -> str:
@@ -157,6 +161,7 @@ class Recipe:
             "board_reached": self.board_reached,
             "board_trials": self.board_trials,
             "boards": self.boards,
+            "able": self.able,
             "smooth": self.smooth,
             "slower": self.slower,
             "text": self.text,

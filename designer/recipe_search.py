@@ -2,15 +2,16 @@
 
 Each is tried on the nominal circuit and on sample boards of its own, from discharged
 capacitors, with phases of the generator that fill the circle. The first that always worked is
-taken, else the one that worked most often. Its sweep is then tried without steps, and
-slower: what a person does with a generator.
+taken. Where none did, all are tried on the same starts: the simplest of those that no other beats
+by more than chance is taken. Its sweep is then tried without steps, and slower: what a person does
+with a generator.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from designer.boards import Boards
 from designer.circuit import nominal_board
 from designer.deck import Excitation
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.reached import switched_on
 from designer.recipe import SLOWER, Recipe, Way
@@ -28,8 +28,10 @@ from designer.verdict import Question, StudyPlan, Verdict, judge
 
 TRIALS = 12
 """Phases at which the nominal circuit is switched on."""
-BOARDS = 6
-"""Sample boards that a recipe is tried on, once each."""
+BOARDS = 24
+"""Sample boards that a recipe is tried on, if they show the response as built."""
+STARTS = 3
+"""Phases from which each of them is switched on."""
 TRIAL = "recipe:"
 """Stream of those boards."""
 STEP = 0.01
@@ -87,64 +89,107 @@ def highest_resonance(system: PiecewiseLinearSystem) -> float:
     return float(np.abs(poles.imag).max()) / (2.0 * math.pi)
 
 
+@dataclass(frozen=True)
+class _Trials:
+    """A recipe with what became of its starts: on the nominal circuit, and on each able board."""
+
+    recipe: Recipe
+    nominal: tuple[bool, ...] = ()
+    boards: tuple[bool, ...] = ()
+
+    @property
+    def certain(self) -> bool:
+        return all(self.nominal) and all(self.boards)
+
+    @property
+    def starts(self) -> tuple[bool, ...]:
+        return (*self.nominal, *self.boards)
+
+    def beaten_by(self, other: _Trials) -> bool:
+        """Whether the other one works more often, by a standard error of the difference or more:
+        of the starts that one of the two fails at and the other does not, in √ of their number."""
+        pairs = list(zip(self.starts, other.starts, strict=True))
+        worse, better = pairs.count((False, True)), pairs.count((True, False))
+        return worse > better and worse - better >= math.sqrt(worse + better)
+
+    @property
+    def counted(self) -> Recipe:
+        return replace(
+            self.recipe,
+            reached=sum(self.nominal),
+            trials=len(self.nominal),
+            board_reached=sum(self.boards),
+            board_trials=len(self.boards),
+        )
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """Where the recipes of a question are tried. able : sample boards that show it as built."""
+
+    question: Question
+    nominal: Ensemble
+    sample: Ensemble
+    able: tuple[int, ...]
+    jobs: int
+
+    def on_nominal(self, trials: _Trials) -> _Trials:
+        starts = [(0, self.question, trials.recipe, phase(k)) for k in range(TRIALS)]
+        return replace(trials, nominal=self._worked(self.nominal, starts))
+
+    def on_boards(self, trials: _Trials, each: int = STARTS) -> _Trials:
+        """``each`` : phases for each board; with fewer, the first ones."""
+        starts = [
+            (i, self.question, trials.recipe, phase(STARTS * i + k))
+            for k in range(each)
+            for i in self.able
+        ]
+        return replace(trials, boards=self._worked(self.sample, starts))
+
+    def _worked(
+        self, ensemble: Ensemble, starts: Sequence[tuple[int, Question, Recipe, float]]
+    ) -> tuple[bool, ...]:
+        ended = switched_on(ensemble, starts, self.jobs)
+        return tuple(e.verdict is Verdict.OK for e in ended)
+
+
 def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
     as_built = sample.settle(
         range(BOARDS),
-        [drive_of(question.excitation)] * BOARDS,
+        [question.excitation.drive] * BOARDS,
         np.tile(question.start.start, (BOARDS, 1)),
         jobs=jobs,
     )
     able = [i for i, o in enumerate(as_built) if judge(o, question.spec, question.start)[0] == "ok"]
-    tried = []
+    bench = _Bench(question, nominal, sample, tuple(able), jobs)
+    tried: list[_Trials] = []
     for option in candidates(question, nominal.reduction(0).system()):
-        known = _on_nominal(replace(option, boards=BOARDS), question, nominal, jobs)
-        if known.rate == 1.0:
-            known = _on_boards(known, question, sample, able, jobs)
-            if known.rate == 1.0:
-                return _by_hand(known, question, nominal, sample, able, jobs)
+        known = bench.on_nominal(_Trials(replace(option, boards=BOARDS, able=len(able))))
+        if all(known.nominal):
+            known = bench.on_boards(known)
+            if known.certain:
+                return _by_hand(known, bench)
         tried.append(known)
-    # None is certain: then all are tried on the boards, and the one that did best is taken.
-    whole = [
-        t if t.reached == t.trials else _on_boards(t, question, sample, able, jobs) for t in tried
-    ]
-    best = max(whole, key=lambda recipe: recipe.rate)
-    return _by_hand(best, question, nominal, sample, able, jobs)
+    whole = [t if t.boards else bench.on_boards(t) for t in tried]
+    best = max(whole, key=lambda trials: sum(trials.starts))
+    return _by_hand(next(t for t in whole if not t.beaten_by(best)), bench)
 
 
-def _by_hand(
-    recipe: Recipe,
-    question: Question,
-    nominal: Ensemble,
-    sample: Ensemble,
-    able: Sequence[int],
-    jobs: int,
-) -> Recipe:
-    """The recipe with how freely its sweep may be done: without steps, and slower."""
+def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
+    """The recipe with how freely its sweep may be done: without steps, and slower. These are tried
+    from one phase of each board."""
+    recipe = trials.counted
     if recipe.way is Way.DIRECT:
         return recipe
+    first = trials.boards[: len(bench.able)]
 
     def as_well(other: Recipe) -> bool:
-        met = _on_boards(_on_nominal(other, question, nominal, jobs), question, sample, able, jobs)
-        return met.reached >= recipe.reached and met.board_reached >= recipe.board_reached
+        met = bench.on_boards(bench.on_nominal(_Trials(other)), 1)
+        return sum(met.nominal) >= sum(trials.nominal) and sum(met.boards) >= sum(first)
 
     smooth = as_well(recipe.refined())
     slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)
     return replace(recipe, smooth=smooth, slower=as_well(slow))
-
-
-def _on_nominal(recipe: Recipe, question: Question, nominal: Ensemble, jobs: int) -> Recipe:
-    ended = switched_on(nominal, [(0, question, recipe, phase(k)) for k in range(TRIALS)], jobs)
-    reached = sum(e.verdict is Verdict.OK for e in ended)
-    return replace(recipe, reached=reached, trials=len(ended))
-
-
-def _on_boards(
-    recipe: Recipe, question: Question, sample: Ensemble, able: Sequence[int], jobs: int
-) -> Recipe:
-    starts = [(i, question, recipe, phase(i)) for i in able]
-    ended = switched_on(sample, starts, jobs)
-    reached = sum(e.verdict is Verdict.OK for e in ended)
-    return replace(recipe, board_reached=reached, board_trials=len(ended))
 
 
 def phase(number: int) -> float:

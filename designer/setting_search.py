@@ -9,10 +9,11 @@ one works:
 3. halfway between two settings of which one has too few impacts on a stop and the other not, from
    the nominal orbit and then from the attractor of the better one (as on the bench, where the
    state carries over);
-4. eight settings that fill the band, centred, and halving again;
-5. 24 settings that fill the band of all three, from the nominal orbit, and halving again.
+4. what a path from the nominal board leads to, which follows the wanted orbit and keeps the setting
+   in the middle of its window (``designer.window_path``); then a second and a third path.
 
-Nothing is random, and no board is asked more than ``MOST_TRIES`` times.
+Nothing is random. No board is asked more than ``MOST_TRIES`` times, and no more than
+``MOST_FOLLOWED`` orbits are followed for it.
 """
 
 from __future__ import annotations
@@ -23,21 +24,27 @@ from itertools import combinations
 
 import numpy as np
 
+from designer import window_path
 from designer.adjustment import AS_BUILT, Adjustment
 from designer.bands import Bands
+from designer.boards import Boards
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.system import Array
+from designer.threads import parallel
 from designer.verdict import Question, Verdict, judge
+from designer.window_path import Trail, find_window
 
-AT_ONCE = 8
-"""Settings that are asked before the search looks at what came back, in rounds 2, 4 and 5."""
 HALVED = 4
 """Pairs of settings halved at once."""
 APART = 0.02
 """Of the half-bands: settings nearer than this are one."""
-MOST_TRIES = 1 + 8 + 2 * HALVED + AT_ONCE + 2 * HALVED + 3 * AT_ONCE + 2 * HALVED
+PATHS = (0.0, 0.5, -0.5)
+"""Half-bands of DC offset at which the paths set out."""
+SPOTS = 3
+"""Settings of a path that are asked, at most: those deepest inside the window."""
+MOST_TRIES = (1 + 8 + 2 * HALVED) + len(PATHS) * SPOTS
+MOST_FOLLOWED = len(PATHS) * window_path.MOST_FOLLOWED
 
 
 @dataclass(frozen=True)
@@ -59,13 +66,15 @@ class Try:
 class Case:
     """One board, by its place in the ensemble, and one response that it does not show as built.
 
-    centre : the DC offset that centres the board, over the amplitude.
+    centre : the DC offset that centres the board, over the amplitude. followed : orbits that were
+    followed on paths to it.
     """
 
     board: int
     question: Question
     centre: float
     tries: list[Try] = field(default_factory=list)
+    followed: int = 0
 
     @property
     def found(self) -> Try | None:
@@ -93,18 +102,15 @@ def seek(
     ensemble: Ensemble, cases: Sequence[Case], bands: Bands, *, jobs: int = 1
 ) -> Sequence[Case]:
     """Ask every case in rounds until it works or the rounds are over; fills in the tries."""
-    for propose in _rounds(bands):
-        asked = [
-            (case, setting, start)
-            for case in cases
-            if case.found is None
-            for setting, start in propose(case)
-        ]
+    for propose in _rounds(ensemble.boards, bands):
+        left = [case for case in cases if case.found is None]
+        proposed = zip(left, parallel(propose, left, jobs), strict=True)
+        asked = [(case, setting, start) for case, some in proposed for setting, start in some]
         if not asked:
             continue
         orbits = ensemble.settle(
             [case.board for case, _, _ in asked],
-            [drive_of(setting.of(case.question.excitation)) for case, setting, _ in asked],
+            [setting.of(case.question.excitation).drive for case, setting, _ in asked],
             np.array([start for _, _, start in asked]),
             jobs=jobs,
         )
@@ -117,53 +123,54 @@ def seek(
 Round = Callable[[Case], list[Asked]]
 
 
-def _rounds(bands: Bands) -> list[Round]:
-    def listed(points: Array, centred: bool) -> Round:
-        """Points (k, 2 or 3) of the box ± 1 as settings, from the nominal orbit."""
+def _rounds(boards: Boards, bands: Bands) -> list[Round]:
+    def centred(points: Sequence[tuple[float, float]]) -> Round:
+        """Frequency and amplitude in half-bands as settings, from the nominal orbit."""
 
         def propose(case: Case) -> list[Asked]:
             settings = [
-                Adjustment(
-                    bands.frequency * float(point[0]),
-                    bands.amplitude * float(point[1]),
-                    case.centre if centred else bands.offset * float(point[2]),
-                ).within(bands)
-                for point in points
+                Adjustment(bands.frequency * f, bands.amplitude * a, case.centre).within(bands)
+                for f, a in points
             ]
-            start = case.question.start.start
-            return [(s, start) for s in _new(case, settings, bands)]
+            return [(s, case.question.start.start) for s in _new(case, settings, bands)]
 
         return propose
 
     def halved(follow: bool) -> Round:
         return lambda case: _halfway(case, bands, follow)
 
+    def path(first: float) -> Round:
+        def propose(case: Case) -> list[Asked]:
+            trail = find_window(boards.take([case.board]), case.question, bands, first)
+            case.followed += trail.followed
+            return [(s, case.question.start.start) for s in _deepest(trail, case, bands)]
+
+        return propose
+
     edge = (-1.0, 0.0, 1.0)
-    frame = np.array([(f, a) for a in edge for f in edge if (f, a) != (0.0, 0.0)])
-    filling, all_three = filled(AT_ONCE, 2), filled(3 * AT_ONCE, 3)
-    halving = [halved(False), halved(True)]
+    frame = [(f, a) for a in edge for f in edge if (f, a) != (0.0, 0.0)]
     return [
-        listed(np.zeros((1, 2)), True),
-        listed(frame, True),
-        *halving,
-        listed(filling, True),
-        *halving,
-        *(listed(all_three[i : i + AT_ONCE], False) for i in range(0, 3 * AT_ONCE, AT_ONCE)),
-        *halving,
+        centred([(0.0, 0.0)]),
+        centred(frame),
+        halved(False),
+        halved(True),
+        *map(path, PATHS),
     ]
 
 
-def filled(count: int, dimensions: int) -> Array:
-    """(count, dimensions) points that fill the box ± 1 evenly, however many are taken.
+def _deepest(trail: Trail, case: Case, bands: Bands) -> list[Adjustment]:
+    """Settings of a path, the one deepest inside the window first, and none twice.
 
-    The additive recurrence with the powers of the root of x^(d+1) = x + 1 (M. Roberts, "The
-    unreasonable effectiveness of quasirandom sequences", 2018).
+    A window may be smaller than ``APART``, so a setting is left out only where the very same was
+    tried.
     """
-    root = 1.0
-    for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (dimensions + 1))
-    steps = root ** -np.arange(1.0, dimensions + 1.0)
-    return np.asarray(2.0 * ((0.5 + np.outer(np.arange(1, count + 1), steps)) % 1.0) - 1.0)
+    known = [AS_BUILT, *(t.setting for t in case.tries)]
+    chosen: list[Adjustment] = []
+    for spot in sorted(trail.spots, key=lambda spot: -spot.radius):
+        here = spot.setting
+        if here not in known and all(_distance(here, s, bands) > APART for s in chosen):
+            chosen.append(here)
+    return chosen[:SPOTS]
 
 
 def _halfway(case: Case, bands: Bands, follow: bool) -> list[Asked]:

@@ -105,6 +105,7 @@ def tuned_json(rows: Sequence[Tuned]) -> dict[str, Any] | None:
         **_counted(count(rows)),
         "tries": sum(r.tries for r in rows),
         "unanswered": sum(r.unanswered for r in rows),
+        "followed": sum(r.followed for r in rows),
         "reasons": _reasons(rows),
         "bench": {
             **_counted(found),

@@ -12,7 +12,6 @@ import numpy as np
 from designer.deck import Excitation
 from designer.design import Design
 from designer.errors import InputError
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.pipeline import nominal_reduction
@@ -130,7 +129,7 @@ class BoardSubject:
         """One for each set of changes, the others as they stand."""
         out = []
         for change in changes:
-            drive = drive_of(self.excitation(change))
+            drive = self.excitation(change).drive
             out.append(
                 Setting(lambda d=drive: Flow(self.system, d), drive.period)  # type: ignore[misc]
             )

@@ -11,7 +11,6 @@ from designer.catalog import Catalog
 from designer.circuit import Circuit, nominal_board
 from designer.coefficients import coefficient_errors
 from designer.deck import Excitation
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.modelfile import ModelFile, parse_model_file
 from designer.orbit import Orbit
@@ -162,7 +161,7 @@ def _questions(
     questions: dict[int, Question] = {}
     missing: dict[int, str] = {}
     for p, response, excitation in zip(OMEGA, found, settings, strict=True):
-        orbit: Orbit = settle(Flow(system, drive_of(excitation)), response.orbit.start * volts)
+        orbit: Orbit = settle(Flow(system, excitation.drive), response.orbit.start * volts)
         if judge(orbit, response.spec, orbit)[0] is Verdict.OK:
             questions[p] = Question(response.spec, excitation, orbit, None)
         else:

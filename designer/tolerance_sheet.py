@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from designer.plots import INK, MUTED, new_figure, styled
+from designer.proportion import wilson
 from designer.setting_search import MOST_TRIES
 from designer.tolerance_cases import OMEGA, REFERENCE, TITLES
 
@@ -151,8 +152,8 @@ def _blame_lines(found: Mapping[str, Any] | None, rows: Sequence[Row]) -> list[s
 
 def _widest(samples: int) -> float:
     """Width of Wilson's interval at one half."""
-    z2 = 1.959964**2
-    return float(np.sqrt(z2 / samples + z2**2 / samples**2) / (1.0 + z2 / samples))
+    low, high = wilson(0.5 * samples, samples)
+    return high - low
 
 
 def _cases(rows: Sequence[Row]) -> list[tuple[float, float, bool]]:

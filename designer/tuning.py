@@ -19,7 +19,6 @@ from designer.bench import BenchResult, find_on_bench
 from designer.centring import centring_offset
 from designer.circuit import nominal_board
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.orbit import Orbit
 from designer.reduction import FloatingCircuit, Reduction
 from designer.setting_search import MOST_TRIES, Case, seek
@@ -43,7 +42,8 @@ class Tuned:
     none was found, which is no proof that there is none. response, reason : there, or as
     built where nothing was found. frequency, amplitude, offset : the setting as fractions, see
     ``Adjustment``; zeros where the board works as built and where nothing was found. tries :
-    settings asked, unanswered of them without an answer. radius, penetration, miss : margins of
+    settings asked, unanswered of them without an answer; followed : orbits that were followed to
+    find some of them. radius, penetration, miss : margins of
     the orbit found (nan without one).
 
     bench_verdict : the exact circuit's, at the setting where the simulated person stopped;
@@ -62,6 +62,7 @@ class Tuned:
     offset: float
     tries: int
     unanswered: int
+    followed: int
     radius: float
     penetration: float
     miss: float
@@ -191,6 +192,7 @@ def _columns(
         "offset": setting.offset,
         "tries": 0 if case is None else len(case.tries),
         "unanswered": 0 if case is None else case.unanswered,
+        "followed": 0 if case is None else case.followed,
         "radius": kept(radius),
         "penetration": kept(penetration),
         "miss": kept(miss),
@@ -226,7 +228,7 @@ def _on_bench(
         settled = ensemble.settle(
             [known[k].sample - indices.start for k in moved],
             [
-                drive_of(results[k].setting.of(plan.questions[known[k].question].excitation))
+                results[k].setting.of(plan.questions[known[k].question].excitation).drive
                 for k in moved
             ],
             np.array([results[k].state for k in moved]),

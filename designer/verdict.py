@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from scipy.stats import binomtest
-
 from designer.circuit import Circuit
 from designer.deck import Excitation, SolverSettings
 from designer.modelfile import Response
 from designer.orbit import Orbit, OrbitStatus
+from designer.proportion import wilson
 from designer.spread import Spread
 
 BLOCK = 250
@@ -96,10 +95,7 @@ class Yield:
     @property
     def interval(self) -> tuple[float, float]:
         decided = self.samples - self.failed
-        if not decided:
-            return (0.0, 1.0)
-        ci = binomtest(self.ok, decided).proportion_ci(0.95, method="wilson")
-        return (float(ci.low), float(ci.high))
+        return wilson(self.ok, decided)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from designer.circuit import nominal_board
 from designer.deck import Excitation
 from designer.ensemble import Ensemble
 from designer.errors import InputError
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.orbit import Orbit
 from designer.reduction import Reduction
@@ -283,8 +282,8 @@ class _Walk:
         """The generator at this ω or b."""
         e, ratio = self.question.excitation, value / self.used
         if self.over == "b":
-            return drive_of(Excitation(e.frequency, e.amplitude / ratio, e.offset))
-        return drive_of(Excitation(e.frequency * ratio, e.amplitude, e.offset))
+            return Excitation(e.frequency, e.amplitude / ratio, e.offset).drive
+        return Excitation(e.frequency * ratio, e.amplitude, e.offset).drive
 
     def window(self) -> tuple[tuple[float, float], tuple[bool, bool]]:
         """Edges of the window around the setting in use; whether each is only the search's end."""

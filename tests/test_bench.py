@@ -11,7 +11,6 @@ from designer import bench
 from designer.adjustment import AS_BUILT, Adjustment
 from designer.bands import Bands
 from designer.bench import find_on_bench
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.modelfile import Expect
 from designer.reduction import Reduction
@@ -64,7 +63,7 @@ def test_a_constant_force_is_found_and_cancelled(ratio: float) -> None:
     assert found.seen
     assert 1 < found.steps <= 1 + bench.CENTRING_STEPS
     assert found.setting.offset == pytest.approx(ratio, abs=0.012)
-    flow = Flow(system, drive_of(found.setting.of(asked.excitation)))
+    flow = Flow(system, found.setting.of(asked.excitation).drive)
     counts = flow.run(found.state, 3).counts.sum(axis=(0, 1))
     assert counts.tolist() == [3 * p, 3 * p]
 

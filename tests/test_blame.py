@@ -14,7 +14,7 @@ from designer.boards import Boards
 from designer.circuit import nominal_board
 from designer.corners import worst_corners
 from designer.crossings import crossings
-from designer.exact import block, drive_of
+from designer.exact import block
 from designer.flow import Flow
 from designer.followed import Function, follow, functions
 from designer.laws import Uniform
@@ -135,7 +135,7 @@ def test_a_function_follows_the_orbit_past_a_grazing() -> None:
     values = []
     watched: Function | None = None
     for factor in (1.0, 0.98, 0.96, 0.94):
-        drive = drive_of(subject.excitation)
+        drive = subject.excitation.drive
         flow = Flow(subject.system, replace(drive, amplitude=factor * drive.amplitude))
         orbit = follow(flow, subject.orbit.start, 1)
         if watched is None:
@@ -180,7 +180,7 @@ def test_a_crossing_is_where_the_response_ends_along_the_line() -> None:
         for at in np.linspace(0.0, share, 24)[1:]:
             moved = with_column(nominal, q, np.array([40e-3 * at]))
             system = Reduction(circuit, moved.board(0)).system()
-            orbit = settle(Flow(system, drive_of(question.excitation)), orbit.start)
+            orbit = settle(Flow(system, question.excitation.drive), orbit.start)
         return judge(orbit, question.spec, question.start)[0] is Verdict.OK
 
     assert kept(met.inside)
@@ -211,7 +211,7 @@ def test_a_replay_says_what_a_board_with_that_part_exact_does() -> None:
         for sample in lost:
             board = draw_many(study.circuit, OFFSETS, 5, range(sample, sample + 1)).board(0)
             board = replace(board, offset={**board.offset, name: 0.0})
-            flow = Flow(Reduction(study.circuit, board).system(), drive_of(question.excitation))
+            flow = Flow(Reduction(study.circuit, board).system(), question.excitation.drive)
             orbit = settle(flow, question.start.start)
             avoided += judge(orbit, question.spec, question.start)[0] is Verdict.OK
         assert next(s for s in found.subjects if s.name == name).avoided == avoided
@@ -241,7 +241,7 @@ def test_the_worst_corner_is_tried_on_the_exact_rung() -> None:
     }
     board = nominal_board(study.circuit)
     board = replace(board, offset={**board.offset, **offset})
-    flow = Flow(Reduction(study.circuit, board).system(), drive_of(question.excitation))
+    flow = Flow(Reduction(study.circuit, board).system(), question.excitation.drive)
     orbit = settle(flow, question.start.start)
     assert judge(orbit, question.spec, question.start)[0] is corner.verdict
     assert orbit.response == corner.response

@@ -16,7 +16,6 @@ from designer.centring import centring_offset, rest_distances
 from designer.circuit import nominal_board
 from designer.deck import Excitation
 from designer.errors import InputError
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.modelfile import parse_model_file
 from designer.reduction import Reduction
@@ -57,9 +56,9 @@ def test_a_board_with_offsets_outside_the_dead_zone_is_the_nominal_one_again(
     asked = question(p)
     volt = centring_offset(system, NOMINAL)
     exc = asked.excitation
-    cured = drive_of(Excitation(exc.frequency, exc.amplitude, volt))
+    cured = Excitation(exc.frequency, exc.amplitude, volt).drive
     found = settle(Flow(system, cured), asked.start.start)
-    known = settle(Flow(NOMINAL, drive_of(exc)), asked.start.start)
+    known = settle(Flow(NOMINAL, exc.drive), asked.start.start)
     assert found.response == known.response == "1-3-3"
     swing, wanted = np.ptp(found.extremes, axis=1), np.ptp(known.extremes, axis=1)
     np.testing.assert_allclose(swing, wanted, rtol=1e-6)

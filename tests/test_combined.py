@@ -16,7 +16,6 @@ from designer.combined import (
     combine,
     differences,
     interval,
-    wilson,
 )
 from designer.hearing import BOUNDARY_SAMPLES, Ask, Hearing, Kind, Why, ask_boundary, ask_random
 from designer.verdict import Answer, Verdict, Yield
@@ -24,18 +23,6 @@ from tests.test_hearing import BLANK, HEARD, question
 
 OK, LOST = "1-2-2", "1-1-1"
 QUESTION = question()
-
-
-@given(of=st.integers(1, 500), count=st.integers(0, 500))
-def test_wilson_is_that_of_a_yield(of: int, count: int) -> None:
-    count = min(count, of)
-    assert wilson(float(count), of) == pytest.approx(Yield(count, of - count, 0, 0).interval)
-
-
-@given(of=st.integers(1, 5000))
-def test_an_interval_of_none_or_all_ends_without_rounding(of: int) -> None:
-    assert wilson(0.0, of)[0] == 0.0
-    assert wilson(float(of), of)[1] == 1.0
 
 
 def world(

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from designer import exact
 from designer.circuit import nominal_board
 from designer.circuit_kernel import POINTS
-from designer.ensemble import Ensemble
+from designer.ensemble import Ensemble, displacement
+from designer.flow import Flow
 from designer.reduction import Reduction
 from designer.spread import draw, draw_many
 from designer.system import Array, Drive, PiecewiseLinearSystem
@@ -49,7 +50,7 @@ def test_waveform_error_is_that_of_an_independent_integration(kind: str) -> None
     board = Reduction(circuit, draw(circuit, FEW[kind], 7, 3)).system()
     shown = integrated(board, drive, found.orbit.start, 1)
     truth = float(np.sqrt(np.mean((shown - wanted) ** 2)) / np.abs(wanted).max())
-    nominal_trace = exact.displacement(system, drive, orbit)
+    nominal_trace = displacement(Flow(system, drive), orbit)
     got = exact.waveform_error(found.trace, exact.images(nominal_trace))
     assert truth > 1e-3, "the test wants a difference"
     assert got == pytest.approx(truth, rel=1e-4)

@@ -12,7 +12,6 @@ from designer import deck
 from designer.attractor import settle
 from designer.circuit import nominal_board
 from designer.deck import Excitation, SolverSettings
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.ngspice import open_simulator
 from designer.power_up import follow, until_strobe
@@ -46,7 +45,7 @@ def test_the_first_strobe_is_that_of_another_integrator(phase: float) -> None:
     board = draw(subject(2).circuit, SPREAD, 1, 0)
     system = Reduction(subject(2).circuit, board).system()
     e = subject(2).excitation
-    drive = drive_of(Excitation(e.frequency, 3.0 * e.amplitude, 0.1 * e.amplitude))
+    drive = Excitation(e.frequency, 3.0 * e.amplitude, 0.1 * e.amplitude).drive
     met = until_strobe(system, drive, phase)
     assert met is not None
     state, clipped = met
@@ -58,7 +57,7 @@ def test_the_first_strobe_is_that_of_another_integrator(phase: float) -> None:
 
 def test_at_phase_zero_it_is_the_flow_itself() -> None:
     system = subject(3).system
-    drive = drive_of(subject(3).excitation)
+    drive = subject(3).excitation.drive
     met = until_strobe(system, drive, 0.0)
     assert met is not None
     wanted = Flow(system, drive).run(np.zeros(4), 1).strobes[-1]
@@ -69,7 +68,7 @@ def test_half_a_period_later_is_the_mirror_image() -> None:
     """The board with ideal op-amps is mirror symmetric."""
     system = Reduction(subject(3).circuit, nominal_board(subject(3).circuit, ideal=True)).system()
     assert system.mirror is not None
-    drive = drive_of(subject(3).excitation)
+    drive = subject(3).excitation.drive
     one = follow(system, [(drive, 50)], [1.0, 1.0 + math.pi])
     assert one[0] is not None
     assert one[1] is not None
@@ -83,11 +82,11 @@ def test_clipping_on_the_way_is_noticed() -> None:
     """Four hundred times the drive: the integrators reach their limits."""
     system = subject(1).system
     e = subject(1).excitation
-    loud = drive_of(Excitation(e.frequency, 400.0 * e.amplitude))
+    loud = Excitation(e.frequency, 400.0 * e.amplitude).drive
     (met,) = follow(system, [(loud, 5)], [1.0])
     assert met is not None
     assert met.clipped
-    (quiet,) = follow(system, [(drive_of(e), 5)], [1.0])
+    (quiet,) = follow(system, [(e.drive, 5)], [1.0])
     assert quiet is not None
     assert not quiet.clipped
     assert quiet.periods == 6
@@ -95,7 +94,7 @@ def test_clipping_on_the_way_is_noticed() -> None:
 
 def test_a_staircase_is_continuous() -> None:
     """Two stages of one setting are one; and stages follow each other at phase 0."""
-    system, drive = subject(2).system, drive_of(subject(2).excitation)
+    system, drive = subject(2).system, subject(2).excitation.drive
     other = Drive(1.05 * drive.omega, drive.amplitude)
     (one,) = follow(system, [(drive, 30)], [2.0])
     (two,) = follow(system, [(drive, 10), (drive, 20)], [2.0])
@@ -129,9 +128,9 @@ def test_ngspice_ends_where_the_exact_circuit_does(sample: int | None, degrees: 
     nets = known.circuit.state_nets
     waves = open_simulator("shared").run(turned, nets, (periods + 1) / e.frequency)
     phase = math.radians(degrees)
-    met = until_strobe(system, drive_of(e), phase)
+    met = until_strobe(system, e.drive, phase)
     assert met is not None
-    run = Flow(system, drive_of(e)).run(met[0], periods)
+    run = Flow(system, e.drive).run(met[0], periods)
     first = (1.0 - degrees / 360.0) / e.frequency
     times = first + np.arange(periods) / e.frequency
     heard = np.interp(times, waves.time, waves.signals["v1"])
@@ -139,7 +138,7 @@ def test_ngspice_ends_where_the_exact_circuit_does(sample: int | None, degrees: 
     exact = run.strobes[:periods, 0] + rest
     peak = np.abs(heard).max()
     assert np.abs(heard[-6:] - exact[-6:]).max() < 0.02 * peak
-    orbit = settle(Flow(system, drive_of(e)), run.strobes[-1])
+    orbit = settle(Flow(system, e.drive), run.strobes[-1])
     n = orbit.n
     assert n in (1, 3)
     again = np.abs(heard[-6:] - heard[-6 - n : -n]).max()
@@ -153,7 +152,7 @@ def test_ngspice_and_the_exact_circuit_agree_on_a_dc_offset() -> None:
     known = subject(1)
     e = known.excitation
     moved = Excitation(e.frequency, e.amplitude, 0.2 * e.amplitude)
-    flow = Flow(known.system, drive_of(moved))
+    flow = Flow(known.system, moved.drive)
     orbit = settle(flow, known.orbit.start)
     wanted = flow.run(orbit.start, orbit.n, points=256).strobes[:, 0]
     settings = SolverSettings("trap", 1.0 / e.frequency / 400)

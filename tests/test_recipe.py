@@ -14,15 +14,16 @@ from designer.boards import Boards
 from designer.circuit import Resistor, nominal_board
 from designer.deck import Excitation
 from designer.ensemble import Ensemble
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.power_up import until_strobe
+from designer.proportion import wilson
 from designer.reached import Reached, phases, reached_block, switched_on
 from designer.recipe import FINER, SLOWER, Recipe, Way, hertz, volts
 from designer.recipe_search import (
     ASIDE,
     HOLD,
     STEP,
+    _Trials,
     candidates,
     find_recipes,
     highest_resonance,
@@ -88,9 +89,10 @@ def test_a_recipe_in_words_and_in_json() -> None:
         recipes(1)[Way.FROM_ABOVE],
         reached=12,
         trials=12,
-        board_reached=5,
-        board_trials=6,
+        board_reached=13,
+        board_trials=15,
         boards=6,
+        able=5,
         smooth=True,
         slower=True,
     )
@@ -100,7 +102,7 @@ def test_a_recipe_in_words_and_in_json() -> None:
     swept = f"{float(f'{tried.sweep_seconds:.2g}'):g} s"
     assert f"sweep logarithmically to {low:g} Hz (omega 1.55) in {swept}, once, then hold" in text
     assert "up to 10 times slower is fine" in text
-    assert "from 12 of 12 switch-on phases, on 5 of 6 sample boards" in text
+    assert "from 12 of 12 switch-on phases, and at 13 of 15 starts of 5 sample boards" in text
     assert "caution" not in text
     said = json.loads(json.dumps(tried.as_dict()))
     assert said["text"] == text
@@ -116,9 +118,9 @@ def test_only_what_was_tried_is_promised() -> None:
     assert "in 10 steps of equal ratio, 20 periods each" in sweep.text
     assert "slower" not in sweep.text
     assert "worked" not in sweep.text
-    few = replace(sweep, reached=12, trials=12, board_reached=1, board_trials=1, boards=6)
+    few = replace(sweep, reached=12, trials=12, board_reached=3, board_trials=3, boards=6, able=1)
     assert "caution: 1 of 6 sample boards" in few.text
-    assert "caution: none of 6" in replace(few, board_trials=0, board_reached=0).text
+    assert "caution: none of 6" in replace(few, board_trials=0, board_reached=0, able=0).text
     raised = replace(recipes(1)[Way.AMPLITUDE], smooth=True).text
     assert "raise the amplitude to " in raised
     assert "steps" not in raised
@@ -195,6 +197,35 @@ def test_recipes_found_keep_their_word_at_other_phases() -> None:
     assert find_recipes(other, 1) == found[1:]
 
 
+def test_one_recipe_beats_another_by_more_than_chance() -> None:
+    """McNemar: only starts at which one of the two failed say anything about the difference."""
+
+    def trials(*worked: int) -> _Trials:
+        return _Trials(recipes(1)[Way.DIRECT], (True,) * 12, tuple(map(bool, worked)))
+
+    always, once_off = trials(1, 1, 1, 1, 1, 1), trials(1, 1, 0, 1, 1, 1)
+    assert always.certain
+    assert not once_off.certain
+    assert once_off.beaten_by(always)
+    assert not always.beaten_by(once_off)
+    assert not always.beaten_by(always)
+    assert not trials(0, 0, 1, 1, 1, 1).beaten_by(trials(1, 1, 1, 1, 0, 1))  # 2 against 1
+    assert trials(0, 0, 0, 1, 1, 1).beaten_by(trials(1, 1, 1, 1, 0, 1))  # 3 against 1
+
+
+def test_what_a_recipe_promises_of_boards_holds_on_others() -> None:
+    """Within the intervals of both; the boards here are of large offsets."""
+    of = plan(2)
+    (found,) = find_recipes(of, 2)
+    assert found.board_trials == recipe_search.STARTS * found.able > 36
+    ok = [a.verdict is Verdict.OK for a in answers(of, range(40))]
+    rows = reached_block(of, range(40), [found], 2)
+    worked = sum(r.verdict is Verdict.OK and able for r, able in zip(rows, ok, strict=True))
+    promised, seen = wilson(found.board_reached, found.board_trials), wilson(worked, sum(ok))
+    assert promised[0] < seen[1]
+    assert seen[0] < promised[1]
+
+
 # Rows of a study.
 
 
@@ -208,7 +239,7 @@ def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
     for row in rows:
         board = draw(of.circuit, of.spread, of.seed, row.sample)
         system = Reduction(of.circuit, board).system()
-        drive = drive_of(direct.target)
+        drive = direct.target.drive
         met = until_strobe(system, drive, row.phase)
         assert met is not None
         run = Flow(system, drive).run(met[0], 900)

@@ -38,12 +38,8 @@ def subject(circuit: Circuit, board: Board, sides: Sides, omega: float) -> gate.
     orbit = settle(Flow(wanted.piecewise_linear(), Drive(omega)), np.zeros(4))
     excitation = Excitation(errors.scales.frequency(omega), 1.0 / errors.drive_gain[0])
     reduction = Reduction(circuit, board)
-    flow = Flow(reduction.system(), drive_of(excitation))
+    flow = Flow(reduction.system(), excitation.drive)
     return gate.Subject(reduction, excitation, settle(flow, orbit.start * errors.scales.volts))
-
-
-def drive_of(excitation: Excitation) -> Drive:
-    return Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +59,7 @@ def test_ngspice_shows_what_the_exact_reduction_says(
     waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
     assert job.reduce(waves).orbit.response == response
     points = 100
-    exact = Flow(asked.system, drive_of(asked.excitation)).run(
+    exact = Flow(asked.system, asked.excitation.drive).run(
         asked.orbit.start, 4, mode=asked.orbit.mode, points=points
     ).strobes  # fmt: skip
     grid = np.arange(len(exact)) * asked.period / points

@@ -15,7 +15,7 @@ from designer.ngspice import open_simulator
 from designer.orbit import OrbitStatus
 from designer.spread import Group, Spread, draw
 from tests.stages import stage
-from tests.test_rectifier_ngspice import SCALED, drive_of, subject
+from tests.test_rectifier_ngspice import SCALED, subject
 
 VARIED = replace(
     Spread(0.005, 0.005, 3e-3, 10e-3),
@@ -41,7 +41,7 @@ def test_ngspice_runs_the_board_that_the_reduction_solves(index: int) -> None:
     for rail in ("VCC", "VEE"):
         assert f"\n{rail} {rail.lower()} 0 {board.supply[rail]!r}\n" in job.netlist
     waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
-    exact = Flow(asked.system, drive_of(asked.excitation)).run(
+    exact = Flow(asked.system, asked.excitation.drive).run(
         asked.orbit.start, 4, mode=asked.orbit.mode, points=points
     ).strobes  # fmt: skip
     grid = np.arange(len(exact)) * asked.period / points

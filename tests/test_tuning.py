@@ -15,11 +15,10 @@ from designer.adjustment import AS_BUILT, Adjustment
 from designer.all_on_one import all_on_one
 from designer.bands import Bands
 from designer.circuit import Resistor
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.orbit import Orbit, OrbitStatus
 from designer.reduction import FloatingCircuit, Reduction
-from designer.setting_search import Case, Try, filled, seek
+from designer.setting_search import MOST_FOLLOWED, Case, Try, seek
 from designer.spread import Spread, draw
 from designer.study_json import tuned_json
 from designer.tuning import MOST_TRIES, Tuned, tuned_block
@@ -60,7 +59,7 @@ def test_a_constant_force_is_cured_at_the_first_try() -> None:
     ratio = 0.04
     board = shifted(p, ratio * asked.excitation.amplitude / lever, "U2C")
     boards = ensemble([board], p)
-    (lost,) = boards.settle([0], [drive_of(asked.excitation)], asked.start.start[None, :])
+    (lost,) = boards.settle([0], [asked.excitation.drive], asked.start.start[None, :])
     assert judge(lost, asked.spec, asked.start)[0] is Verdict.LOST
     case = Case(0, asked, ratio)
     seek(boards, [case], Bands())
@@ -97,14 +96,13 @@ def test_every_setting_found_lies_in_the_bands_and_works(
     checked = 0
     for row in rough[1]:
         assert row.tries <= MOST_TRIES
+        assert row.followed <= MOST_FOLLOWED
         assert row.setting.within(bands) == row.setting
         if row.verdict is not Verdict.OK or not 0 < row.tries <= 9:
             continue
         asked = of.questions[row.question]
         board = draw(of.circuit, of.spread, of.seed, row.sample)
-        flow = Flow(
-            Reduction(of.circuit, board).system(), drive_of(row.setting.of(asked.excitation))
-        )
+        flow = Flow(Reduction(of.circuit, board).system(), row.setting.of(asked.excitation).drive)
         run = flow.run(asked.start.start, 900)
         found = period_counts(run.strobes, run.counts)
         assert found is not None
@@ -229,14 +227,16 @@ def test_a_board_given_up_is_lost_only_where_most_settings_answered(
 
 def test_json_states_what_had_no_answer() -> None:
     blank = Tuned(
-        0, 0, Verdict.LOST, "", "not found among 9 tries", 0.0, 0.0, 0.0, 9, 4, 0.5, 1.0, 1.0,
+        0, 0, Verdict.LOST, "", "not found among 9 tries", 0.0, 0.0, 0.0, 9, 4, 90, 0.5, 1.0, 1.0,
         Verdict.LOST, "", "not seen at 12 settings", False, 0.0, 0.0, 0.0, 12,
     )  # fmt: skip
-    other = replace(blank, sample=1, reason="not found among 7 tries", tries=7, unanswered=2)
+    other = replace(
+        blank, sample=1, reason="not found among 7 tries", tries=7, unanswered=2, followed=10
+    )
     broken = replace(blank, sample=2, bench_verdict=Verdict.FAILED, bench_reason="ValueError: x")
     said = tuned_json([blank, other, broken])
     assert said is not None
-    assert (said["tries"], said["unanswered"]) == (25, 10)
+    assert (said["tries"], said["unanswered"], said["followed"]) == (25, 10, 190)
     assert said["reasons"] == {"lost: not found": 3}
     assert said["bench"]["reasons"] == {"lost: not seen": 2, "failed: ValueError: x": 1}
 
@@ -244,19 +244,6 @@ def test_json_states_what_had_no_answer() -> None:
 def test_a_board_of_which_the_answer_is_missing_is_an_error() -> None:
     with pytest.raises(KeyError):
         tuned_block(plan(1), range(1), [], Bands(), 1)
-
-
-@pytest.mark.parametrize("dimensions", [2, 3])
-def test_filling_points_are_in_every_corner(dimensions: int) -> None:
-    """Any 8 in a row (24 in three dimensions) have one in each quadrant or octant."""
-    count = {2: 8, 3: 24}[dimensions]
-    points = filled(count, dimensions)
-    assert points.shape == (count, dimensions)
-    assert np.abs(points).max() < 1.0
-    corners = {tuple(np.sign(p)) for p in points}
-    assert len(corners) == 2**dimensions
-    gaps = np.abs(points[:, None, :] - points[None, :, :]).max(axis=2)
-    assert gaps[~np.eye(count, dtype=bool)].min() > 0.05
 
 
 def test_all_on_one_takes_the_worst_of_each_board() -> None:
@@ -279,16 +266,17 @@ def test_all_on_one_takes_the_worst_of_each_board() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("p", "sigma", "most"), [(4, 1e-3, 2), (8, 3e-4, 2)])
-def test_what_the_search_misses_of_a_dense_grid(p: int, sigma: float, most: int) -> None:
-    """Of 12 boards, the first three that the search gives up, on an 11 x 11 x 11 grid over the
-    bands: on two of the three some setting works, in a window that the search's questions miss.
-    A better search lowers ``most``."""
+@pytest.mark.parametrize(("p", "sigma", "boards", "most"), [(4, 1e-3, 17, 0), (8, 3e-4, 45, 1)])
+def test_what_the_search_misses_of_a_dense_grid(
+    p: int, sigma: float, boards: int, most: int
+) -> None:
+    """The first three boards that the search gives up, on an 11 x 11 x 11 grid over the bands. Of
+    1-8-8 on one of them a single setting of the grid works. A better search lowers ``most``."""
     of = plan(p, spread=Spread(0.01, 0.01, sigma, 4 * sigma), seed=5)
     asked, bands = of.questions[0], Bands()
-    rows = tuned_block(of, range(12), answers(of, range(12)), bands, 2)
+    rows = tuned_block(of, range(boards), answers(of, range(boards)), bands, 2)
     given_up = [r.sample for r in rows if r.verdict is not Verdict.OK][:3]
-    assert given_up
+    assert len(given_up) == 3
     assert any(r.tries > 0 and r.verdict is Verdict.OK for r in rows)
     eleven = np.linspace(-1.0, 1.0, 11)
     missed = set()
@@ -301,7 +289,7 @@ def test_what_the_search_misses_of_a_dense_grid(p: int, sigma: float, most: int)
             ]
             orbits = board.settle(
                 [0] * len(grid),
-                [drive_of(setting.of(asked.excitation)) for setting in grid],
+                [setting.of(asked.excitation).drive for setting in grid],
                 np.tile(asked.start.start, (len(grid), 1)),
                 jobs=2,
             )

@@ -13,7 +13,6 @@ import pytest
 from designer.attractor import coexisting, settle, starts
 from designer.circuit import nominal_board
 from designer.errors import InputError
-from designer.exact import drive_of
 from designer.flow import Flow
 from designer.map_files import files
 from designer.map_plots import map_chart
@@ -65,9 +64,7 @@ def test_a_point_is_what_its_boards_do_from_the_nominal_orbit_there() -> None:
     assert list(omega) == sorted(omega)
     for i in (0, len(omega) - 1):
         ratio = omega[i] / question.spec.omega
-        drive = drive_of(
-            replace(question.excitation, frequency=question.excitation.frequency * ratio)
-        )
+        drive = replace(question.excitation, frequency=question.excitation.frequency * ratio).drive
         system = Reduction(study.circuit, nominal_board(study.circuit)).system()
         start = question.start
         for at in np.linspace(1.0, ratio, 12)[1:]:
@@ -93,7 +90,7 @@ def test_the_window_ends_where_the_nominal_circuit_loses_the_response() -> None:
         verdicts = []
         for omega in (edge, edge + sign * 1e-3 * found.used):
             e = question.excitation
-            drive = drive_of(replace(e, frequency=e.frequency * omega / found.used))
+            drive = replace(e, frequency=e.frequency * omega / found.used).drive
             orbit = question.start
             for at in np.linspace(found.used, omega, 40)[1:]:
                 flow = Flow(system, replace(drive, omega=drive.omega * at / omega))
@@ -117,7 +114,7 @@ def asymmetric() -> StudyPlan:
     e = subject.excitation
     excitation = replace(e, frequency=e.frequency * 1.43 / paper_cases.OMEGA[1])
     met = coexisting(
-        Flow(subject.system, drive_of(excitation)), starts(3.0 * np.abs(subject.orbit.start), 32)
+        Flow(subject.system, excitation.drive), starts(3.0 * np.abs(subject.orbit.start), 32)
     )
     orbit = next(o for o in met if o.response == "1-1-1" and not o.symmetric)
     spec = Response(omega=1.43, expect=Expect(1, 1, 1), symmetric=False)
@@ -146,7 +143,7 @@ def test_over_b_the_amplitude_goes_as_its_inverse() -> None:
     e = question.excitation
     louder = replace(question, excitation=replace(e, amplitude=e.amplitude * 0.25 / 0.24))
     system = Reduction(study.circuit, nominal_board(study.circuit)).system()
-    start = settle(Flow(system, drive_of(louder.excitation)), question.start.start)
+    start = settle(Flow(system, louder.excitation.drive), question.start.start)
     again = yield_map(
         replace(study, questions=(replace(louder, start=start),)), 0, "b", 0.24, values=[0.24],
         samples=5,
