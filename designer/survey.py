@@ -13,6 +13,7 @@ from designer.continuation import Branch, start, trace
 from designer.curve import Curve
 from designer.family import Family
 from designer.orbit import Orbit, OrbitStatus
+from designer.retrace import images, place
 from designer.switching import close, switch
 from designer.system import Array
 
@@ -64,6 +65,11 @@ def survey(
         progress()
         return number
 
+    def known_before(child: Branch) -> bool:
+        """By where its first points end, off the branch that it leaves."""
+        curve, last = child.curve, child.points[-1].solved
+        return any(follows(b, curve.n, curve.symmetric, images(curve, last)) for b in branches)
+
     for value, orbit in known:
         if orbit.status is not OrbitStatus.PERIODIC or not low <= value <= high:
             continue
@@ -79,8 +85,10 @@ def survey(
             if deep == depth:
                 continue
             for where in [p for p in points if p.branch == number]:
-                child = switch(branches[number], where, low, high) if _leads(where) else None
-                if child is not None and not _known(branches, child):
+                if not _leads(where):
+                    continue
+                child = switch(branches[number], where, low, high, known=known_before)
+                if child is not None:
                     queue.append((add(close(child, points), number), deep + 1))
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
@@ -108,6 +116,14 @@ def passes(branch: Branch, value: float, orbit: Orbit, tolerance: float = 1e-6) 
     return False
 
 
+def follows(branch: Branch, n: int, symmetric: bool, seen: Array) -> bool:
+    """Whether a branch of such orbits passes one of these ``images``."""
+    curve = branch.curve
+    if (curve.n, curve.symmetric) != (n, symmetric):
+        return False
+    return place(curve, [p.solved for p in branch.points], seen) is not None
+
+
 def _least(laps: Array, x: Array, curve: Curve) -> float:
     return float((np.abs(laps - x) / curve.scale[:-1]).max(axis=1).min())
 
@@ -115,9 +131,3 @@ def _least(laps: Array, x: Array, curve: Curve) -> float:
 def _leads(where: Bifurcation) -> bool:
     """Whether another branch leaves here and the change concerns a stable orbit."""
     return where.kind in (Kind.PITCHFORK, Kind.DOUBLING) and where.stable[0] != where.stable[1]
-
-
-def _known(branches: list[Branch], child: Branch) -> bool:
-    """Whether a branch was followed before, from its other end."""
-    middle = child.points[len(child.points) // 2]
-    return any(passes(b, middle.value, middle.orbit) for b in branches)
