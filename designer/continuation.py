@@ -209,16 +209,17 @@ def follow(
                 break
             continue
         inner = _between(curve, here, new)
-        if inner is None:  # what lies between is not seen to lead from one to the other
+        back = inner is not None and _retraces(curve, points, new)
+        if back and (closing := _closing(curve, points, new)):
+            points += closing
+            end = End.CLOSED
+            break
+        if inner is None or back:  # it is not seen to lead there, or turns round on the spot
             step *= 0.5
             if step < LEAST:
                 end = End.LOST
                 break
             continue
-        if _retraces(curve, points, new):
-            points += _closing(curve, points, new)
-            end = End.CLOSED
-            break
         points += [*inner, new]
         if until(new):
             end = End.STOPPED

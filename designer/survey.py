@@ -9,7 +9,7 @@ import numpy as np
 
 from designer.attractor import mirrored_strobes
 from designer.bifurcations import Bifurcation, Kind, locate
-from designer.continuation import Branch, start, trace
+from designer.continuation import Branch, End, start, trace
 from designer.curve import Curve
 from designer.family import Family
 from designer.orbit import Orbit, OrbitStatus
@@ -65,10 +65,11 @@ def survey(
         progress()
         return number
 
-    def known_before(child: Branch) -> bool:
-        """By where its first points end, off the branch that it leaves."""
-        curve, last = child.curve, child.points[-1].solved
-        return any(follows(b, curve.n, curve.symmetric, images(curve, last)) for b in branches)
+    def known_before(child: Branch, at: int = -1) -> bool:
+        """By its point of this number; of its first points the last is off the parent."""
+        curve = child.curve
+        seen = images(curve, child.points[at].solved)
+        return any(follows(b, curve.n, curve.symmetric, seen) for b in branches)
 
     for value, orbit in known:
         if orbit.status is not OrbitStatus.PERIODIC or not low <= value <= high:
@@ -84,12 +85,21 @@ def survey(
             number, deep = queue.pop(0)
             if deep == depth:
                 continue
+            lost: list[Branch] = []
             for where in [p for p in points if p.branch == number]:
                 if not _leads(where):
                     continue
                 child = switch(branches[number], where, low, high, known=known_before)
-                if child is not None:
+                if child is None:
+                    continue
+                if child.ends[1] is End.LOST:
+                    lost.append(child)
+                else:
                     queue.append((add(close(child, points), number), deep + 1))
+            # What was lost on the way may have been followed whole from its other end.
+            for child in lost:
+                if not known_before(child, len(child.points) // 2):
+                    queue.append((add(child, number), deep + 1))
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
 

@@ -60,7 +60,7 @@ def switch(
         point = at(other, solved)
         if point is None:
             continue
-        if float(np.linalg.norm(apart(other, point))) < 0.5 * reach:
+        if _parting(other, point) < 0.5 * reach:
             continue  # fell back onto the parent
         origin = Branch(other, (point,), (End.JOINED, End.STOPPED))
         root = _meeting(other, where, point)
@@ -100,6 +100,8 @@ def _led(curve: Curve, root: BranchPoint, near: BranchPoint) -> tuple[BranchPoin
         return None
     solved = curve.between(root.solved, points[1].solved, FIRST)
     first = None if solved is None else at(curve, solved)
+    if first is not None and _parting(curve, first) < 0.5 * FIRST * _parting(curve, points[1]):
+        first = None  # the parent's, where it crosses the hyperplane
     after = points[1:] if first is None else (first, *points[1:])
     chord = (after[0].solved.y - root.solved.y) / curve.scale
     tangent = chord / np.linalg.norm(chord)
@@ -126,6 +128,10 @@ def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint
         return None
     residual = float(np.abs((image[0] - x) / curve.scale[:-1]).max())
     return at(curve, Solved(y, image[1], step / length, 0, residual))
+
+
+def _parting(curve: Curve, point: BranchPoint) -> float:
+    return float(np.linalg.norm(apart(curve, point)))
 
 
 def _length(curve: Curve, step: Array) -> float:

@@ -142,3 +142,18 @@ def test_a_branch_goes_on_where_it_turns_sharply_beside_a_grazing() -> None:
     assert solved is not None
     points = [p.solved for p in branch.points]
     assert place(branch.curve, points, images(branch.curve, solved)) is not None
+
+
+@pytest.mark.slow
+def test_a_branch_that_is_lost_from_one_end_is_followed_from_the_other() -> None:
+    """From 1-8-8 up to a sharp turn, and from 1-7-7 all the way: one branch, not one and a half."""
+    over = family.of_model(PAPER, 0.22, "omega")
+    found = survey(over, [(0.22, settle(over.flow(0.22), np.zeros(4)))], 0.219, 0.2527, depth=1)
+    twins = [b for b in found.branches if b.values.min() < 0.2225 and not b.curve.symmetric]
+    assert len(twins) == 1
+    assert twins[0].ends == (End.JOINED, End.JOINED)
+    ends = sorted(twins[0].points[k].value for k in (0, -1))
+    forks = [p.value for p in found.on(0) if p.kind is Kind.PITCHFORK]
+    assert all(min(abs(e - f) for f in forks) < 1e-9 for e in ends)
+    names = facts(list(found.points))
+    assert len(set(names)) == len(names)
