@@ -23,7 +23,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.optimize import brentq
 
-from designer.continuation import Branch, BranchPoint, at, joined
+from designer.continuation import Branch, BranchPoint, at, joined, parted
 from designer.curve import CONVERGED, Curve
 from designer.extrema import heights
 
@@ -120,6 +120,9 @@ def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[Kind, Tes
     if _pair(a) * _pair(b) < 0.0:
         tests.append((Kind.TORUS, _pair))
     out = [(kind, test) for kind, test in tests if test(a) * test(b) < 0.0]
+    if not curve.symmetric and not (parted(curve, a) and parted(curve, b)):
+        # Where it leaves its parent λ turns: that is no fold, and rounding decides the sign.
+        out = [(kind, test) for kind, test in out if kind is not Kind.FOLD]
     if a.counts != b.counts:
         out.append((Kind.GRAZING, _gap(curve)))
     return out

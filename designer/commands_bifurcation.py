@@ -86,8 +86,9 @@ def bifurcation(
     """Bifurcation diagrams, maps of n-p-q over two parameters, basins of attraction."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer import sweep_job
+        from designer.sweep_request import Request
 
-        request = sweep_job.Request(
+        request = Request(
             over=over,
             low=low,
             high=high,

@@ -20,10 +20,13 @@ from designer.attractor import describe
 from designer.curve import Curve, Solved
 from designer.family import Family
 from designer.orbit import Orbit, OrbitStatus
+from designer.retrace import images, place
 from designer.system import Array
 
-FIRST, LEAST, GREATEST = 5e-3, 1e-7, 5e-2
-"""Arclength of the first, the shortest and the longest step, in scaled units."""
+FIRST, LEAST, GREATEST = 5e-3, 1e-9, 5e-2
+"""Arclength of the first, the shortest and the longest step, in scaled units. Past a grazing point
+the tangent changes with the square root of the penetration: beside a fold it may turn within 1e-7.
+"""
 TURN = 0.97
 """Cosine of the most that the tangent may turn in one step."""
 JUMP = 0.15
@@ -36,6 +39,8 @@ CLOSE = 1e-3
 """Arclength from a branch's last point, at most, to where it joins its parent."""
 SAME = 1e-7
 """Of the peak: an orbit no farther than this from its mirror image is symmetric."""
+LOOP = 1.1
+"""Of a step: the way by a point that lies on it, not aside."""
 POINTS = 4000
 """Most steps of one branch in one direction."""
 
@@ -139,8 +144,11 @@ def trace(
     *,
     until: Callable[[BranchPoint], bool] = lambda _: False,
 ) -> Branch:
-    """A branch followed from its only or its first point, both ways; see ``follow``."""
+    """A branch followed from its only or its first point, both ways, once round where it is a loop;
+    see ``follow``."""
     up = follow(origin, low, high, 1.0, until=until)
+    if up.ends[1] is End.CLOSED:
+        return Branch(up.curve, up.points, (End.CLOSED, End.CLOSED))
     down = follow(origin, low, high, -1.0, until=until)
     return Branch(up.curve, down.points[:0:-1] + up.points, (down.ends[1], up.ends[1]))
 
@@ -167,7 +175,7 @@ def follow(
         toward[-1] = direction
     tangent = tangent if tangent @ toward >= 0.0 else -tangent
     points, step = [first], FIRST
-    parted = _parted(curve, first)  # else Newton's method may fall onto the parent near its end
+    away = parted(curve, first)  # else Newton's method may fall onto the parent near its end
     end = End.POINTS
     while len(points) < POINTS:
         here = points[-1]
@@ -178,14 +186,16 @@ def follow(
                 end = End.LIMIT
                 break
             last = _onto(curve, here.solved, solved, edge)
-            if last is not None and (point := at(curve, last)) is not None:
-                points += [*_between(curve, here, point), point]
+            point = None if last is None else at(curve, last)
+            inner = None if point is None else _between(curve, here, point)
+            if point is not None and inner is not None:
+                points += [*inner, point]
                 end = End.LIMIT
                 break
             solved = None
         if solved is not None:
             new = at(curve, solved)
-        fallen = new is not None and parted and not _parted(curve, new)
+        fallen = new is not None and away and not parted(curve, new)
         if new is None or solved is None or fallen:
             step *= 0.5
             if step < LEAST:
@@ -198,12 +208,21 @@ def follow(
                 end = End.JOINED
                 break
             continue
-        points += [*_between(curve, here, new), new]
+        inner = _between(curve, here, new)
+        back = inner is not None and _retraces(curve, points, new)
+        if back and (closing := _closing(curve, points, new)):
+            points += closing
+            end = End.CLOSED
+            break
+        if inner is None or back:  # it is not seen to lead there, or turns round on the spot
+            step *= 0.5
+            if step < LEAST:
+                end = End.LOST
+                break
+            continue
+        points += [*inner, new]
         if until(new):
             end = End.STOPPED
-            break
-        if len(points) > 10 and curve.distance(first.solved, solved) < 0.5 * step:
-            end = End.CLOSED
             break
         change = abs(_size(here) - _size(new))
         turned = float(tangent @ solved.tangent)
@@ -213,6 +232,29 @@ def follow(
         elif solved.iterations > 5 or change > JUMP:
             step = max(0.5 * step, FIRST * 0.1)
     return Branch(curve, tuple(points), (End.STOPPED, end))
+
+
+def _retraces(curve: Curve, points: list[BranchPoint], new: BranchPoint) -> bool:
+    """Whether a branch goes on along itself."""
+    return place(curve, [p.solved for p in points], images(curve, new.solved)) is not None
+
+
+def _closing(curve: Curve, points: list[BranchPoint], new: BranchPoint) -> list[BranchPoint]:
+    """What leads from a branch's last point to its first, as the orbit is met there, on the way to
+    ``new``; nothing where the branch did not come back to its first point."""
+    here = points[-1]
+    step = curve.distance(here.solved, new.solved)
+
+    def way(y: Array) -> float:
+        """By y from the last point to the new one."""
+        ends = (here.solved.y, new.solved.y)
+        return float(sum(np.linalg.norm((end - y) / curve.scale) for end in ends))
+
+    y = min(images(curve, points[0].solved), key=way)
+    border = (new.solved.y - here.solved.y) / curve.scale / step
+    solved = curve.correct(y, border) if way(y) < LOOP * step else None
+    last = None if solved is None else at(curve, solved)
+    return [] if last is None else [*(_between(curve, here, last) or ()), last]
 
 
 def _step(curve: Curve, here: Solved, tangent: Array, step: float) -> Solved | None:
@@ -239,9 +281,12 @@ def _size(point: BranchPoint) -> float:
     return float(np.log1p(point.orbit.radius))
 
 
-def _between(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[BranchPoint]:
+def _between(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[BranchPoint] | None:
     """Points between two, down to where no count changes and no multiplier jumps from one to the
-    next, or they lie too close to be told apart."""
+    next, or they lie too close to be told apart.
+
+    None where the curve does not lead from one to the other: the second is another branch's.
+    """
     out: list[BranchPoint] = []
     stack = [(a, b)]
     while stack:
@@ -255,14 +300,18 @@ def _between(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[BranchPoint]:
             middle = None if solved is None else at(curve, solved)
         if middle is not None:
             stack += [(middle, b), (a, middle)]
+        elif (counts or jump) and length > FINEST:
+            return None
         else:
             out.append(b)
     return out[:-1]
 
 
-def linked(curve: Curve, a: BranchPoint, b: BranchPoint) -> tuple[BranchPoint, ...]:
-    """Two neighbouring points of a branch and those between them that tell its events apart."""
-    return (a, *_between(curve, a, b), b)
+def linked(curve: Curve, a: BranchPoint, b: BranchPoint) -> tuple[BranchPoint, ...] | None:
+    """Two neighbouring points of a branch and those between them that tell its events apart, or
+    None where the branch does not lead from one to the other."""
+    inner = _between(curve, a, b)
+    return None if inner is None else (a, *inner, b)
 
 
 def apart(curve: Curve, point: BranchPoint) -> Array:
@@ -280,7 +329,7 @@ def apart(curve: Curve, point: BranchPoint) -> Array:
     return np.asarray((partner - point.solved.x) / curve.scale[:-1])
 
 
-def _parted(curve: Curve, point: BranchPoint) -> bool:
+def parted(curve: Curve, point: BranchPoint) -> bool:
     """Whether an orbit and its partner are two."""
     return not curve.symmetric and bool(np.abs(apart(curve, point)).max() > SAME)
 

@@ -30,6 +30,9 @@ SETTLED = 1e-7
 DIFFERENCE = 3e-8
 """Of the parameter's size: step of the central difference for ∂P/∂λ; wider ones reach across
 grazing points that lie near, narrower ones drown in rounding."""
+ASTRAY = 1.0
+"""Of the distance between two neighbouring points: the most that the curve between them lies off
+their chord. It does not turn by more than ``continuation.TURN`` from one to the next."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,10 @@ class Curve:
         return self.correct(np.append(x, value), border)
 
     def between(self, a: Solved, b: Solved, s: float) -> Solved | None:
-        """The point of the curve at a share s of the way from a to b, s in [0, 1]."""
+        """The point of the curve at a share s of the way from a to b, s in [0, 1].
+
+        None where none lies near: Newton's method may find another branch on the same hyperplane.
+        """
         chord = (b.y - a.y) / self.scale
         length = float(np.linalg.norm(chord))
         # Hermite's cubic: the tangents at both ends are known.
@@ -172,7 +178,11 @@ class Curve:
             (3.0 * s**2 - 2.0 * s**3) * chord
             + length * ((s - 2.0 * s**2 + s**3) * ta + (s**3 - s**2) * tb)
         )
-        return self.correct(guess, chord / length, centre=a.y + s * (b.y - a.y))
+        centre = a.y + s * (b.y - a.y)
+        found = self.correct(guess, chord / length, centre=centre)
+        if found is None or np.linalg.norm((found.y - centre) / self.scale) > ASTRAY * length:
+            return None
+        return found
 
     def monodromy(self, solved: Solved) -> Array:
         """(states, states) of the n-period map."""

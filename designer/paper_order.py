@@ -78,7 +78,7 @@ def out_of_turn(windows: Sequence[Window], gap: Gap) -> list[tuple[float, int]]:
             met.append((middle, each.response))
     out, reached = [], gap.p
     for value, name in sorted(met, reverse=True):
-        q = _equal(name)
+        q = equal(name)
         if q is None:
             continue
         if q < reached or q > gap.after:
@@ -108,15 +108,15 @@ def strays(windows: Sequence[Window], mains: Sequence[tuple[int, Window]]) -> li
     out = []
     for p, main in mains:
         for each in windows:
-            q = _equal(each.response)
+            q = equal(each.response)
             middle = 0.5 * (each.low.value + each.high.value)
             if q not in (None, p) and main.low.value < middle < main.high.value:
                 out.append(f"1-{q}-{q} at ω = {middle:.5f} beside 1-{p}-{p}")
     return out
 
 
-def _equal(name: str) -> int | None:
-    """q of "1-q-q"."""
+def equal(name: str) -> int | None:
+    """q of "1-q-q", or None."""
     parts = name.split("-")
     if len(parts) != 3 or parts[0] != "1" or parts[1] != parts[2]:
         return None

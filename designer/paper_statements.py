@@ -15,7 +15,7 @@ import numpy as np
 from designer.bifurcations import Bifurcation, Kind
 from designer.cascade import Cascade, cascade
 from designer.orbit import Orbit
-from designer.paper_order import Gap, faults, strays
+from designer.paper_order import Gap, equal, faults, strays
 from designer.survey import Survey
 from designer.system import Array
 from designer.windows import Window
@@ -73,7 +73,7 @@ def statements(
     out = [_pitchfork(symmetric), _first_end(found, windows, twins)]
     out += [_doublings(windows), _second(windows), _twins(windows), _order(windows, gaps)]
     out.append(_chattering(found, windows, chatter))
-    return out
+    return [*out, _each(windows), _touches(found)]
 
 
 def _pitchfork(symmetric: Window) -> Statement:
@@ -220,6 +220,51 @@ def _chattering(
         + ("bounces that die out, finite in number" if dying else "not bounces that die out"),
         AGREES if grows and dying else IN_PART,
         f"designer simulate examples/paper.toml --omega {lowest:g}",
+    )
+
+
+def _each(windows: Sequence[Window]) -> Statement:
+    """The conclusions' course of every 1-p-p, of which Section 4 says the steps for p = 1, 2."""
+    forks, doubles, others = [], [], []
+    tops = symmetric_mains(windows)
+    for p, top in tops:
+        twins = main_windows(windows, p)[1]
+        if top.low.why == Kind.PITCHFORK:
+            forks.append(p)
+        if twins is not None and twins.low.why == Kind.DOUBLING:
+            doubles.append(p)
+        elif twins is not None:
+            others.append(f"{p} by a {twins.low.why}")
+    whole = len(tops) == 8
+    agrees = whole and len(forks) == len(doubles) == 8
+    return Statement(
+        "Sec. 6, 1 (i), (ii): as ω falls symmetric 1-p-p loses its symmetry in a pitchfork, and "
+        "asymmetric 1-p-p goes over into chaos by period doublings",
+        f"A pitchfork ends the main symmetric window for p = {_list(forks)}; a period doubling "
+        f"ends that of the twins for p = {_list(doubles)}"
+        + (f", and p = {', '.join(others)}" if others else ""),
+        AGREES if agrees else IN_PART if forks and doubles else DISAGREES,
+        "designer reproduce dynamics --out out/paper-dynamics",
+    )
+
+
+def _touches(found: Survey) -> Statement:
+    """Where 1-p-p becomes 1-(p+1)-p, by grazing, as an attractor."""
+    seen = []
+    for point in found.points:
+        if point.kind is not Kind.GRAZING or point.stable != (True, True):
+            continue
+        ends = [point.before, point.after]
+        above, below = ends if point.direction < 0 else ends[::-1]
+        p = equal(above)
+        if p is not None and below in (f"1-{p + 1}-{p}", f"1-{p}-{p + 1}"):
+            seen.append((point.value, f"{above} → {below} at ω = {point.value:.6f}"))
+    words = "; ".join(text for _, text in sorted(seen, reverse=True))
+    return Statement(
+        "Sec. 6, 1: 1-p-p may undergo a grazing bifurcation, resulting in 1-(p+1)-p",
+        f"As ω falls, stable on both sides: {words}" if seen else "Nowhere as an attractor",
+        AGREES if seen else DISAGREES,
+        f"{SWEEP} --from 1.21 --to 1.24 --steps 601 --starts 8 --out out/grazing",
     )
 
 

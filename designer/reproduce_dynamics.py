@@ -44,7 +44,7 @@ from designer.survey import Survey, survey
 from designer.sweep_store import write_sweep
 from designer.sweep_subject import ModelSubject
 from designer.whole_file import write
-from designer.windows import Window, all_windows, outside
+from designer.windows import NOT_LOCATED, Window, all_windows, outside
 
 FORMAT = 1
 COMMAND = "designer reproduce dynamics --out reports/paper-dynamics"
@@ -54,6 +54,8 @@ FIRST = 1.55
 """ω at which the branch of symmetric orbits is set out from."""
 DEPTH = 2
 """Branch switches in a row: to the twins, and to their doubled orbits."""
+TITLE = "Soft-impacting system with two-sided stops"
+"""Of the sweeps' pictures: the paper's case, as its model file calls it."""
 DATA = "dynamics.json"
 FIGURES = {"fig2a": (0.1, 1.8, 1801), "fig2b": (0.2, 0.6, 801), "fig2c": (1.25, 1.6, 701)}
 """ω from, to and steps of each picture of the paper's Fig. 2."""
@@ -208,7 +210,8 @@ def _pictures(
         made = sweep.run(plan, jobs, progress=progress.stage(f"Sweep for {name}"))
         write_sweep(out / f"{name}.parquet", made, source)
         marks = bifurcation_plots.marks(dynamics.found.points, low, high)
-        drawn[name] = bifurcation_plots.diagram(made, marks if name != "fig2a" else ())
+        shown = marks if name != "fig2a" else ()
+        drawn[name] = bifurcation_plots.diagram(made, shown, TITLE)
     for name, figure in drawn.items():
         png = io.BytesIO()
         to_png(figure, png)
@@ -353,13 +356,23 @@ def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
                 f"| {w.high.value:.6f} | {w.high.why} |"
             )
     lost = sum(b.ends.count(End.LOST) for b in dynamics.found.branches)
+    unseen = [w for w in dynamics.windows if NOT_LOCATED in (w.low.why, w.high.why)]
     lines += ["", "## Pictures", ""]
     lines.append(
         f"{len(dynamics.found.branches)} branches were followed, {sum(_lengths(dynamics))} orbits "
-        f"in all; {lost} of their ends are for want of convergence.\n"
+        f"in all; {lost} of their ends are for want of convergence. {len(unseen)} of the "
+        f"{len(dynamics.windows)} windows, those of longer periods included, end where no "
+        f"bifurcation was located{_named_windows(unseen)}.\n"
     )
     lines += [f"![{_CAPTIONS[name]}]({name}.png)\n\n{_CAPTIONS[name]}\n" for name in pictures]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _named_windows(windows: Sequence[Window]) -> str:
+    if not windows:
+        return ""
+    names = [f"{w.response} from ω = {w.low.value:.6f} to {w.high.value:.6f}" for w in windows]
+    return f" ({'; '.join(names)})"
 
 
 def _lengths(dynamics: Dynamics) -> list[int]:

@@ -9,10 +9,11 @@ import numpy as np
 
 from designer.attractor import mirrored_strobes
 from designer.bifurcations import Bifurcation, Kind, locate
-from designer.continuation import Branch, start, trace
+from designer.continuation import Branch, End, start, trace
 from designer.curve import Curve
 from designer.family import Family
 from designer.orbit import Orbit, OrbitStatus
+from designer.retrace import images, place
 from designer.switching import close, switch
 from designer.system import Array
 
@@ -64,6 +65,12 @@ def survey(
         progress()
         return number
 
+    def known_before(child: Branch, at: int = -1) -> bool:
+        """By its point of this number; of its first points the last is off the parent."""
+        curve = child.curve
+        seen = images(curve, child.points[at].solved)
+        return any(follows(b, curve.n, curve.symmetric, seen) for b in branches)
+
     for value, orbit in known:
         if orbit.status is not OrbitStatus.PERIODIC or not low <= value <= high:
             continue
@@ -78,10 +85,21 @@ def survey(
             number, deep = queue.pop(0)
             if deep == depth:
                 continue
+            lost: list[Branch] = []
             for where in [p for p in points if p.branch == number]:
-                child = switch(branches[number], where, low, high) if _leads(where) else None
-                if child is not None and not _known(branches, child):
+                if not _leads(where):
+                    continue
+                child = switch(branches[number], where, low, high, known=known_before)
+                if child is None:
+                    continue
+                if child.ends[1] is End.LOST:
+                    lost.append(child)
+                else:
                     queue.append((add(close(child, points), number), deep + 1))
+            # What was lost on the way may have been followed whole from its other end.
+            for child in lost:
+                if not known_before(child, len(child.points) // 2):
+                    queue.append((add(child, number), deep + 1))
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
 
@@ -108,6 +126,14 @@ def passes(branch: Branch, value: float, orbit: Orbit, tolerance: float = 1e-6) 
     return False
 
 
+def follows(branch: Branch, n: int, symmetric: bool, seen: Array) -> bool:
+    """Whether a branch of such orbits passes one of these ``images``."""
+    curve = branch.curve
+    if (curve.n, curve.symmetric) != (n, symmetric):
+        return False
+    return place(curve, [p.solved for p in branch.points], seen) is not None
+
+
 def _least(laps: Array, x: Array, curve: Curve) -> float:
     return float((np.abs(laps - x) / curve.scale[:-1]).max(axis=1).min())
 
@@ -115,9 +141,3 @@ def _least(laps: Array, x: Array, curve: Curve) -> float:
 def _leads(where: Bifurcation) -> bool:
     """Whether another branch leaves here and the change concerns a stable orbit."""
     return where.kind in (Kind.PITCHFORK, Kind.DOUBLING) and where.stable[0] != where.stable[1]
-
-
-def _known(branches: list[Branch], child: Branch) -> bool:
-    """Whether a branch was followed before, from its other end."""
-    middle = child.points[len(child.points) // 2]
-    return any(passes(b, middle.value, middle.orbit) for b in branches)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,20 +19,28 @@ ASIDE = (3e-3, 1e-3, 1e-2, 3e-4, 3e-2, 1e-4, 3e-5, 1e-5)
 
 REACH = 5e-2
 """Arclength, in scaled units, from a branch's last point to where it joins another."""
+FIRST = 0.1
+"""Of the way from where branches meet to the next point: a point there, since the branch's course
+where it sets out, λ going by the square of the distance, cannot be read off the meeting point."""
 NEAR = 2.0
 """Of such an arclength: farther from the parent than this lies another branch's orbit."""
 
 
 def switch(
-    parent: Branch, where: Bifurcation, low: float, high: float, aside: tuple[float, ...] = ASIDE
+    parent: Branch,
+    where: Bifurcation,
+    low: float,
+    high: float,
+    *,
+    known: Callable[[Branch], bool] = lambda _: False,
 ) -> Branch | None:
     """The branch that leaves ``parent`` at a pitchfork or a period doubling, followed to its end.
 
     At a pitchfork one of the two asymmetric twins (its mirror image is the other), at a period
     doubling the orbits of twice the period; they set out along the eigenvector of the multiplier
-    -1. The first point is the one it leaves at. None where none is found, or its period passes
-    ``MAX_PERIOD``. The branch is measured in the size of the orbit that it leaves, so it is the
-    same wherever the parent was begun.
+    -1. The first point is the one it leaves at. The branch is measured in the size of the orbit
+    that it leaves, so it is the same wherever the parent was begun. None where none is found, or
+    its period passes ``MAX_PERIOD``, or its first points are ``known``.
     """
     curve = parent.curve
     x, value = where.point.solved.x, where.value
@@ -44,20 +53,24 @@ def switch(
     other = Curve.through(curve.family, x, value, n, False)
     border = np.append(_leaving(where.point.solved.jacobian, other.scale[:-1]), 0.0)
     centre = np.append(x, value)
-    for reach in aside:
+    for reach in ASIDE:
         solved = other.correct(centre + reach * other.scale * border, border)
         if solved is None or _length(other, solved.y - centre) > NEAR * reach:
             continue  # another branch crosses the hyperplane too
         point = at(other, solved)
         if point is None:
             continue
-        if float(np.linalg.norm(apart(other, point))) < 0.5 * reach:
+        if _parting(other, point) < 0.5 * reach:
             continue  # fell back onto the parent
         origin = Branch(other, (point,), (End.JOINED, End.STOPPED))
+        root = _meeting(other, where, point)
+        points = None if root is None else _led(other, root, point)
+        if points is None:
+            continue  # no orbit of this branch, or one beyond more than can be told apart
+        if known(Branch(other, points, (End.JOINED, End.STOPPED))):
+            return None
         grown = follow(origin, low, high, 1.0, border=border)
-        root = _meeting(other, where, grown.points[0])
-        points = () if root is None else linked(other, root, grown.points[0])[:-1]
-        return Branch(other, points + grown.points, (End.JOINED, grown.ends[1]))
+        return Branch(other, points[:-1] + grown.points, (End.JOINED, grown.ends[1]))
     return None
 
 
@@ -74,9 +87,25 @@ def close(branch: Branch, points: Sequence[Bifurcation]) -> Branch:
             break
         root = _meeting(branch.curve, where, last)
         if root is not None:
-            more = linked(branch.curve, last, root)[1:]
+            more = (_led(branch.curve, root, last) or (root, last))[-2::-1]
             return Branch(branch.curve, branch.points + more, branch.ends)
     return branch
+
+
+def _led(curve: Curve, root: BranchPoint, near: BranchPoint) -> tuple[BranchPoint, ...] | None:
+    """From where branches meet to a point of one of them, with all that tells its events apart;
+    None where the branch is not seen to lead there."""
+    points = linked(curve, root, near)
+    if points is None:
+        return None
+    solved = curve.between(root.solved, points[1].solved, FIRST)
+    first = None if solved is None else at(curve, solved)
+    if first is not None and _parting(curve, first) < 0.5 * FIRST * _parting(curve, points[1]):
+        first = None  # the parent's, where it crosses the hyperplane
+    after = points[1:] if first is None else (first, *points[1:])
+    chord = (after[0].solved.y - root.solved.y) / curve.scale
+    tangent = chord / np.linalg.norm(chord)
+    return (replace(root, solved=replace(root.solved, tangent=tangent)), *after)
 
 
 def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint | None:
@@ -99,6 +128,10 @@ def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint
         return None
     residual = float(np.abs((image[0] - x) / curve.scale[:-1]).max())
     return at(curve, Solved(y, image[1], step / length, 0, residual))
+
+
+def _parting(curve: Curve, point: BranchPoint) -> float:
+    return float(np.linalg.norm(apart(curve, point)))
 
 
 def _length(curve: Curve, step: Array) -> float:

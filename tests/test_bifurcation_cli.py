@@ -178,8 +178,8 @@ def test_needs_a_frequency(tmp_path: Path, capfd: pytest.CaptureFixture[str]) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("tracks", [["--down", "--up"], ["--starts", "2"]])
 def test_goes_on_after_a_kill(model: Path, tmp_path: Path, tracks: list[str]) -> None:
-    """And again after a Ctrl-C. What was finished is kept to the byte. Another process may round
-    the set-up of the tables otherwise, so what is new is compared where nothing is chaotic."""
+    """And again after a Ctrl-C. What was finished is kept to the byte, and the whole is that of
+    one process: in chaos each step shows every digit of the state handed over to it."""
     out, whole = tmp_path / "out", tmp_path / "whole"
     words: list[str | Path] = [
         "bifurcation",
@@ -215,14 +215,7 @@ def test_goes_on_after_a_kill(model: Path, tmp_path: Path, tracks: list[str]) ->
     one, other = (json.loads((f / "sweep.json").read_text()) for f in (out, whole))
     assert {**one, "cost": 0} == {**other, "cost": 0}
     for path in sorted((whole / "sweep.parquet").iterdir()):
-        want = pq.read_table(path, partitioning=None).to_pylist()
-        got = pq.read_table(out / "sweep.parquet" / path.name, partitioning=None).to_pylist()
-        for a, b in zip(got, want, strict=True):
-            assert [a[k] for k in ("omega", "n", "p", "q")] == [
-                b[k] for k in ("omega", "n", "p", "q")
-            ]
-            np.testing.assert_allclose(a["minima"], b["minima"], atol=1e-7)
-            np.testing.assert_allclose(a["velocities"], b["velocities"], atol=1e-7)
+        assert (out / "sweep.parquet" / path.name).read_bytes() == path.read_bytes()
 
 
 def _finished(*words: str | Path) -> tuple[int, str]:

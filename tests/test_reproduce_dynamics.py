@@ -16,13 +16,14 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from designer import cli, reproduce_dynamics
+from designer import bifurcation_plots, cli, reproduce_dynamics
 from designer.attractor import settle
 from designer.bifurcations import Kind
 from designer.cascade import cascade
 from designer.catalog import load_catalog
 from designer.errors import InputError
 from designer.flow import Flow
+from designer.modelfile import read_model_file
 from designer.orbit import failed
 from designer.paper_design import MODEL
 from designer.paper_order import Gap, faults, gaps
@@ -31,8 +32,10 @@ from designer.paper_statements import (
     DISAGREES,
     IN_PART,
     _dying,
+    _each,
     _grazing,
     _order,
+    _touches,
     main_windows,
 )
 from designer.progress import Progress
@@ -177,6 +180,49 @@ def test_each_step_of_the_first_cascade_is_what_long_runs_show() -> None:
         x = reached.start
 
 
+def grazing(before: str, after: str, direction: int, *stable: bool) -> Any:
+    return SimpleNamespace(
+        kind=Kind.GRAZING, value=1.2, before=before, after=after, stable=stable, direction=direction
+    )
+
+
+@pytest.mark.parametrize(
+    ("point", "verdict"),
+    [
+        (grazing("1-1-1", "1-2-1", -1, True, True), AGREES),
+        (grazing("1-2-3", "1-2-2", 1, True, True), AGREES),
+        (grazing("1-1-1", "1-2-1", 1, True, True), DISAGREES),  # as ω rises
+        (grazing("1-1-1", "1-2-1", -1, False, False), DISAGREES),  # no attractor
+        (grazing("1-1-1", "1-2-2", -1, True, True), DISAGREES),
+        (grazing("2-2-2", "2-3-2", -1, True, True), DISAGREES),
+    ],
+)
+def test_grazing_from_1_p_p_to_one_impact_more(point: Any, verdict: str) -> None:
+    said = _touches(SimpleNamespace(points=[point]))  # type: ignore[arg-type]
+    assert said.verdict == verdict
+
+
+def test_the_course_of_every_1_p_p() -> None:
+    def ended(p: int, why: str, *, symmetric: bool) -> Window:
+        one = made(f"1-{p}-{p}", 10.0 - p, 10.5 - p, symmetric=symmetric)
+        return replace(one, low=replace(one.low, why=why))
+
+    ladders = [ended(p, "pitchfork", symmetric=True) for p in range(1, 9)]
+    ladders += [ended(p, "period-doubling", symmetric=False) for p in range(1, 9)]
+    assert _each(ladders).verdict == AGREES
+    lacking = [w for w in ladders if w.symmetric or w.response != "1-7-7"]
+    assert _each(lacking).verdict == IN_PART
+    said = _each([*lacking, ended(7, "grazing", symmetric=False)])
+    assert said.verdict == IN_PART
+    assert "p = 7 by a grazing" in said.found
+    assert _each([ended(1, "fold", symmetric=True)]).verdict == DISAGREES
+
+
+def test_pictures_bear_the_title_of_the_papers_model() -> None:
+    path = Path(__file__).parent.parent / "examples" / "paper.toml"
+    assert read_model_file(path).title == reproduce_dynamics.TITLE
+
+
 @pytest.mark.slow
 def test_statements_say_where_the_paper_is_wrong() -> None:
     said = small().statements
@@ -195,6 +241,14 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
     out = tmp_path / "paper-dynamics"
     monkeypatch.setitem(reproduce_dynamics.FIGURES, "fig2c", (1.4, 1.5, 21))
     few = replace(SMALL, low=1.32, depth=2, figures=("fig2c",))
+    titles: list[str] = []
+    draw = bifurcation_plots.diagram
+
+    def titled(made: Any, points: Any, name: str = "") -> Any:
+        titles.append(name)
+        return draw(made, points, name)
+
+    monkeypatch.setattr(bifurcation_plots, "diagram", titled)
     found = reproduce(out, extent=few)
     data = json.loads((out / "dynamics.json").read_text(encoding="utf-8"))
     assert data["points"] == [p.as_dict() for p in found.found.points]
@@ -220,6 +274,9 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     for statement in found.statements:
         assert statement.found in text
+    unseen = [w for w in data["windows"] if "not located" in (w["from_kind"], w["to_kind"])]
+    assert f" {len(unseen)} of the {len(data['windows'])} windows" in text
+    assert titles == [reproduce_dynamics.TITLE]
     assert {path.name for path in out.iterdir()} <= reproduce_dynamics.NAMES
     command = reproduce_dynamics.COMMAND
     check_ours(out, reproduce_dynamics.NAMES, "dynamics.json", command)  # may be replaced
