@@ -30,7 +30,6 @@ from designer.corners import Corner, worst_corners
 from designer.ensemble import Ensemble
 from designer.jsonout import plain
 from designer.margin_indices import Index, sobol
-from designer.jsonout import plain
 from designer.margins import Margin, Prediction
 from designer.proportion import wilson
 from designer.quantities import exact_in, quantities
