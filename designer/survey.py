@@ -97,9 +97,11 @@ def survey(
                 else:
                     queue.append((add(close(child, points), number), deep + 1))
             # What was lost on the way may have been followed whole from its other end.
-            for child in lost:
-                if not known_before(child, len(child.points) // 2):
-                    queue.append((add(child, number), deep + 1))
+            queue.extend(
+                (add(child, number), deep + 1)
+                for child in lost
+                if not known_before(child, len(child.points) // 2)
+            )
     return Survey(family.parameter, tuple(branches), tuple(parents), tuple(points))
 
 
