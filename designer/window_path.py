@@ -38,7 +38,7 @@ STRIDE, SHORTEST = 1.0 / 8.0, 1.0 / 64.0
 REACH = 2.0
 """Of the deepest contact: extremes farther from a stop have no say."""
 MOVE, FINE, FINEST = 0.2, 0.1, 0.005
-"""Half-bands: how far the setting moves at once on the way, on the board itself at first, and where
+"""Half-bands: how far the setting moves in a longest step, on the board itself at first, and where
 moving ends."""
 ROAMING = 8
 """Steps of the first kind on the board itself."""
@@ -120,7 +120,8 @@ class _Path:
             there = None
             while there is None and ahead >= SHORTEST:
                 # A valley that closes on the way may open again: only at its end it has a say.
-                move = self._centre(here, slopes, ahead, MOVE, without="valley")
+                trust = MOVE * ahead / STRIDE
+                move = self._centre(here, slopes, ahead, trust, without="valley")
                 lenient = ahead == SHORTEST
                 there = self._at(here, slopes, ahead, move, lenient=lenient)
                 ahead *= 0.5
