@@ -20,7 +20,7 @@ from designer.board_parts import (
     protection_offset,
     trim_reach,
 )
-from designer.boardspec import BoardChoice, BoardSpec
+from designer.boardspec import BoardChoice, BoardSpec, Trim
 from designer.catalogentry import mounting_of
 from designer.circuit import (
     GROUND,
@@ -72,13 +72,14 @@ def start(circuit: Circuit) -> tuple[np.ndarray, np.ndarray]:
 def test_fittings_are_neutral_while_the_circuit_works(circuit: Circuit) -> None:
     """Probes, spare sections and a trim at 0 V, simulated too, change no coefficient."""
     board = fitted(circuit, FITTED, CATALOG)
-    more = [
-        replace(p, views=View.EVERYWHERE, **({"a": GROUND} if p.name == "R911" else {}))
-        for p in board.fittings
-        if isinstance(p, Resistor | Section)
-    ]
+    more: list[Resistor | Section] = []
+    for p in board.fittings:
+        if isinstance(p, Resistor):
+            a = GROUND if p.name == "R911" else p.a  # the wiper at 0 V
+            more.append(replace(p, a=a, views=View.EVERYWHERE))
+        elif isinstance(p, Section):
+            more.append(replace(p, views=View.EVERYWHERE))
     assert any(p.name == "R911" for p in more)
-    # A generator at 0 V in the wiper's place needs no trimmer.
     whole = replace(circuit, parts=(*circuit.parts, *more))
     for got, wanted in zip(start(whole), start(circuit), strict=True):
         np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
@@ -106,7 +107,12 @@ def test_the_trim_reaches_as_far_as_it_says() -> None:
 
 
 def test_a_trim_is_fitted_or_not_or_not_there() -> None:
-    for word, views in (("fitted", View.FITTED), ("unfitted", View.BOARD), ("none", None)):
+    cases: list[tuple[Trim, View | None]] = [
+        ("fitted", View.FITTED),
+        ("unfitted", View.BOARD),
+        ("none", None),
+    ]
+    for word, views in cases:
         choice = replace(CHOICE, spec=replace(CHOICE.spec, dc_trim=word))
         board = fitted(CIRCUITS["paper"], choice, CATALOG)
         trim = [p for p in board.fittings if p.name in ("RV901", "R911")]

@@ -12,7 +12,8 @@ import pytest
 from designer.board_parts import fitted
 from designer.boardspec import BoardChoice
 from designer.bom import COLUMNS, Line, bill, bill_csv
-from designer.bom_layouts import FOLDER, file_of, layouts
+from designer.bom_layouts import file_of, layouts
+from designer.catalog import LAYOUTS, load_catalog
 from designer.components import Component, components
 from designer.errors import InputError
 from designer.views import View
@@ -100,9 +101,9 @@ def test_columns_of_kicad() -> None:
 
 def test_no_cell_is_a_formula(tmp_path: Path) -> None:
     line = Line(1, ("R1",), "=1+1", "+x", "@m", "-p", "F:F", "", 1, "")
-    (tmp_path / FOLDER).mkdir()
+    (tmp_path / LAYOUTS).mkdir()
     own = 'format = 1\ncolumns = [{ title = "A", field = "value" }, { title = "B", text = "=x" }]\n'
-    (tmp_path / FOLDER / "own.toml").write_text(own)
+    (tmp_path / LAYOUTS / "own.toml").write_text(own)
     (layout,) = layouts(["own"], [tmp_path, *CATALOG.folders])
     (row,) = rows(layout.csv([line]))
     assert row == {"A": "'=1+1", "B": "'=x"}
@@ -130,8 +131,8 @@ def test_no_cell_is_a_formula(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_layouts_are_named(tmp_path: Path, text: str, field: str) -> None:
-    (tmp_path / FOLDER).mkdir()
-    (tmp_path / FOLDER / "own.toml").write_text(text)
+    (tmp_path / LAYOUTS).mkdir()
+    (tmp_path / LAYOUTS / "own.toml").write_text(text)
     with pytest.raises(InputError) as caught:
         layouts(["own"], [tmp_path])
     assert caught.value.field == field
@@ -142,3 +143,12 @@ def test_an_unknown_layout_is_named() -> None:
     with pytest.raises(InputError, match="jlcpcb") as caught:
         layouts(["jlpcb"], CATALOG.folders)
     assert caught.value.field == "board.bom"
+
+
+def test_a_changed_layout_is_a_changed_input(tmp_path: Path) -> None:
+    (tmp_path / LAYOUTS).mkdir()
+    path = tmp_path / LAYOUTS / "own.toml"
+    path.write_text('format = 1\ncolumns = [{ title = "A", text = "" }]\n')
+    before = load_catalog(tmp_path).hash
+    path.write_text('format = 1\ncolumns = [{ title = "B", text = "" }]\n')
+    assert load_catalog(tmp_path).hash != before != load_catalog().hash
