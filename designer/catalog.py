@@ -83,8 +83,8 @@ _CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
 class Catalog:
     """Everything that the folders hold; earlier entries come from earlier folders.
 
-    ``hash`` is of the content of all files, wherever they lie, layouts of bills among them. mounting : the cases that a board
-    takes; what is sold in no such case is no choice.
+    ``hash`` is of the content of all files, wherever they lie, layouts of bills among them.
+    mounting : the cases that a board takes; what is sold in no such case is no choice.
     """
 
     families: tuple[PartFamily, ...]

@@ -92,7 +92,10 @@ def test_the_trim_reaches_as_far_as_it_says() -> None:
         series = next(p for p in board.fittings if p.name == "R911")
         assert isinstance(series, Resistor)
         # The generator moved to the wiper; what was its resistor goes to ground.
-        parts = [replace(p, a=GROUND) if p.name == "R6" else p for p in circuit.parts]
+        parts = [
+            replace(p, a=GROUND) if isinstance(p, Resistor) and p.name == "R6" else p
+            for p in circuit.parts
+        ]
         wiper = replace(
             circuit,
             parts=(*parts, replace(series, views=View.EVERYWHERE)),
