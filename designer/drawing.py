@@ -65,7 +65,7 @@ def svg(circuit: Circuit, title: str = "") -> str:
     return _TAG.sub(lambda tag: _DIGITS.sub(lambda n: f"{float(n[0]):.3f}", tag[0]), text)
 
 
-def png(circuit: Circuit, title: str = "", dpi: int = 100) -> bytes:
+def png(circuit: Circuit, title: str = "", dpi: int = 72) -> bytes:
     """The drawing as PNG."""
     from designer.plots import style  # matplotlib is needed for this alone
 
@@ -76,7 +76,7 @@ def png(circuit: Circuit, title: str = "", dpi: int = 100) -> bytes:
 
 
 class _Page:
-    def __init__(self, canvas: Canvas, dpi: int = 100) -> None:
+    def __init__(self, canvas: Canvas, dpi: int = 72) -> None:
         self.canvas = canvas
         self.drawing = schemdraw.Drawing(canvas=canvas, show=False, dpi=dpi)
         self.drawing.config(
