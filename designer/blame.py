@@ -122,13 +122,13 @@ class Blame:
         for r in self.responses:
             row = asdict(r)
             row["prediction"]["right"] = r.prediction.right
-            for subject, plain in zip(r.subjects, row["subjects"], strict=True):
-                plain["low"], plain["high"] = subject.interval
+            for subject, its_row in zip(r.subjects, row["subjects"], strict=True):
+                its_row["low"], its_row["high"] = subject.interval
             rows.append(row)
         cost = {"attractors": self.attractors, "orbits": self.orbits, "seconds": self.seconds}
         out = {"samples": self.samples, "seed": self.seed, "responses": rows, "cost": cost}
-        plain_out: dict[str, Any] = plain(out)
-        return plain_out
+        shown: dict[str, Any] = plain(out)
+        return shown
 
 
 def blame(
