@@ -15,7 +15,7 @@ import importlib.resources
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
@@ -28,7 +28,9 @@ from designer.catalogentry import (
     UNITS,
     Diode,
     Figure,
+    Header,
     Kind,
+    Mounting,
     OpAmp,
     PartChoice,
     PartFamily,
@@ -36,6 +38,9 @@ from designer.catalogentry import (
     Rating,
     Reference,
     Section,
+    Trimmer,
+    Use,
+    mounting_of,
 )
 from designer.catalogfile import Entry, read_catalog_file
 from designer.errors import InputError, Unreachable
@@ -49,7 +54,9 @@ __all__ = [
     "Catalog",
     "Diode",
     "Figure",
+    "Header",
     "Kind",
+    "Mounting",
     "OpAmp",
     "PartChoice",
     "PartFamily",
@@ -57,6 +64,8 @@ __all__ = [
     "Rating",
     "Reference",
     "Section",
+    "Trimmer",
+    "Use",
     "load_catalog",
 ]
 
@@ -65,13 +74,15 @@ ENVIRONMENT = "DESIGNER_CATALOGS"
 
 _SAME = 1e-9  # relative; values and grades closer than this are the same
 _NamedT = TypeVar("_NamedT", OpAmp, Diode, Reference)
+_CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
 
 
 @dataclass(frozen=True)
 class Catalog:
     """Everything that the folders hold; earlier entries come from earlier folders.
 
-    ``hash`` is of the content of all files, wherever they lie.
+    ``hash`` is of the content of all files, wherever they lie. mounting : the cases that a board
+    takes; what is sold in no such case is no choice.
     """
 
     families: tuple[PartFamily, ...]
@@ -80,6 +91,13 @@ class Catalog:
     references: tuple[Reference, ...]
     hash: str
     folders: tuple[Path, ...]
+    trimmers: tuple[Trimmer, ...] = ()
+    headers: tuple[Header, ...] = ()
+    mounting: Mounting = "mixed"
+
+    def mounted(self, mounting: Mounting) -> Catalog:
+        """The same catalogue for a board that takes these cases."""
+        return replace(self, mounting=mounting)
 
     def values(
         self, kind: Kind, series: Sequence[str], lo: float, hi: float, grade: float
@@ -102,7 +120,7 @@ class Catalog:
             self._explain(kind, series, (lo, hi), grade, sold)
         return result
 
-    def part(self, kind: Kind, value: float, grade: float) -> PartChoice:
+    def part(self, kind: Kind, value: float, grade: float, use: Use = "signal") -> PartChoice:
         """The cheapest part of this value at ``grade`` or better.
 
         Among equally cheap ones the better grade, then the one that is listed first.
@@ -111,13 +129,8 @@ class Catalog:
         ------
         Unreachable : no family holds the value at that grade.
         """
-        fitting = self._families(kind, grade)
-        found = [
-            (family, nearest)
-            for family in fitting
-            for nearest in [min(family.values, key=lambda sold: abs(sold - value))]
-            if math.isclose(nearest, value, rel_tol=_SAME)
-        ]
+        fitting = self._families(kind, grade, use)
+        found = self._holding(fitting, value)
         if not found:
             unit = UNITS[kind]
             sold = sorted({each for family in fitting for each in family.values})
@@ -131,37 +144,100 @@ class Catalog:
                 if near
                 else f"a grade that can be bought: {self._best_grade(kind)}",
             )
-        family, exact = min(found, key=lambda each: (each[0].price, each[0].grade))
-        return PartChoice(
-            family,
-            exact,
-            family.part_number.of(exact),
-            family.manufacturer,
-            family.footprint,
-            family.rating,
-            family.price,
-        )
+        return _choice(*min(found, key=lambda each: (each[0].price, each[0].grade)))
+
+    def substitute(self, part: PartChoice, grade: float) -> PartChoice | None:
+        """Another maker's part of the same value, grade or better, use and footprint; the cheapest,
+        or None where the catalogue has none."""
+        family = part.family
+        found = [
+            (other, exact)
+            for other, exact in self._holding(
+                self._families(family.kind, grade, family.use), part.value
+            )
+            if other.footprint == part.footprint and other.manufacturer != part.manufacturer
+        ]
+        if not found:
+            return None
+        return _choice(*min(found, key=lambda each: (each[0].price, each[0].grade)))
 
     def opamp(self, name: str) -> OpAmp:
-        """The op-amp of this name; InputError names the known ones and a likely one."""
-        return _named(self.opamps, name, "circuit.opamp")
+        """The op-amp of this name; InputError names the known ones and a likely one, or says that
+        it is not sold in a case that the board takes."""
+        return self._cased(_named(self.opamps, name, "circuit.opamp"))
 
     def diode(self, name: str) -> Diode:
         """The diode of this name; InputError names the known ones and a likely one."""
-        return _named(self.diodes, name, "diode")
+        return self._cased(_named(self.diodes, name, "diode"))
 
     def reference(self, name: str) -> Reference:
         """The voltage reference of this name; InputError as for ``opamp``."""
-        return _named(self.references, name, "reference")
+        return self._cased(_named(self.references, name, "reference"))
 
-    def _families(self, kind: Kind, grade: float) -> list[PartFamily]:
+    def trimmer(self, value: float) -> Trimmer:
+        """The first trimmer of this value [Ω]; InputError names the values that there are."""
+        for entry in self.trimmers:
+            if math.isclose(entry.value, value, rel_tol=_SAME):
+                return self._cased(entry)
+        known = ", ".join(format_quantity(entry.value, "Ω") for entry in self.trimmers)
+        raise InputError(None, "trimmer", format_quantity(value, "Ω"), f"one of {known}")
+
+    def header(self, ways: int) -> Header:
+        """The first pin header of so many ways; InputError where there is none."""
+        for entry in self.headers:
+            if entry.ways[0] <= ways <= entry.ways[1]:
+                return entry
+        most = max((entry.ways[1] for entry in self.headers), default=0)
+        raise InputError(None, "header", ways, f"a number of ways up to {most}")
+
+    def _cased(self, entry: _CasedT) -> _CasedT:
+        """The entry in the first of its cases that the board takes."""
+        if self.mounting in ("mixed", mounting_of(entry.footprint)):
+            return entry
+        for case in entry.cases:
+            if mounting_of(case.footprint) == self.mounting:
+                moved = replace(
+                    entry,
+                    part_number=case.part_number,
+                    footprint=case.footprint,
+                    manufacturer=case.manufacturer or entry.manufacturer,
+                )
+                if case.pins is None or isinstance(moved, OpAmp):
+                    return moved
+                return replace(moved, pins=case.pins)
+        sold = mounting_of(entry.footprint)
+        raise InputError(
+            None,
+            "board.mounting",
+            self.mounting,
+            f'"{sold}" or "mixed": {entry.name} is in the catalogue in no other case',
+        )
+
+    def _families(self, kind: Kind, grade: float, use: Use = "signal") -> list[PartFamily]:
         if kind not in UNITS:
             raise InputError(None, "kind", kind, one_of(kind, UNITS))
         limit = grade * (1.0 + _SAME)
-        return [each for each in self.families if each.kind == kind and each.grade <= limit]
+        return [
+            each
+            for each in self.families
+            if each.kind == kind
+            and each.use == use
+            and each.grade <= limit
+            and self.mounting in ("mixed", each.mounting)
+        ]
+
+    @staticmethod
+    def _holding(families: Sequence[PartFamily], value: float) -> list[tuple[PartFamily, float]]:
+        """Those that hold a value, with that value as they have it."""
+        return [
+            (family, nearest)
+            for family in families
+            for nearest in [min(family.values, key=lambda sold: abs(sold - value))]
+            if math.isclose(nearest, value, rel_tol=_SAME)
+        ]
 
     def _best_grade(self, kind: Kind) -> str:
-        grades = [family.grade for family in self.families if family.kind == kind]
+        grades = [family.grade for family in self._families(kind, 1.0)]
         return f"{min(grades):.4g} or more" if grades else f"the catalogue has no {kind}s"
 
     def _explain(
@@ -217,6 +293,8 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         tuple(entry for entry in entries if isinstance(entry, Reference)),
         digest.hexdigest(),
         folders,
+        tuple(entry for entry in entries if isinstance(entry, Trimmer)),
+        tuple(entry for entry in entries if isinstance(entry, Header)),
     )
 
 
@@ -258,6 +336,18 @@ def _shipped() -> Path:
         if folder.is_dir():
             return folder
     raise InputError(None, "catalogs", "nothing", "the catalogue that comes with the tool")
+
+
+def _choice(family: PartFamily, value: float) -> PartChoice:
+    return PartChoice(
+        family,
+        value,
+        family.part_number.of(value),
+        family.manufacturer,
+        family.footprint,
+        family.rating,
+        family.price,
+    )
 
 
 def _named(entries: Sequence[_NamedT], name: str, where: str) -> _NamedT:

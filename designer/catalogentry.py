@@ -1,15 +1,20 @@
-"""What a catalogue holds: part families, op-amps, diodes, references, and their figures."""
+"""What a catalogue holds: part families, op-amps, diodes, references, and what a board needs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from designer.quantity import encode_value
+from designer.quantity import decode_value, encode_value
 from designer.vendor_model import VendorModel
 
 Kind = Literal["resistor", "capacitor"]
+Use = Literal["signal", "supply"]
+"""What a family is for: "supply" is for decoupling alone, where the value need not be kept."""
+Mounting = Literal["mixed", "smd", "tht"]
+"""Which cases a board takes: any, the first that the catalogue names; or one kind alone."""
 
 UNITS: dict[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
 
@@ -43,6 +48,31 @@ class Figure:
         raise AssertionError("a figure has at least one value")
 
 
+def mounting_of(footprint: str) -> Literal["smd", "tht"]:
+    """Whether a KiCad footprint is soldered on the surface or through holes, by its library."""
+    library = footprint.partition(":")[0]
+    through = ("_THT", "Package_DIP", "Package_SIP", "PinHeader", "TerminalBlock")
+    return "tht" if any(word in library for word in through) else "smd"
+
+
+@dataclass(frozen=True)
+class Rating:
+    """What a part stands: power [W], voltage [V]; None where it does not apply."""
+
+    power: float | None
+    voltage: float | None
+
+
+@dataclass(frozen=True)
+class Case:
+    """Another case that a part is sold in; pins : as of the part, where they differ."""
+
+    part_number: str
+    footprint: str
+    manufacturer: str | None = None
+    pins: Mapping[str, str] | None = field(default=None, hash=False)
+
+
 @dataclass(frozen=True)
 class Section:
     """One amplifier of a package, with its pin numbers."""
@@ -66,6 +96,8 @@ class OpAmp:
     noise_corner [Hz], of the 1/f noise; phase_reversal, whether the output goes high when an input
     falls below the common-mode range. spice : a vendor's model, used instead of ours on the finest
     rung.
+    input_current [A] : absolute maximum into an input, None where no sheet gives it. cases : others
+    that it is sold in, with the same pins.
     ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
     offsets from, and where it is cut. ``supply_pins``: positive, negative.
     """
@@ -100,6 +132,9 @@ class OpAmp:
     noise_corner: Figure | None = None
     phase_reversal: bool = False
     spice: VendorModel | None = None
+    # What no simulation knows of stays out of repr, which is part of what a study is known by.
+    input_current: Figure | None = field(default=None, repr=False)
+    cases: tuple[Case, ...] = field(default=(), repr=False)
 
     @property
     def sections(self) -> int:
@@ -113,7 +148,10 @@ class OpAmp:
 
 @dataclass(frozen=True)
 class Diode:
-    """A diode: forward_voltage [V], reverse_current [A], capacitance [F], recovery [s]."""
+    """A diode: forward_voltage [V], reverse_current [A], capacitance [F], recovery [s].
+
+    pins : name to number of the footprint's pad; KiCad's have the cathode at 1.
+    """
 
     name: str
     manufacturer: str
@@ -126,12 +164,17 @@ class Diode:
     price: int
     footprint: str
     sources: tuple[str, ...]
+    pins: Mapping[str, str] = field(
+        default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
+    )
+    cases: tuple[Case, ...] = ()
 
 
 @dataclass(frozen=True)
 class Reference:
     """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in,
-    dynamic impedance [Ω], which may be missing."""
+    dynamic impedance [Ω], which may be missing. pins : name to number; a name that is neither
+    cathode nor anode is not connected."""
 
     name: str
     manufacturer: str
@@ -144,6 +187,10 @@ class Reference:
     footprint: str
     sources: tuple[str, ...]
     impedance: Figure | None = None
+    pins: Mapping[str, str] = field(
+        default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
+    )
+    cases: tuple[Case, ...] = ()
 
     @property
     def least_current(self) -> float:
@@ -157,11 +204,45 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Rating:
-    """What a part stands: power [W], voltage [V]; None where it does not apply."""
+class Trimmer:
+    """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper."""
 
-    power: float | None
-    voltage: float | None
+    name: str
+    manufacturer: str
+    part_number: str
+    value: float
+    grade: float
+    rating: Rating
+    pins: Mapping[str, str] = field(hash=False)
+    price: int
+    footprint: str
+    sources: tuple[str, ...]
+    assumed: tuple[str, ...] = ()
+    cases: tuple[Case, ...] = ()
+
+
+@dataclass(frozen=True)
+class Header:
+    """Pin headers of one to many ways; ``{ways}`` and ``{ways:02}`` stand in the part number and
+    the footprint for the number of ways."""
+
+    name: str
+    manufacturer: str
+    part_number: str
+    ways: tuple[int, int]
+    rating: Rating
+    price: int
+    footprint: str
+    sources: tuple[str, ...]
+    assumed: tuple[str, ...] = ()
+
+    def number(self, ways: int) -> str:
+        """The part number of a header of so many ways."""
+        return self.part_number.format(ways=ways)
+
+    def place(self, ways: int) -> str:
+        """Its footprint."""
+        return self.footprint.format(ways=ways)
 
 
 @dataclass(frozen=True)
@@ -176,6 +257,12 @@ class PartNumber:
         """The part number of a value; ValueError for a value that the code cannot spell."""
         return f"{self.prefix}{encode_value(self.code, value)}{self.suffix}"
 
+    def value(self, number: str) -> float:
+        """The value [Ω or F] of a part number; ValueError for one that is not of this rule."""
+        if not (number.startswith(self.prefix) and number.endswith(self.suffix)):
+            raise ValueError(f"not a part number {self.prefix}…{self.suffix}")
+        return decode_value(self.code, number[len(self.prefix) : len(number) - len(self.suffix)])
+
 
 @dataclass(frozen=True)
 class PartFamily:
@@ -184,6 +271,7 @@ class PartFamily:
     ``values`` [Ω or F] are those that can be bought, ascending; temperature_coefficient [1/K] is a
     magnitude; ``assumed`` says in words what could not be compared with a data sheet. drift : most
     that a value changes in the data sheet's endurance test, a fraction; None where not known.
+    use : "supply" for families that no signal goes through.
     """
 
     name: str
@@ -202,6 +290,11 @@ class PartFamily:
     assumed: tuple[str, ...]
     values: tuple[float, ...] = field(repr=False)
     drift: float | None = None
+    use: Use = "signal"
+
+    @property
+    def mounting(self) -> Literal["smd", "tht"]:
+        return mounting_of(self.footprint)
 
 
 @dataclass(frozen=True)

@@ -13,22 +13,25 @@ from pathlib import Path
 
 from designer.catalogentry import (
     UNITS,
+    Case,
     Diode,
+    Header,
     OpAmp,
     PartFamily,
     PartNumber,
     Rating,
     Reference,
     Section,
+    Trimmer,
 )
-from designer.catalogtables import FamilyTable, FileTables, OpAmpTable
+from designer.catalogtables import CaseTable, FamilyTable, FileTables, OpAmpTable
 from designer.errors import InputError
 from designer.eseries import series_values
 from designer.quantity import format_quantity, parse_quantity
 from designer.schema import checked, one_of, parse_toml
 from designer.vendor_model import read_vendor_model
 
-Entry = PartFamily | OpAmp | Diode | Reference
+Entry = PartFamily | OpAmp | Diode | Reference | Trimmer | Header
 
 _MAX_BYTES = 4_000_000
 
@@ -69,9 +72,14 @@ def _from_toml(text: str, file: str) -> Iterable[Entry]:
     for index, opamp in enumerate(tables.opamp, start=1):
         yield _opamp(opamp, file, f"opamp[{index}]")
     for diode in tables.diode:
-        yield Diode(**dict(diode))
+        yield Diode(**{**dict(diode), "cases": _cases(diode.cases)})
     for reference in tables.reference:
-        yield Reference(**dict(reference))
+        yield Reference(**{**dict(reference), "cases": _cases(reference.cases)})
+    for trimmer in tables.trimmer:
+        rating = Rating(**dict(trimmer.rating))
+        yield Trimmer(**{**dict(trimmer), "rating": rating, "cases": _cases(trimmer.cases)})
+    for header in tables.header:
+        yield Header(**{**dict(header), "rating": Rating(**dict(header.rating))})
 
 
 def _from_csv(text: str, file: str) -> Iterable[Entry]:
@@ -162,6 +170,7 @@ def _family(table: FamilyTable, file: str, place: str) -> PartFamily:
         assumed=table.assumed,
         values=values,
         drift=table.drift,
+        use=table.use,
     )
 
 
@@ -198,4 +207,9 @@ def _opamp(table: OpAmpTable, file: str, place: str) -> OpAmp:
                 raise
             raise InputError(file, f"{place}.{error.field}", error.found, error.expected) from None
     figures = {key: value for key, value in table if key not in ("section", "spice")}
-    return OpAmp(**{**figures, "pins": sections, "spice": spice})
+    cases = _cases(table.cases)
+    return OpAmp(**{**figures, "pins": sections, "spice": spice, "cases": cases})
+
+
+def _cases(tables: Iterable[CaseTable]) -> tuple[Case, ...]:
+    return tuple(Case(**dict(table)) for table in tables)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-from designer.catalogentry import PRICE_CLASSES, UNITS, Figure, Kind
+from designer.catalogentry import PRICE_CLASSES, UNITS, Figure, Kind, Use
 from designer.eseries import SERIES
 from designer.quantity import VALUE_CODES, parse_quantity
 from designer.schema import (
@@ -123,6 +123,49 @@ def _quantity() -> Accepts:
     return Accepts('a number, or text such as "22.1k"', lambda value: one([value])[0])
 
 
+def _pins(*wanted: str) -> Accepts:
+    """A table of pin numbers by name; these names have to be there."""
+    one = line("").check
+    listed = f" with {', '.join(wanted)}" if wanted else ""
+
+    def check(value: object) -> dict[str, str]:
+        if not isinstance(value, dict) or not set(wanted) <= value.keys():
+            raise ValueError
+        numbers = {str(name): str(one(number)) for name, number in value.items()}
+        if len(set(numbers.values())) != len(numbers):
+            raise ValueError("each number once")
+        return numbers
+
+    return Accepts(f'a table of pins by name{listed}: {{ anode = "2" }}', check)
+
+
+def _ways() -> Accepts:
+    def check(value: object) -> tuple[int, int]:
+        if not isinstance(value, list) or len(value) != 2:
+            raise ValueError
+        low, high = value
+        if type(low) is not int or type(high) is not int or not 1 <= low <= high <= 99:
+            raise ValueError
+        return low, high
+
+    return Accepts("two whole numbers, the fewest and the most ways, up to 99", check)
+
+
+def _with_ways(expected: str) -> Accepts:
+    """Text in which "{ways}" or "{ways:02}" stands for the number of ways."""
+
+    def check(value: object) -> str:
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError
+        if not re.search(r"\{ways(:02)?\}", value) or set("{}") & set(
+            re.sub(r"\{ways(:02)?\}", "", value)
+        ):
+            raise ValueError("{ways} or {ways:02} has to stand in it")
+        return value
+
+    return Accepts(expected, check)
+
+
 def _pair_of_pins() -> Accepts:
     pins = lines("").check
 
@@ -183,6 +226,15 @@ class FamilyTable(BaseModel):
     example: ExampleTable | None = Field(None, description="a table of value, part_number")
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
     assumed: Annotated[tuple[str, ...], lines("a list of what was not checked")] = ()
+    use: Annotated[Use, choice("signal", "supply")] = "signal"
+
+
+class CaseTable(BaseModel):
+    model_config = STRICT
+    part_number: Annotated[str, _code_text()]
+    footprint: Annotated[str, _footprint()]
+    manufacturer: Annotated[str | None, line("a name of one line")] = None
+    pins: Annotated[dict[str, str] | None, _pins()] = None
 
 
 class SectionTable(BaseModel):
@@ -232,6 +284,10 @@ class OpAmpTable(BaseModel):
     noise_corner: Annotated[Figure | None, _figure("Hz")] = None
     phase_reversal: Annotated[bool, flag()] = False
     spice: SpiceTable | None = Field(None, description="a table of file, subckt, pins")
+    input_current: Annotated[Figure | None, _figure("A")] = None
+    cases: tuple[CaseTable, ...] = Field(
+        (), strict=False, description="a list of tables of part_number, footprint"
+    )
 
 
 class DiodeTable(BaseModel):
@@ -247,6 +303,12 @@ class DiodeTable(BaseModel):
     price: Annotated[int, _price()]
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
+    pins: Annotated[dict[str, str], _pins("cathode", "anode")] = Field(
+        default_factory=lambda: {"cathode": "1", "anode": "2"}
+    )
+    cases: tuple[CaseTable, ...] = Field(
+        (), strict=False, description="a list of tables of part_number, footprint"
+    )
 
 
 class ReferenceTable(BaseModel):
@@ -266,6 +328,45 @@ class ReferenceTable(BaseModel):
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
     impedance: Annotated[Figure | None, _figure("Ω")] = None
+    pins: Annotated[dict[str, str], _pins("cathode", "anode")] = Field(
+        default_factory=lambda: {"cathode": "1", "anode": "2"}
+    )
+    cases: tuple[CaseTable, ...] = Field(
+        (), strict=False, description="a list of tables of part_number, footprint"
+    )
+
+
+class TrimmerTable(BaseModel):
+    model_config = STRICT
+    name: Annotated[str, line("a name of one line")]
+    manufacturer: Annotated[str, line("a name of one line")]
+    part_number: Annotated[str, _code_text()]
+    value: Annotated[float, _positive("Ω")]
+    grade: Annotated[
+        float, number("", "a fraction in (0, 1): 0.01 is 1 %", lambda value: 0.0 < value < 1.0)
+    ]
+    rating: RatingTable = Field(RatingTable(), description="a table of power and voltage")
+    pins: Annotated[dict[str, str], _pins("low", "wiper", "high")]
+    price: Annotated[int, _price()]
+    footprint: Annotated[str, _footprint()]
+    sources: Annotated[tuple[str, ...], lines(_SOURCES)]
+    assumed: Annotated[tuple[str, ...], lines("a list of what was not checked")] = ()
+    cases: tuple[CaseTable, ...] = Field(
+        (), strict=False, description="a list of tables of part_number, footprint"
+    )
+
+
+class HeaderTable(BaseModel):
+    model_config = STRICT
+    name: Annotated[str, line("a name of one line")]
+    manufacturer: Annotated[str, line("a name of one line")]
+    part_number: Annotated[str, _with_ways('a part number with "{ways}" or "{ways:02}" in it')]
+    ways: Annotated[tuple[int, int], _ways()]
+    rating: RatingTable = Field(RatingTable(), description="a table of power and voltage")
+    price: Annotated[int, _price()]
+    footprint: Annotated[str, _with_ways('a KiCad footprint with "{ways}" or "{ways:02}" in it')]
+    sources: Annotated[tuple[str, ...], lines(_SOURCES)]
+    assumed: Annotated[tuple[str, ...], lines("a list of what was not checked")] = ()
 
 
 class FileTables(BaseModel):
@@ -277,3 +378,5 @@ class FileTables(BaseModel):
     reference: tuple[ReferenceTable, ...] = Field(
         (), strict=False, description="tables [[reference]]"
     )
+    trimmer: tuple[TrimmerTable, ...] = Field((), strict=False, description="tables [[trimmer]]")
+    header: tuple[HeaderTable, ...] = Field((), strict=False, description="tables [[header]]")

@@ -1,7 +1,8 @@
-"""The circuit: the single list of parts, pins and nets that every output is written from.
+"""The circuit: the single list of parts and nets that every output is written from.
 
-Net "0" is ground. Parts carry the names of the paper where it has them, and the role they play:
-the term of Eq. (10) that they realise.
+Net "0" is ground. ``Circuit.parts`` are simulated; ``Circuit.fittings`` are on the board or on the
+bill alone, and each part says in which views it stands. Parts carry the names of the paper where it
+has them, and the role they play: the term of Eq. (10) that they realise.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from dataclasses import dataclass, field
 from designer.catalogentry import OpAmp
 from designer.diode_model import DiodeModel
 from designer.errors import InputError
+from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.views import View
 
 GROUND = "0"
 POSITIVE, NEGATIVE = "vcc", "vee"
@@ -28,6 +31,7 @@ class Resistor:
     b: str
     value: float
     role: str
+    views: View = View.EVERYWHERE
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -43,6 +47,7 @@ class Capacitor:
     minus: str
     value: float
     role: str
+    views: View = View.EVERYWHERE
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -62,6 +67,7 @@ class Section:
     output: str
     role: str
     limits: bool = False
+    views: View = View.EVERYWHERE
 
     @property
     def package(self) -> str:
@@ -82,6 +88,7 @@ class Diode:
     model: DiodeModel
     rest: bool
     role: str
+    views: View = View.EVERYWHERE
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -105,6 +112,7 @@ class Reference:
     role: str
     least: float = 0.0
     impedance: float = 0.0
+    views: View = View.EVERYWHERE
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -168,6 +176,9 @@ class Stop:
 
 
 Part = Resistor | Capacitor | Section | Diode | Reference
+"""What is simulated."""
+Fitting = Part | SupplyCapacitor | Connector | TestPoint | Trimmer
+"""What may stand on the board or the bill alone, or be any part of a view."""
 
 
 @dataclass(frozen=True)
@@ -179,6 +190,7 @@ class Circuit:
     opamp : name of the op-amp in the catalogue; gain : its open-loop gain; bias : input current
     [A]; supply, saturation : rails and output limits, ± volts. figures : the catalogue's entry of
     the op-amp, for models above the ideal one.
+    fittings : parts of the board and the bill that are not simulated (``designer.board_parts``).
     """
 
     parts: tuple[Part, ...]
@@ -192,12 +204,23 @@ class Circuit:
     supply: float
     saturation: float
     figures: OpAmp | None = None
+    fittings: tuple[Fitting, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [p.name for p in self.parts]
+        names = [p.name for p in (*self.parts, *self.fittings)]
         if len(set(names)) != len(names):
             twice = sorted({n for n in names if names.count(n) > 1})
             raise InputError(None, "circuit.parts", ", ".join(twice), "each reference once")
+        for wanted, parts in ((True, self.parts), (False, self.fittings)):
+            lost = [p.name for p in parts if (View.SIMULATION in p.views) is not wanted]
+            if lost:
+                place = "parts" if wanted else "fittings"
+                said = "simulated parts" if wanted else "parts that are not simulated"
+                raise InputError(None, f"circuit.{place}", ", ".join(lost), said)
+
+    def view(self, view: View) -> tuple[Fitting, ...]:
+        """The parts that stand in a view, simulated ones first."""
+        return tuple(p for p in (*self.parts, *self.fittings) if view in p.views)
 
     @property
     def gain_bandwidth(self) -> float:

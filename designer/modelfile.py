@@ -27,6 +27,7 @@ from typing import Annotated, Literal, NoReturn
 from pydantic import BaseModel, Field
 
 from designer.bands import Bands
+from designer.boardspec import BoardSpec, BoardTable
 from designer.circuitspec import CircuitSpec, CircuitTable
 from designer.errors import InputError
 from designer.measured import Measured, read_measured
@@ -139,6 +140,7 @@ class ModelFile:
     spread: SpreadSpec = BENCH_1
     measured: Measured | None = None
     tuning: Bands = field(default_factory=Bands)
+    board: BoardSpec = field(default_factory=BoardSpec)
 
     @property
     def sha256(self) -> str:
@@ -216,8 +218,9 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
     title = tables.title or (source.stem if source is not None else "untitled")
     tuning = Bands(**dict(tables.tuning))
+    board = BoardSpec(**dict(tables.board))
     return ModelFile(
-        title, model, mechanical, responses, circuit, text, source, spread, tuning=tuning
+        title, model, mechanical, responses, circuit, text, source, spread, None, tuning, board
     )
 
 
@@ -401,4 +404,5 @@ class _File(BaseModel):
     )
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
     tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
+    board: BoardTable = Field(BoardTable(), description="a table [board]")
     spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 from designer import __version__, confirmation, hearing
+from designer.circuit import Part
 from designer.jsonout import plain
 from designer.verdict import StudyPlan, kept
 
@@ -57,12 +58,17 @@ def nine_digits(value: Any) -> Any:
     return [nine_digits(v) for v in value] if isinstance(value, list | tuple) else value
 
 
+def _simulated(part: Part) -> dict[str, Any]:
+    """What a part is to a simulation: not where else it stands."""
+    return {key: value for key, value in asdict(part).items() if key != "views"}
+
+
 def _samples(plan: StudyPlan) -> dict[str, Any]:
     circuit = plan.circuit
     return {
         "version": __version__,
         "rules": RULES["samples"],
-        "parts": [[type(p).__name__, plain(asdict(p))] for p in circuit.parts],
+        "parts": [[type(p).__name__, plain(_simulated(p))] for p in circuit.parts],
         "opamp": [circuit.opamp, circuit.gain, circuit.bias, circuit.supply, circuit.saturation],
         "figures": repr(circuit.figures),
         "spread": plain(plan.spread.as_dict()),

@@ -1,0 +1,61 @@
+"""The table ``[board]`` of a model file: what stands on the board beside the circuit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import BaseModel
+
+from designer.catalogentry import Mounting
+from designer.schema import STRICT, choice, flag, physical
+
+Trim = Literal["none", "unfitted", "fitted"]
+
+
+@dataclass(frozen=True)
+class BoardSpec:
+    """What the board has; the defaults of a model file.
+
+    mounting : the cases that it takes. test_points : pads for the outputs. probe_resistor [Ω] :
+    between an output and its pad and pin. decoupling, bulk [F] : at each supply pin, and at the
+    supply connector. dc_trim : the footprints of the DC trim, and whether they are fitted.
+    input_protection : diodes at the driven summing nodes.
+    """
+
+    mounting: Mounting = "mixed"
+    test_points: bool = True
+    probe_resistor: float = 1e3
+    decoupling: float = 100e-9
+    bulk: float = 10e-6
+    dc_trim: Trim = "unfitted"
+    input_protection: bool = True
+
+
+@dataclass(frozen=True)
+class BoardChoice:
+    """A board for one design: what the model file says, and the figures that it depends on.
+
+    resistor_grade, capacitor_grade : of what is bought, fractions. diode : the protection's, by
+    its name in the catalogue. trim : largest DC [V] that the trim stands for, as if the generator
+    had it.
+    """
+
+    spec: BoardSpec = BoardSpec()
+    resistor_grade: float = 0.01
+    capacitor_grade: float = 0.01
+    diode: str = "1N4148"
+    trim: float = 0.25
+
+
+class BoardTable(BaseModel):
+    """The keys of ``[board]``, each with what it accepts."""
+
+    model_config = STRICT
+    mounting: Annotated[Mounting, choice("mixed", "smd", "tht")] = BoardSpec.mounting
+    test_points: Annotated[bool, flag()] = BoardSpec.test_points
+    probe_resistor: Annotated[float, physical("Ω")] = BoardSpec.probe_resistor
+    decoupling: Annotated[float, physical("F")] = BoardSpec.decoupling
+    bulk: Annotated[float, physical("F")] = BoardSpec.bulk
+    dc_trim: Annotated[Trim, choice("none", "unfitted", "fitted")] = BoardSpec.dc_trim
+    input_protection: Annotated[bool, flag()] = BoardSpec.input_protection

@@ -1,0 +1,272 @@
+"""What stands on the board and what is bought: one list that BOM, KiCad, drawing and rules read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from designer.boardspec import BoardChoice
+from designer.catalog import Catalog, Kind, Use
+from designer.catalogentry import Rating
+from designer.circuit import Capacitor, Circuit, Diode, Fitting, Reference, Resistor, Section
+from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.pins import Package, Pin, packages, pins
+from designer.quantity import format_quantity
+from designer.stage_names import SUPPLY, stage_names
+from designer.views import View
+
+
+@dataclass(frozen=True)
+class Bought:
+    """What is ordered: grade is a fraction or None; substitute : another maker's part number, with
+    the maker in front, or ""; dielectric : what it is made of, or ""."""
+
+    manufacturer: str
+    part_number: str
+    rating: str
+    price_class: int
+    grade: float | None = None
+    substitute: str = ""
+    dielectric: str = ""
+
+
+@dataclass(frozen=True)
+class Component:
+    """One physical part.
+
+    kind : "resistor", "capacitor", "op-amp", "diode", "reference", "connector", "test point",
+    "trimmer". value : as people write it. quantity : the same as a number [Ω, F, V], None where
+    there is none. footprint : KiCad's, Library:Name. pins : every pad with its net. role : the
+    terms that it realises. stage : ``designer.stage_names``. near : reference of the component that
+    it has to stand at, or "". parts : names of the circuit's parts that it is. bought : None for
+    what is no part to order, such as a pad.
+    """
+
+    reference: str
+    kind: str
+    value: str
+    quantity: float | None
+    footprint: str
+    pins: tuple[Pin, ...]
+    role: str
+    stage: str
+    views: View
+    description: str
+    bought: Bought | None
+    near: str = ""
+    parts: tuple[str, ...] = ()
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it is on the board when that is populated; bare pads are."""
+        return View.BOM in self.views or self.bought is None
+
+    @property
+    def nets(self) -> dict[str, str]:
+        """The net of each pad; "" where nothing may be connected."""
+        return {pin.number: pin.net for pin in self.pins}
+
+
+def components(circuit: Circuit, catalog: Catalog, choice: BoardChoice) -> tuple[Component, ...]:
+    """Everything of the board and the bill, in the order of the circuit; op-amps as packages, in
+    the place of their first section.
+
+    Raises
+    ------
+    Unreachable : a value that cannot be bought at the grade.
+    InputError : a part or a case that is not in the catalogue.
+    """
+    lister = _Lister(circuit, catalog, choice)
+    cased = {p.name: p for p in packages(circuit, catalog)}
+    out: list[Component] = []
+    for part in (*circuit.parts, *circuit.fittings):
+        if not part.views & View.FITTED:
+            continue
+        if isinstance(part, Section):
+            package = cased.pop(part.package, None)
+            if package is not None:
+                out.append(lister.package(package))
+        else:
+            out.append(lister.one(part))
+    return tuple(out)
+
+
+def joined(found: Iterable[Component]) -> dict[str, tuple[tuple[str, str], ...]]:
+    """What each net joins: (reference, pad) in natural order, nets sorted. Pads without a net are
+    left out."""
+    out: dict[str, list[tuple[str, str]]] = {}
+    for component in found:
+        for pin in component.pins:
+            if pin.net:
+                out.setdefault(pin.net, []).append((component.reference, pin.number))
+    return {
+        net: tuple(sorted(out[net], key=lambda pad: (natural(pad[0]), natural(pad[1]))))
+        for net in sorted(out)
+    }
+
+
+class _Lister:
+    """Looks up each part of one circuit."""
+
+    def __init__(self, circuit: Circuit, catalog: Catalog, choice: BoardChoice) -> None:
+        self.circuit, self.catalog, self.choice = circuit, catalog, choice
+        self.stages: Mapping[str, str] = stage_names(circuit)
+
+    def one(self, part: Fitting) -> Component:
+        if isinstance(part, Resistor):
+            return self.passive(part, "resistor", "Ω", self.choice.resistor_grade, "signal")
+        if isinstance(part, Capacitor):
+            return self.passive(part, "capacitor", "F", self.choice.capacitor_grade, "signal")
+        if isinstance(part, SupplyCapacitor):
+            return self.passive(part, "capacitor", "F", 1.0, "supply", near=part.package)
+        if isinstance(part, Diode):
+            return self.diode(part)
+        if isinstance(part, Reference):
+            return self.reference(part)
+        if isinstance(part, Trimmer):
+            return self.trimmer(part)
+        if isinstance(part, Connector):
+            return self.connector(part)
+        assert isinstance(part, TestPoint)
+        return self.component(part, "test point", part.net, None, TEST_POINT, "", None)
+
+    def passive(
+        self,
+        part: Resistor | Capacitor | SupplyCapacitor,
+        kind: Kind,
+        unit: str,
+        grade: float,
+        use: Use,
+        near: str = "",
+    ) -> Component:
+        found = self.catalog.part(kind, part.value, grade, use)
+        other = self.catalog.substitute(found, grade)
+        bought = Bought(
+            manufacturer=found.manufacturer,
+            part_number=found.part_number,
+            rating=rated(found.rating),
+            price_class=found.price,
+            grade=found.family.grade,
+            substitute="" if other is None else f"{other.manufacturer} {other.part_number}",
+            dielectric=found.family.dielectric,
+        )
+        value = format_quantity(found.value, unit)
+        made = f"{found.family.dielectric} {kind}, {100 * found.family.grade:g} %"
+        return self.component(
+            part, kind, value, found.value, found.footprint, made, bought, near=near
+        )
+
+    def diode(self, part: Diode) -> Component:
+        found = self.catalog.diode(part.model.name)
+        rating = f"{format_quantity(found.reverse_voltage.nominal, 'V')} reverse"
+        bought = Bought(found.manufacturer, found.part_number, rating, found.price)
+        return self.component(part, "diode", found.name, None, found.footprint, "diode", bought)
+
+    def reference(self, part: Reference) -> Component:
+        found = self.catalog.reference(part.model)
+        rating = format_quantity(found.voltage, "V")
+        bought = Bought(found.manufacturer, found.part_number, rating, found.price, found.grade)
+        return self.component(
+            part,
+            "reference",
+            found.name,
+            found.voltage,
+            found.footprint,
+            "shunt reference",
+            bought,
+        )
+
+    def trimmer(self, part: Trimmer) -> Component:
+        found = self.catalog.trimmer(part.value)
+        bought = Bought(
+            found.manufacturer, found.part_number, rated(found.rating), found.price, found.grade
+        )
+        value = format_quantity(found.value, "Ω")
+        return self.component(
+            part, "trimmer", value, found.value, found.footprint, "trimmer", bought
+        )
+
+    def connector(self, part: Connector) -> Component:
+        ways = len(part.ways)
+        found = self.catalog.header(ways)
+        bought = Bought(found.manufacturer, found.number(ways), rated(found.rating), found.price)
+        return self.component(
+            part,
+            "connector",
+            f"{ways} ways",
+            None,
+            found.place(ways),
+            f"pin header, {ways} ways",
+            bought,
+        )
+
+    def package(self, package: Package) -> Component:
+        opamp, sections = package.opamp, package.sections
+        used = [s for s in sections if View.SIMULATION in s.views]
+        stages = dict.fromkeys(self.stages[s.name] for s in used)
+        return Component(
+            reference=package.name,
+            kind="op-amp",
+            value=opamp.name,
+            quantity=None,
+            footprint=opamp.footprint,
+            pins=package.pins,
+            role="; ".join(dict.fromkeys(s.role for s in used)),
+            stage=next(iter(stages), SUPPLY),
+            views=View.EVERYWHERE,
+            description=f"op-amp, {opamp.sections} sections; {len(used)} used",
+            bought=Bought(
+                opamp.manufacturer,
+                opamp.part_number,
+                f"± {self.circuit.supply:g} V supply",
+                opamp.price,
+            ),
+            parts=tuple(s.name for s in sections),
+        )
+
+    def component(
+        self,
+        part: Fitting,
+        kind: str,
+        value: str,
+        quantity: float | None,
+        footprint: str,
+        description: str,
+        bought: Bought | None,
+        near: str = "",
+    ) -> Component:
+        return Component(
+            reference=part.name,
+            kind=kind,
+            value=value,
+            quantity=quantity,
+            footprint=footprint,
+            pins=pins(part, self.circuit, self.catalog),
+            role=part.role,
+            stage=self.stages[part.name],
+            views=part.views,
+            description=description or kind,
+            bought=bought,
+            near=near,
+            parts=(part.name,),
+        )
+
+
+TEST_POINT = "TestPoint:TestPoint_Pad_D1.5mm"
+"""Footprint of a bare pad."""
+
+
+def rated(rating: Rating) -> str:
+    """A rating in words."""
+    shown = []
+    if rating.power is not None:
+        shown.append(format_quantity(rating.power, "W"))
+    if rating.voltage is not None:
+        shown.append(format_quantity(rating.voltage, "V"))
+    return ", ".join(shown)
+
+
+def natural(name: str) -> tuple[object, ...]:
+    """Sort key: R2 before R10."""
+    return tuple(int(t) if t.isdigit() else t for t in re.split(r"(\d+)", name))
