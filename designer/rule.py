@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -119,16 +120,38 @@ class NotRun(Exception):
     """A rule cannot be looked at; says why in words. Never a pass."""
 
 
-def judged(rule: Rule, found: Found, override: Override | None) -> Outcome:
-    """Pass or fail by the rule's limit, what was found, and what the model file says."""
-    usual = found.limit if found.limit is not None else rule.limit
-    assert usual is not None, rule.id
+def judged(rule: Rule, found: Iterable[Found], override: Override | None = None) -> Outcome:
+    """Pass or fail by the worst of what was found, under the model file's limit or the usual one.
+
+    Raises
+    ------
+    NotRun : there is nothing that the rule applies to.
+    """
+    ranked = [(_excess(rule, each, override), each) for each in found]
+    if not ranked:
+        raise NotRun("the design has nothing that this applies to")
+    _, worst = max(ranked, key=lambda pair: pair[0])
+    usual = usual_limit(rule, worst)
     limit = usual if override is None else override.limit
-    text = shown(found.value, rule.unit)
-    text += f" at {found.where}" if found.where else ""
-    text += f"; {found.more}" if found.more else ""
-    status = PASS if rule.keeps(found.value, limit) else FAIL
-    return Outcome(rule, status, text, found.value, limit, found.where, override, usual)
+    text = shown(worst.value, rule.unit)
+    text += f" at {worst.where}" if worst.where else ""
+    text += f"; {worst.more}" if worst.more else ""
+    status = PASS if rule.keeps(worst.value, limit) else FAIL
+    return Outcome(rule, status, text, worst.value, limit, worst.where, override, usual)
+
+
+def usual_limit(rule: Rule, found: Found) -> float:
+    """The limit of a rule where no model file changes it."""
+    limit = found.limit if found.limit is not None else rule.limit
+    assert limit is not None, f"{rule.id} has no limit"
+    return limit
+
+
+def _excess(rule: Rule, found: Found, override: Override | None) -> float:
+    """How far past its limit, in limits; a value that is no number is the worst."""
+    limit = usual_limit(rule, found) if override is None else override.limit
+    over = (limit - found.value) if rule.least else (found.value - limit)
+    return float("inf") if over != over else over / (abs(limit) or 1.0)
 
 
 def not_run(rule: Rule, why: str, override: Override | None = None) -> Outcome:

@@ -119,9 +119,9 @@ RULES: tuple[Rule, ...] = (
     _rule(
         "fault-current",
         "Current into an input while the supply is off and the generator gives 10 V",
-        2e-3, "A",
-        "DS21733J, absolute maximum at input pins, the smallest of the catalogue; 10 V is what "
-        "common generators give into a high impedance",
+        "the op-amp's largest input current; 2 mA where its data sheet gives none", "A",
+        "the op-amp's data sheet, absolute maximum ratings; 2 mA is that of the MCP6004, DS21733J; "
+        "10 V is what common generators give into a high impedance",
         "fit the input protection (board.input_protection), or drive through a larger resistor",
     ),
     _rule(

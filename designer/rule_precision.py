@@ -60,9 +60,7 @@ def noise(
     yield Found(total, more=f"{SLOWEST:g} Hz to {frequency:.4g} Hz")
 
 
-def leakage(
-    circuit: Circuit, catalog: Catalog, forces: Forces, drive: float
-) -> Iterator[Found]:
+def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) -> Iterator[Found]:
     """A rail through the board into one summing node; with it whatever leaks through diodes.
 
     Opposed diodes at one node leak less than that: neither sees a voltage there.
@@ -71,9 +69,7 @@ def leakage(
     for diode in circuit.diodes:
         entry = catalog.diode(diode.model.name)
         through += abs(forces.between(diode.cathode, diode.anode)) * entry.reverse_current.nominal
-    opposed = {
-        frozenset(d.nets) for d in circuit.fittings if isinstance(d, Diode)
-    }
+    opposed = {frozenset(d.nets) for d in circuit.fittings if isinstance(d, Diode)}
     for section in circuit.sections:
         node = section.inverting
         over_board = abs(forces.current.get(node, 0.0)) * circuit.supply / INSULATION
@@ -123,5 +119,3 @@ def stiffness(circuit: Circuit, mu: float, grade: float) -> Iterator[Found]:
 def shown_volts(volts: float) -> str:
     """Volts as people write them."""
     return f"{1e3 * volts:.3g} mV"
-
-

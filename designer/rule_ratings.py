@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 
 from designer.catalogentry import OpAmp
 from designer.circuit import GROUND, NEGATIVE, POSITIVE, Circuit, Diode
-from designer.components import Component
 from designer.conditions import saturating
 from designer.limits import bandwidth_limit, guaranteed
 from designer.rule import Found
@@ -15,6 +14,8 @@ from designer.stages import Stage, stages
 
 GENERATOR = 10.0
 """Most that a generator gives into a high impedance [V]: what common ones do."""
+INPUT = 2e-3
+"""Largest current into an input where no sheet gives one [A]: DS21733J, MCP6004, has the least."""
 HEAVY, LIGHT = 2e3, 10e3
 """Loads that data sheets state the swing for [Ω]."""
 
@@ -60,29 +61,27 @@ def output_current(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[F
         yield Found(peak.value, _at(section.name, peak), limit)
 
 
-def fault_current(circuit: Circuit) -> Iterator[Found]:
+def fault_current(circuit: Circuit, opamp: OpAmp) -> Iterator[Found]:
     """From the generator into each input with the supply off, every output and rail at 0 V.
 
     A pair of opposed diodes to ground at the node takes the current in the input's place; the two
     share it at worst, for both drop a diode's voltage.
     """
-    from designer.rule_nets import CLOSED
-
+    limit = INPUT if opamp.input_current is None else opamp.input_current.nominal
     held = {GROUND, POSITIVE, NEGATIVE, *(s.output for s in circuit.sections)}
     for section in circuit.sections:
         node = section.inverting
         siemens = _towards(circuit, circuit.generator.net, node, held)
         current = GENERATOR * siemens
-        guarded = {
-            frozenset((d.anode, d.cathode)) & {node} and (d.anode == node)
+        ways = {
+            d.anode == node
             for d in circuit.fittings
-            if isinstance(d, Diode) and {d.anode, d.cathode} == {node, GROUND}
+            if isinstance(d, Diode) and set(d.nets) == {node, GROUND}
         }
         more = ""
-        if guarded == {True, False}:
+        if ways == {True, False}:
             current, more = current / 2.0, "shared with the diodes at the node"
-        assert siemens < CLOSED
-        yield Found(current, f"{section.name}, node {node}", more=more)
+        yield Found(current, f"{section.name}, node {node}", limit, more)
 
 
 def _towards(circuit: Circuit, source: str, node: str, held: set[str]) -> float:
@@ -100,9 +99,7 @@ def _towards(circuit: Circuit, source: str, node: str, held: set[str]) -> float:
     return total
 
 
-def power(
-    found: Mapping[str, Component], ratings: Mapping[str, float], met: Operating
-) -> Iterator[Found]:
+def power(ratings: Mapping[str, float], met: Operating) -> Iterator[Found]:
     """Mean power of each resistor over its rating [W], by name."""
     for name, rating in ratings.items():
         peak = met.power.get(name)

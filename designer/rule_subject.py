@@ -12,12 +12,12 @@ from designer import loads
 from designer.api import Synthesis
 from designer.catalog import Catalog
 from designer.catalogentry import OpAmp
-from designer.circuit import Circuit, Resistor
+from designer.circuit import Circuit
 from designer.components import Component
 from designer.design import Design
-from designer.fittings import SupplyCapacitor
 from designer.loads import Run
 from designer.pipeline import nominal_reduction
+from designer.quantity import parse_quantity
 from designer.reduction import Reduction
 from designer.responses import ModelResponse, circuit_flow, on_circuit, peaks
 from designer.rule import NotRun
@@ -113,9 +113,26 @@ class Subject:
 
     @cached_property
     def watts(self) -> dict[str, float]:
-        """Rated power of each resistor [W]; without those whose family states none."""
-        return {
-            p.name: power
-            for p in self._resistors
-            if (power := self._part(p).rating.power) is not None
-        }
+        """Rated power [W] by resistor, of what is ordered; without those that state none."""
+        return self._rated("resistor", "W")
+
+    @cached_property
+    def volts(self) -> dict[str, float]:
+        """Rated voltage [V] by capacitor, likewise."""
+        return self._rated("capacitor", "V")
+
+    @cached_property
+    def dielectrics(self) -> dict[str, str]:
+        """What each capacitor is made of, in words."""
+        found = (c for c in self.components if c.kind == "capacitor" and c.bought is not None)
+        return {c.reference: c.bought.dielectric for c in found if c.bought is not None}
+
+    def _rated(self, kind: str, unit: str) -> dict[str, float]:
+        out = {}
+        for component in self.components:
+            if component.kind != kind or component.bought is None:
+                continue
+            for words in component.bought.rating.split(", "):
+                if words.endswith(unit):
+                    out[component.reference] = parse_quantity(words, unit)
+        return out
