@@ -34,8 +34,8 @@ SPACING: tuple[tuple[float, float, float], ...] = (
 MADE = 0.2
 """Gap [mm] that board makers etch without extra cost, and KiCad's own default."""
 CANARY = "canary"
-CANARY_WIDTH = 0.0371
-"""A track of a width [mm] that no board has."""
+CANARY_WIDTH, CANARY_LIMIT = 0.0371, 7.3371
+"""A track of a width [mm] that no board has, and the least that its rule asks for."""
 NONE: Mapping[str, Override] = MappingProxyType({})
 
 
@@ -128,7 +128,9 @@ def rules_text(rules: Sequence[CustomRule]) -> str:
 
 def canary() -> CustomRule:
     """A rule that a track of ``CANARY_WIDTH`` breaks: unless KiCad says so, it has read no rule."""
-    return CustomRule(CANARY, "track_width", 1.0, True, f"A.Width == {number_text(CANARY_WIDTH)}mm")
+    return CustomRule(
+        CANARY, "track_width", CANARY_LIMIT, True, f"A.Width == {number_text(CANARY_WIDTH)}mm"
+    )
 
 
 def _any_of(nets: Sequence[str]) -> str:

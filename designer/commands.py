@@ -34,7 +34,7 @@ STUDY_KEYS = (
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 VERBS = tuple(
-    "run synthesise synthesize simulate bifurcation tolerance reproduce catalog new".split()
+    "run synthesise synthesize simulate bifurcation tolerance rules reproduce catalog new".split()
 )
 
 app = typer.Typer(
@@ -369,5 +369,6 @@ def _print_json(answer: object) -> None:
 from designer import (  # noqa: E402
     commands_bifurcation,  # noqa: F401
     commands_reproduce,  # noqa: F401
+    commands_rules,  # noqa: F401
     commands_tolerance,  # noqa: F401
 )

@@ -9,12 +9,13 @@ formula of the topology enters.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from designer.circuit import GROUND, Circuit, nominal_board
+from designer.dead_zone_parts import OUTPUT
 from designer.nodal import NodalEquations
 from designer.system import Array
 
@@ -70,14 +71,15 @@ class Statics:
         n = len(c.states)
         key = c.rest
         G, right = self._equations.of(key)
-        sections = [s for s in c.sections]
-        count = len(sections) + len(self._nets)
+        sections = len(c.sections)
+        count = sections + len(self._nets)
         sources = np.zeros((len(G), count))
         for i, row in enumerate(self._section_rows()):
             sources[row, i] = -1.0
-        for i, net in enumerate(self._nets, len(sections)):
+        for i, net in enumerate(self._nets, sections):
             sources[c.nets.index(net), i] = 1.0
-        y = np.linalg.solve(G, np.hstack([right[:, : n + 1], sources, right[:, n + 1 :]]))
+        known = np.hstack([right[:, : n + 1], sources, right[:, n + 1 :]])
+        y = np.asarray(np.linalg.solve(G, known), dtype=np.float64)
         solved = self._equations.solution(y)
         solved.voltage[GROUND] = np.zeros(y.shape[1])
         rates = self._equations.rates(solved)
@@ -110,9 +112,7 @@ def leftover(circuit: Circuit, values: Mapping[str, float] | None = None) -> flo
     is the only path that differs, so its slope against the displacement is read there. values :
     ohm and farad in the place of the circuit's.
     """
-    from dataclasses import replace
-
-    board = nominal_board(circuit, ideal=False)
+    board = nominal_board(circuit)
     if values is not None:
         board = replace(board, values={**circuit.values, **values})
     equations = NodalEquations(circuit, board)
@@ -121,11 +121,8 @@ def leftover(circuit: Circuit, values: Mapping[str, float] | None = None) -> flo
     slopes = []
     for key in (circuit.rest, *(circuit.carrying(c) for _, c in stop.contacts)):
         G, right = equations.of(key)
-        solved = equations.solution(np.linalg.solve(G, right))
-        slopes.append(float(solved.voltage[STAGE][place]))
+        y = np.asarray(np.linalg.solve(G, right), dtype=np.float64)
+        solved = equations.solution(y)
+        slopes.append(float(solved.voltage[OUTPUT][place]))
     contact = float(np.mean(slopes[1:])) - slopes[0]
     return slopes[0] / contact
-
-
-STAGE = "fv"
-"""Net of the nonlinear stage's output."""
