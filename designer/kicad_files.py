@@ -11,6 +11,7 @@ from typing import Any
 
 from designer.api import Synthesis
 from designer.board_parts import board_circuit
+from designer.board_rules import board_rules, rules_text
 from designer.components import components
 from designer.design_files import design_provenance
 from designer.errors import InputError
@@ -38,7 +39,9 @@ def texts(made: Synthesis, checked: Checked | None = None) -> dict[str, str]:
     with naming(made.modelfile):
         circuit, choice = board_circuit(made)
         found = components(circuit, made.catalog, choice)
-        project = Project(made.modelfile.title, circuit, found, first_run(made, checked))
+        rules = rules_text(board_rules(circuit, made.modelfile.rules))
+        run = first_run(made, checked)
+        project = Project(made.modelfile.title, circuit, found, run, rules)
         return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
 
 

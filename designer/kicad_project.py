@@ -36,14 +36,14 @@ VIA: Mapping[str, float] = {"via_diameter": 0.6, "via_drill": 0.3}
 class Project:
     """What a project is made from.
 
-    title : the model file's. rules : text of the ``.kicad_dru``, or "" for none.
+    title : the model file's. rules : text of the ``.kicad_dru``.
     """
 
     title: str
     circuit: Circuit
     components: tuple[Component, ...]
     run: FirstRun
-    rules: str = ""
+    rules: str
 
     @property
     def name(self) -> str:
@@ -73,9 +73,8 @@ def files(project: Project) -> dict[str, str]:
         f"{LIBRARY}.kicad_sym": write(library(shapes(sheet))),
         "sym-lib-table": _table("sym_lib_table", f"{LIBRARY}.kicad_sym"),
         "fp-lib-table": _table("fp_lib_table", f"{LIBRARY}.pretty"),
+        f"{name}.kicad_dru": project.rules,
     }
-    if project.rules:
-        out[f"{name}.kicad_dru"] = project.rules
     for case, shape in sorted(cases.items()):
         out[f"{LIBRARY}.pretty/{case}.kicad_mod"] = write(module(shape))
     return out
