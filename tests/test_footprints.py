@@ -15,9 +15,11 @@ CATALOG = load_catalog()
 
 
 def catalogued() -> set[str]:
-    """Every footprint that the catalogue names."""
-    entries = (*CATALOG.opamps, *CATALOG.families, *CATALOG.diodes, *CATALOG.references)
-    return {entry.footprint for entry in entries}
+    """Every footprint that the catalogue names, in whichever case."""
+    found = {family.footprint for family in CATALOG.families}
+    for entries in (CATALOG.opamps, CATALOG.diodes, CATALOG.references, CATALOG.trimmers):
+        found |= {case.footprint for entry in entries for case in (entry, *entry.cases)}
+    return found | {CATALOG.header(ways).place(ways) for ways in range(2, 8)}
 
 
 @pytest.mark.parametrize("name", sorted({*catalogued(), *EXAMPLES}))
