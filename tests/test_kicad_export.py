@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from designer import kicad_files
+from designer import cli, kicad_files
 from designer.api import Synthesis
 from designer.errors import InputError
 from designer.kicad_project import Project
@@ -38,15 +38,19 @@ capacitors = "E12"
 """Without stops and responses: the quickest design."""
 
 
-def designer(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "designer", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=PAPER.parent.parent,
-        env={**os.environ, "COLUMNS": "200"},
-    )
+@dataclass(frozen=True)
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def designer(*arguments: str | Path) -> Done:
+    """The command line, inside this process."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = cli.status([str(a) for a in arguments])
+    return Done(code, out.getvalue(), err.getvalue())
 
 
 @pytest.fixture(scope="module")
