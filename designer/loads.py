@@ -135,7 +135,7 @@ def over(
     best: dict[tuple[str, str], tuple[float, str]] = {}
     for run in wanted:
         try:
-            found = _Sampled(reduction, run).extremes()
+            found = Sampled(reduction, run).extremes()
         except ArithmeticError as error:
             missing[run.name] = str(error)
             continue
@@ -152,7 +152,7 @@ def over(
     return Loads(tuple(loads), missing)
 
 
-class _Sampled:
+class Sampled:
     """One run on exact strobes, with the mode at each, and what lies between them."""
 
     def __init__(self, reduction: Reduction, run: Run) -> None:
@@ -190,7 +190,7 @@ class _Sampled:
         for _ in range(ROUNDS):
             time = left[:, None] + (right - left)[:, None] * np.linspace(0.0, 1.0, BRACKET + 1)
             x, u = self._between(time.ravel())
-            at = _modes(self.system, x, u, self.keys)
+            at = modes_at(self.system, x, u, self.keys)
             fine = table(x, u, at).reshape(len(which), BRACKET + 1, -1)
             own = fine[np.arange(len(which)), :, which]
             np.maximum.at(best, which, own.max(axis=1))
@@ -211,7 +211,7 @@ class _Sampled:
         self.x = run.strobes
         self.u = self._drive(self.step * np.arange(len(self.x), dtype=np.float64))
         self.keys: list[ModeKey] = [self.system.start]
-        self.at = _modes(self.system, self.x, self.u, self.keys)
+        self.at = modes_at(self.system, self.x, self.u, self.keys)
         self.slope = np.empty_like(self.x)
         for i, key in enumerate(self.keys):
             here, mode = self.at == i, self.system.mode(key)
@@ -277,7 +277,7 @@ def _brackets(values: Array) -> tuple[Index, Array, Array]:
     return which, np.maximum(at - 1, 0).astype(float), np.minimum(at + 1, last).astype(float)
 
 
-def _modes(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeKey]) -> Index:
+def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeKey]) -> Index:
     """Index into ``keys``, which grows, of the mode at each state (k, n) and drive (k,).
 
     The walk of ``PiecewiseLinearSystem.mode_at`` for all at once: across the most violated guard

@@ -20,6 +20,7 @@ import hashlib
 import math
 import re
 import stat
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
@@ -33,6 +34,8 @@ from designer.errors import InputError
 from designer.measured import Measured, read_measured
 from designer.model import Dimensionless, Mechanical, Sides
 from designer.paths import inside
+from designer.rule import Override
+from designer.rulespec import overrides
 from designer.schema import (
     STRICT,
     Accepts,
@@ -141,6 +144,7 @@ class ModelFile:
     measured: Measured | None = None
     tuning: Bands = field(default_factory=Bands)
     board: BoardSpec = field(default_factory=BoardSpec)
+    rules: Mapping[str, Override] = field(default_factory=dict)
 
     @property
     def sha256(self) -> str:
@@ -219,9 +223,10 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     title = tables.title or (source.stem if source is not None else "untitled")
     tuning = Bands(**dict(tables.tuning))
     board = BoardSpec(**dict(tables.board))
-    return ModelFile(
+    made = ModelFile(
         title, model, mechanical, responses, circuit, text, source, spread, None, tuning, board
     )
+    return replace(made, rules=overrides(tables.rules, file))
 
 
 def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
@@ -405,4 +410,5 @@ class _File(BaseModel):
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
     tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
     board: BoardTable = Field(BoardTable(), description="a table [board]")
+    rules: dict[str, object] = Field({}, description="tables [rules.<id>]")
     spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")

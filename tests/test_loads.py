@@ -158,7 +158,7 @@ def test_modes_of_many_states_are_those_of_each(seed: int) -> None:
     x = rng.uniform(-9.0, 9.0, (12, 4)) * rng.choice([0.01, 0.1, 1.0], (12, 1))
     u = rng.uniform(-3.0, 3.0, 12)
     keys = [system.start]
-    at = loads._modes(system, x, u, keys)
+    at = loads.modes_at(system, x, u, keys)
     assert [keys[i] for i in at] == [system.mode_at(a, float(b)) for a, b in zip(x, u, strict=True)]
 
 

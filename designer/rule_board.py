@@ -1,0 +1,157 @@
+"""Rules on a board: by KiCad's own check where that can say them, else read from the board file.
+
+Without a board, without KiCad, or where KiCad does not show that it understood a rule, the rule is
+not run: never a pass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from designer.board_drc import DesignRuleCheck, Violation
+from designer.board_file import BoardFile
+from designer.board_rules import CustomRule
+from designer.circuit import NEGATIVE, POSITIVE
+from designer.components import Component
+from designer.kicad_names import circuit_net
+from designer.rule import (
+    FAIL,
+    PASS,
+    Found,
+    NotRun,
+    Outcome,
+    Override,
+    Rule,
+    judged,
+    not_run,
+    shown,
+)
+from designer.rule_list import RULES
+
+NO_BOARD = "no board was given (--board FILE)"
+READ = "decoupling-distance"
+"""Rule that KiCad cannot say: it is read from the file."""
+MOST = 5
+"""Names in a message."""
+COPPER = frozenset({"clearance"})
+"""Rules that say nothing of a board without tracks."""
+
+
+def without_board(
+    rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str = NO_BOARD
+) -> tuple[Outcome, ...]:
+    """Every rule on a board, none of them run."""
+    return tuple(_idle(rule, rules, overrides, why) for rule in _wanted())
+
+
+def on_board(
+    board: BoardFile,
+    components: Sequence[Component],
+    rules: Sequence[CustomRule],
+    overrides: Mapping[str, Override],
+    checked: DesignRuleCheck | str,
+) -> tuple[Outcome, ...]:
+    """Every rule on a board. checked : what KiCad found, or why it was not asked."""
+    said = {custom.id: custom for custom in rules}
+    out = []
+    for rule in _wanted():
+        override = overrides.get(rule.id)
+        try:
+            if rule.id == READ:
+                out.append(judged(rule, decoupling_distance(board, components), override))
+            elif isinstance(checked, str):
+                out.append(_idle(rule, rules, overrides, checked))
+            else:
+                out.append(_by_kicad(rule, said[rule.id], board, checked, override))
+        except NotRun as reason:
+            out.append(_idle(rule, rules, overrides, str(reason)))
+    return tuple(out)
+
+
+def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """Between centres of pads [mm]: each supply pin, and the nearest pad on its net of the
+    capacitors that belong to the package."""
+    for package in components:
+        if package.kind != "op-amp":
+            continue
+        own = [c.reference for c in components if c.near == package.reference]
+        for pad in board.pads(package.reference):
+            if pad.net not in (POSITIVE, NEGATIVE):
+                continue
+            near = [
+                (math.dist(pad.at, other.at), reference)
+                for reference in own
+                for other in board.pads(reference)
+                if other.net == pad.net
+            ]
+            if not near:
+                raise NotRun(f"{package.reference} has no decoupling capacitor on {pad.net}")
+            distance, reference = min(near)
+            where = f"{package.reference}.{pad.number}"
+            yield Found(distance, where, more=f"to {reference}; read from the board file")
+
+
+def _by_kicad(
+    rule: Rule,
+    custom: CustomRule,
+    board: BoardFile,
+    checked: DesignRuleCheck,
+    override: Override | None,
+) -> Outcome:
+    if custom.id in checked.misunderstood:
+        raise NotRun("KiCad does not report a board that breaks this rule")
+    mine = [v for v in checked.violations if v.rule == custom.id]
+    if mine:
+        return _broken(rule, custom, mine, override)
+    concerned = {circuit_net(net) for net in custom.nets}
+    if concerned:
+        lost = sorted(concerned & checked.unconnected)
+        if lost:
+            raise NotRun(f"not routed yet: {', '.join(lost)}")
+        if not concerned & board.routed:
+            raise NotRun("none of the nets that this speaks of is routed")
+    elif rule.id in COPPER and not board.routed:
+        raise NotRun("the board has no track and no zone yet")
+    if custom.constraint == "courtyard_clearance":
+        bare = [f.reference for f in board.footprints if f.wired and not f.courtyard]
+        if bare:
+            raise NotRun(f"footprints without a courtyard: {', '.join(bare[:MOST])}")
+    usual = _usual(rule, custom, override)
+    return Outcome(
+        rule, PASS, "no violation in KiCad's check", limit=custom.limit, override=override,
+        usual=usual,
+    )  # fmt: skip
+
+
+def _broken(
+    rule: Rule, custom: CustomRule, found: Sequence[Violation], override: Override | None
+) -> Outcome:
+    worst = (min if rule.least else max)(found, key=lambda v: v.actual)
+    text = f"{shown(worst.actual, rule.unit)} at {worst.where}"
+    if len(found) > 1:
+        text += f"; {len(found)} places in all"
+    usual = _usual(rule, custom, override)
+    return Outcome(rule, FAIL, text, worst.actual, custom.limit, worst.where, override, usual)
+
+
+def _usual(rule: Rule, custom: CustomRule, override: Override | None) -> float:
+    """The limit without the model file's; nan where only the table would say."""
+    if override is None:
+        return custom.limit
+    return float("nan") if rule.limit is None else rule.limit
+
+
+def _idle(
+    rule: Rule, rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str
+) -> Outcome:
+    limits = {custom.id: custom.limit for custom in rules}
+    made = not_run(rule, why, overrides.get(rule.id))
+    return Outcome(
+        made.rule, made.status, made.found, limit=limits.get(rule.id, made.limit),
+        override=made.override,
+    )  # fmt: skip
+
+
+def _wanted() -> list[Rule]:
+    return [rule for rule in RULES if rule.scope == "board"]

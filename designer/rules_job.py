@@ -1,0 +1,138 @@
+"""The verb ``rules``: what is looked at, what is written.
+
+Nothing here prints; ``designer.commands_rules`` does.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from designer import __version__, junit, rule_board, rules, whole_file
+from designer.api import Synthesis
+from designer.board_drc import CheckFailed, DesignRuleCheck, check, kicad_version
+from designer.board_file import BoardFile, check_belongs, read_board
+from designer.board_parts import board_circuit
+from designer.board_rules import board_rules
+from designer.catalog import load_catalog
+from designer.components import components
+from designer.errors import InputError
+from designer.folder import Folder, StageName, is_design_folder
+from designer.job import read_design
+from designer.jsonout import dumps, plain
+from designer.preconditions import naming
+from designer.progress import Progress
+from designer.provenance import provenance, sha256
+from designer.rule import FAIL, NOT_RUN, PASS, Outcome
+from designer.rule_subject import Subject
+
+FORMAT = 1
+NAME = "rules.json"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What the rules say of a design. kicad : version of the program that checked the board."""
+
+    outcomes: tuple[Outcome, ...]
+    kicad: str | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether no rule fails; what was not run does not fail."""
+        return all(o.status != FAIL for o in self.outcomes)
+
+
+def into_folder(
+    path: Path, board: Path | None, report: Path | None, progress: Progress
+) -> tuple[dict[str, Any], bool]:
+    """Look at a design folder and write ``rules.json``, and the JUnit report if one is asked for.
+
+    What the folder has of an earlier look is replaced, for a board changes while it is drawn.
+
+    Returns
+    -------
+    The JSON object, and whether no rule fails.
+
+    Raises
+    ------
+    InputError : no design folder, or a board that is not of this design; nothing is written then.
+    """
+    began = time.perf_counter()
+    if not is_design_folder(path):
+        raise InputError(
+            path, "DIR", "no manifest.json", "a design folder, as synthesise and run make it"
+        )
+    catalog = load_catalog()
+    made = read_design(path, catalog)
+    given = None if board is None else read_board(board)
+    progress.stage("rules")
+    found = checked(made, given)
+    inputs = {
+        "model": made.modelfile.sha256,
+        "catalogue": catalog.hash,
+        "version": __version__,
+        "board": None if given is None else sha256(given.text.encode("utf-8")),
+        "kicad": found.kicad,
+    }
+    settings = {"board_sha256": inputs["board"], "kicad": found.kicad}
+    said = provenance(made.modelfile, catalog.hash, settings=settings)
+    answer = plain(_json(made, given, found.outcomes, said, time.perf_counter() - began))
+    folder = Folder(path)
+    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {"rules": (inputs, [NAME])}
+    folder.decide(wanted, overwrite=True, resume=False)  # refuses what is not ours
+    kept = {} if folder.manifest is None else folder.manifest.provenance
+    folder.begin(wanted, kept)
+    folder.write(NAME, dumps(answer))
+    folder.finish("rules")
+    if report is not None:
+        whole_file.write(report, junit.report(made.modelfile.title, found.outcomes))
+    return answer, found.passed
+
+
+def checked(made: Synthesis, board: BoardFile | None = None) -> Checked:
+    """Every rule on a design, and on its board if there is one.
+
+    Raises
+    ------
+    InputError : the board is not of this design, or a part is not in the catalogue.
+    """
+    limits = made.modelfile.rules
+    with naming(made.modelfile):
+        circuit, choice = board_circuit(made)
+        listed = components(circuit, made.catalog, choice)
+        custom = board_rules(circuit, limits)
+    if board is not None:
+        check_belongs(board, listed)
+    on_circuit = rules.on_circuit(Subject(made, circuit, listed), limits)
+    if board is None:
+        return Checked((*on_circuit, *rule_board.without_board(custom, limits)), None)
+    told: DesignRuleCheck | str
+    try:
+        told = check(board, custom)
+    except CheckFailed as why:
+        told = str(why)
+    on_board = rule_board.on_board(board, listed, custom, limits, told)
+    return Checked((*on_circuit, *on_board), kicad_version())
+
+
+def _json(
+    made: Synthesis,
+    board: BoardFile | None,
+    outcomes: Sequence[Outcome],
+    said: dict[str, Any],
+    seconds: float,
+) -> dict[str, Any]:
+    count = {status: sum(o.status == status for o in outcomes) for status in (PASS, FAIL, NOT_RUN)}
+    return {
+        "format": FORMAT,
+        "title": made.modelfile.title,
+        "board": None if board is None else board.path.name,
+        "counts": count,
+        "rules": [o.as_dict() for o in outcomes],
+        "provenance": said,
+        "cost": {"seconds": seconds},
+    }
