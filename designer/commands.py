@@ -34,7 +34,8 @@ STUDY_KEYS = (
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 VERBS = tuple(
-    "run synthesise synthesize simulate bifurcation tolerance rules reproduce catalog new".split()
+    "run synthesise synthesize simulate bifurcation tolerance export rules reproduce catalog "
+    "new".split()
 )
 
 app = typer.Typer(
@@ -368,6 +369,7 @@ def _print_json(answer: object) -> None:
 # The verbs that stand in files of their own register themselves.
 from designer import (  # noqa: E402
     commands_bifurcation,  # noqa: F401
+    commands_export,  # noqa: F401
     commands_reproduce,  # noqa: F401
     commands_rules,  # noqa: F401
     commands_tolerance,  # noqa: F401

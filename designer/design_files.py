@@ -15,23 +15,21 @@ from designer.bom import bill, bill_csv
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.coefficients import coefficient_errors
-from designer.deck import Excitation, SolverSettings
 from designer.design import Certificate, Check, Design
 from designer.errors import InputError
+from designer.first_run import first_run
 from designer.folder import DESIGN, MODEL, Folder
 from designer.jsonout import dumps, synthesis_json
 from designer.measured import MEASURED
-from designer.modelfile import ModelFile, Response
-from designer.pipeline import Checked, nominal_reduction
+from designer.modelfile import ModelFile
+from designer.pipeline import Checked
 from designer.preconditions import cores, naming
 from designer.provenance import provenance
-from designer.responses import find, on_circuit, peaks
+from designer.responses import find, peaks
 from designer.selection import SOLVER
 from designer.setup_table import scales_csv, setup_csv, start_recipes
 
 SETUP = "setup.csv"
-DECK_PERIODS = 20
-"""Drive periods that ``circuit.cir`` runs for."""
 
 
 def texts(made: Synthesis) -> dict[str, str]:
@@ -130,25 +128,15 @@ def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:
 
     checked : of the first response; its gate's settings are used.
     """
-    modelfile, design = made.modelfile, made.design
-    first = made.found[0] if made.found else find(design.model, [Response(1.0)])[0]
-    excitation = Excitation(design.errors.scales.frequency(first.omega), design.amplitude(first.b))
-    if checked is None:
-        orbit = on_circuit(nominal_reduction(design).system(), design, first)
-    else:
-        orbit = checked.circuit
-    period = 1.0 / excitation.frequency
-    settings = SolverSettings("trap", period / 1000.0)
-    if checked is not None and checked.gate is not None:
-        settings = checked.gate.settings
+    design, run = made.design, first_run(made, checked)
     text = deck.write(
         design.circuit,
         nominal_board(design.circuit),
-        excitation,
-        settings,
-        title=modelfile.title,
-        stop_time=DECK_PERIODS * period,
-        initial=orbit.start if len(orbit.start) else None,
+        run.excitation,
+        run.settings,
+        title=made.modelfile.title,
+        stop_time=run.stop_time,
+        initial=run.initial,
     )
     nets = [*design.circuit.state_nets, *(["fv"] if design.circuit.stops else [])]
     shown = " ".join(f"v({net})" for net in [*nets, design.circuit.generator.net])

@@ -1,11 +1,12 @@
 """The design folder on disk: its manifest, what may be replaced, what is complete.
 
 ``manifest.json`` lists every file that the tool wrote, with its hash, and the stages (``design``,
-``study``, ``comparison``) with the hash of their inputs. A stage with the same inputs is not done
-again; one with others only with ``--overwrite``, which touches listed files and no others. Where
-only a list among the inputs has grown (``layers`` of a study) the stage is extended. A stage's
-files are listed before the first of them is written, so that interrupted work can be told from
-foreign files; a name that ends in "/" stands for a folder of blocks until the stage is finished.
+``kicad``, ``study``, ``comparison``) with the hash of their inputs. A stage with the same inputs is
+not done again; one with others only with ``--overwrite``, which touches listed files and no others.
+Where only a list among the inputs has grown (``layers`` of a study) the stage is extended. A
+stage's files are listed before the first of them is written, so that interrupted work can be told
+from foreign files; a name that ends in "/" stands for a folder of blocks until the stage is
+finished.
 """
 
 from __future__ import annotations
@@ -167,7 +168,7 @@ class Folder:
         data = content.encode("utf-8") if isinstance(content, str) else content
         path = self / name
         with _writing(path):
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             partial = partial_of(path)
             partial.write_bytes(data)
             os.replace(partial, path)

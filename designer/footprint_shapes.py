@@ -127,6 +127,14 @@ def two_holes(
     return Footprint(name, pads, body, mark=mark)
 
 
+def transistor_outline(name: str) -> Footprint:
+    """TO-92 with its legs in a row at 1.27 mm; body 5.2 mm by 4.0 mm (JEDEC TO-226)."""
+    pads = tuple(
+        Pad(str(i + 1), 1.27 * (i - 1), 0.0, 0.95, 1.5, 0.6, first=i == 0) for i in range(3)
+    )
+    return Footprint(name, pads, (5.2, 4.0), mark=True)
+
+
 def header(name: str, count: int, pitch: float) -> Footprint:
     """A column of holes for square pins of 0.64 mm."""
     pads = tuple(

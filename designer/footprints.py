@@ -67,6 +67,11 @@ _RULES: tuple[tuple[str, str, _Rule], ...] = (
     ),
     ("CP_Radial_D5.0mm_P2.00mm", rf"CP?_Radial_D{_NUMBER}mm_P{_NUMBER}mm", _can),
     (
+        "TO-92_Inline",
+        r"TO-92_Inline",
+        lambda name, m: shapes.transistor_outline(name),
+    ),
+    (
         "PinHeader_1x03_P2.54mm_Vertical",
         rf"PinHeader_1x(\d+)_P{_NUMBER}mm_Vertical",
         lambda name, m: shapes.header(name, int(m[1]), float(m[2])),

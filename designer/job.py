@@ -16,6 +16,7 @@ from designer import (
     api,
     compare_files,
     design_files,
+    kicad_files,
     simulate_plots,
     simulation,
 )
@@ -114,6 +115,8 @@ def synthesise_into(
         made = api.synthesise(modelfile, catalog)
         with naming(modelfile):
             files = design_files.texts(made)
+        inputs = wanted["design"][0]
+        project = kicad_files.beside(folder, made, inputs, options.overwrite, progress)
     elif todo:
         made = load(folder, modelfile, catalog)
     compared = compare_files.make(made, progress) if "comparison" in todo else None
@@ -122,6 +125,7 @@ def synthesise_into(
     if "design" in todo:
         design_files.write(folder, made, files)
         folder.finish("design")
+        kicad_files.write(folder, made, inputs, project)
     if compared is not None:
         compare_files.write(folder, compared)
         folder.finish("comparison")

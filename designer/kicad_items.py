@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from designer import kicad_symbols as symbols
 from designer.circuit import GROUND, NEGATIVE, POSITIVE, Circuit
 from designer.components import Component
+from designer.first_run import FirstRun
 from designer.kicad_layout import Item
 from designer.kicad_names import LIBRARY, POWER, footprint_name, library_name
-from designer.kicad_sim import Fields, Simulation, fields, sources
+from designer.kicad_sim import Fields, fields, sources
 from designer.kicad_symbols import Shape
 from designer.pins import SUPPLY_UNIT
 from designer.stage_names import SUPPLY, section_stages
@@ -38,13 +39,13 @@ class Entry:
 
 
 def entries(
-    circuit: Circuit, components: Sequence[Component], simulation: Simulation, library: str
+    circuit: Circuit, components: Sequence[Component], run: FirstRun, library: str
 ) -> tuple[Entry, ...]:
     """Every component, then what the simulation needs besides. library : file of its models."""
     stages = section_stages(circuit)
     made = [_entry(c, circuit, stages, library) for c in components]
     ground = GROUND
-    for source in sources(circuit, simulation):
+    for source in sources(circuit, run):
         shape = symbols.source("VSOURCE")
         pins = {"1": source.net, "2": ground}
         item = Item(source.name, source.value, shape, pins, {1: SIMULATION})

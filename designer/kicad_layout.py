@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 from designer.kicad_names import POWER
 from designer.kicad_symbols import GRID, REACH, Shape, ShapePin, power
@@ -123,7 +124,7 @@ class Cell:
 
     def wire(self, *points: Point) -> None:
         """A wire through these points; those that coincide take none."""
-        self.wires += [(a, b) for a, b in zip(points, points[1:], strict=False) if a != b]
+        self.wires += [(a, b) for a, b in pairwise(points) if a != b]
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ class Sheet:
         out: set[tuple[Point, Point]] = set()
         for a, b in whole:
             on = sorted(p for p in stops if _on(p, a, b))
-            out |= set(zip(on, on[1:], strict=False))
+            out |= set(pairwise(on))
         return tuple(sorted(out))
 
     @property
@@ -267,7 +268,9 @@ def _section(
         levels.append(y - 6)
         cell.wire((BUS, y - 6), (RETURN, y - 6), (RETURN, at_out[1]))
     elif node not in POWER:
-        cell.labels.append(Label(node, (BUS, min(levels)), left=False))
+        # Past the junction; above the bus where nothing leads on from there.
+        where = (BUS + 1, 0) if back else (BUS, min(levels))
+        cell.labels.append(Label(node, where, left=False))
     cell.wire((BUS, min(levels)), (BUS, max(levels)))
     cell.height = max(PITCH * (len(inputs) - 1) + 4, y + 6)
     return cell

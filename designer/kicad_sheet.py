@@ -37,9 +37,7 @@ def symbol_id(project: str, reference: str, unit: int = 1) -> str:
     return identifier(project, "symbol", reference, str(unit))
 
 
-def schematic(
-    project: str, title: str, entries: Sequence[Entry], sheet: Sheet
-) -> Expression:
+def schematic(project: str, title: str, entries: Sequence[Entry], sheet: Sheet) -> Expression:
     """The file ``.kicad_sch``. title : from the model file, as it is."""
     by_reference = {e.item.reference: e for e in entries}
     return expression(
@@ -123,7 +121,9 @@ def _symbol(project: str, placed: Placed, entries: Mapping[str, Entry]) -> Expre
         expression("lib_id", f"{LIBRARY}:{item.shape.name}"),
         position(placed.x, placed.y, placed.angle),
         expression("unit", placed.unit),
-        expression("exclude_from_sim", entry is not None and not entry.simulated and not _power(item)),
+        expression(
+            "exclude_from_sim", entry is not None and not entry.simulated and not _power(item)
+        ),
         expression("in_bom", entry is not None and entry.bought),
         expression("on_board", entry is not None and entry.placed),
         expression("dnp", entry is not None and not entry.fitted),
@@ -153,7 +153,7 @@ def _properties(placed: Placed, entry: Entry | None) -> Iterator[Expression]:
     item = placed.item
     (rx, ry), (vx, vy) = item.shape.texts
     supply = len(item.shape.units) > 1 and placed.unit == len(item.shape.units)
-    hidden = item.shape.power and item.value in ("GND", "PWR_FLAG")
+    hidden = item.value in ("GND", "PWR_FLAG") if item.shape.power else item.shape.prefix == "TP"
     if supply:
         rx, ry = 3.5, 0.0
     yield _property("Reference", item.reference, placed.x + rx, placed.y - ry, item.shape.power)
@@ -182,5 +182,3 @@ def _at(point: tuple[int, int]) -> Expression:
 
 def _id(*what: str) -> Expression:
     return expression("uuid", identifier(*what))
-
-

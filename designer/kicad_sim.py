@@ -12,23 +12,12 @@ from dataclasses import dataclass
 from designer import diode_model, opamp_model
 from designer.circuit import Circuit, nominal_board
 from designer.components import Component
-from designer.deck import Excitation, SolverSettings
+from designer.first_run import FirstRun
 from designer.kicad_names import kicad_net
-from designer.system import Array
 from designer.views import View
 
 GENERATOR, RAIL = "generator", "supply"
 Fields = tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """What the sheet simulates. stop_time [s]; initial : (states,) capacitor voltages."""
-
-    excitation: Excitation
-    settings: SolverSettings
-    stop_time: float
-    initial: Array
 
 
 @dataclass(frozen=True)
@@ -41,9 +30,9 @@ class Source:
     fields: Fields
 
 
-def sources(circuit: Circuit, simulation: Simulation) -> tuple[Source, ...]:
+def sources(circuit: Circuit, run: FirstRun) -> tuple[Source, ...]:
     """The generator and both rails."""
-    drive = simulation.excitation
+    drive = run.excitation
     sine = (
         f"dc={_n(drive.offset)} ampl={_n(drive.amplitude)} f={_n(drive.frequency)} "
         "td=0 theta=0 phase=180"
@@ -51,7 +40,9 @@ def sources(circuit: Circuit, simulation: Simulation) -> tuple[Source, ...]:
     made = [Source(circuit.generator.name, circuit.generator.net, GENERATOR, _source("SIN", sine))]
     made += [
         # A reference without a number is none to KiCad.
-        Source(f"{rail.name}1", rail.net, f"{rail.volts:g} V", _source("DC", f"dc={_n(rail.volts)}"))
+        Source(
+            f"{rail.name}1", rail.net, f"{rail.volts:g} V", _source("DC", f"dc={_n(rail.volts)}")
+        )
         for rail in circuit.rails
     ]
     return tuple(made)
@@ -74,7 +65,9 @@ def fields(component: Component, circuit: Circuit, library: str) -> Fields:
         return _model("SUBCKT", library, component.reference.lower(), pins)
     by_names = f"{numbers['cathode']}={{}} {numbers['anode']}={{}}"
     if component.kind == "diode":
-        return _model("D", library, _diodes(circuit)[component.reference], by_names.format("K", "A"))
+        return _model(
+            "D", library, _diodes(circuit)[component.reference], by_names.format("K", "A")
+        )
     name = _references(circuit)[component.reference]
     return _model("SUBCKT", library, name, by_names.format("cathode", "anode"))
 
@@ -119,19 +112,24 @@ def models(circuit: Circuit, components: Sequence[Component]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def directives(circuit: Circuit, simulation: Simulation) -> tuple[str, ...]:
+def directives(circuit: Circuit, run: FirstRun) -> tuple[str, ...]:
     """The lines that a simulation of the sheet runs with."""
-    s = simulation.settings
+    s = run.settings
     by_name = {c.name: c for c in circuit.capacitors}
-    starts = [
-        f".ic v({kicad_net(by_name[name].plus)})={_n(volts)}"
-        for name, volts in zip(circuit.states, simulation.initial, strict=False)
-    ]
+    # The other plate is a summing node, which starts at 0 V.
+    starts = (
+        []
+        if run.initial is None
+        else [
+            f".ic v({kicad_net(by_name[name].plus)})={_n(volts)}"
+            for name, volts in zip(circuit.states, run.initial, strict=True)
+        ]
+    )
     return (
         f".options method={s.method} reltol={_n(s.reltol)}",
         f".options abstol={_n(s.abstol)} vntol={_n(s.vntol)} noopiter",
         *starts,
-        f".tran {_n(s.max_step)} {_n(simulation.stop_time)} 0 {_n(s.max_step)} uic",
+        f".tran {_n(s.max_step)} {_n(run.stop_time)} 0 {_n(s.max_step)} uic",
     )
 
 
@@ -166,5 +164,3 @@ def _references(circuit: Circuit) -> Mapping[str, str]:
 def _n(value: float) -> str:
     """A number that SPICE reads back as the same float."""
     return repr(float(value))
-
-

@@ -139,7 +139,7 @@ def row(name: str, prefix: str, pins: Sequence[tuple[str, str, str]], pitch: int
 def test_point() -> Shape:
     ring = ((0.0, 0.0), (0.0, 1.0), (-0.6, 1.6), (0.0, 2.2), (0.6, 1.6), (0.0, 1.0))
     pin = ShapePin("1", "1", "passive", 0, 0, 90, 0)
-    return Shape("TestPoint", "TP", (Unit((pin,), (ring,), False),), ((2.4, 2.2), (2.4, 0.8)))
+    return Shape("TestPoint", "TP", (Unit((pin,), (ring,), False),), ((2.6, 1.4), (2.6, 0.0)))
 
 
 test_point.__test__ = False  # type: ignore[attr-defined]  # no test, whatever its name says
@@ -149,9 +149,7 @@ INVERTING, NONINVERTING, OUTPUT = (-6, 2), (-6, -2), (6, 0)
 """Where the pins of a section are."""
 
 
-def opamp(
-    name: str, sections: Sequence[tuple[str, str, str]], supply: tuple[str, str]
-) -> Shape:
+def opamp(name: str, sections: Sequence[tuple[str, str, str]], supply: tuple[str, str]) -> Shape:
     """An op-amp package: pin numbers (inverting, noninverting, output) of each section in order,
     then of the positive and the negative supply, which are the last unit."""
     triangle = ((-4.0, -4.0), (-4.0, 4.0), (4.0, 0.0), (-4.0, -4.0))
@@ -199,7 +197,10 @@ def power(net: str) -> Shape:
 
 def flag() -> Shape:
     """Tells the electrical rule check that a net is fed from outside."""
-    lines = (((0.0, 0.0), (0.0, 1.0)), ((-1.0, 1.6), (0.0, 1.0), (1.0, 1.6), (0.0, 2.2), (-1.0, 1.6)))
+    lines = (
+        ((0.0, 0.0), (0.0, 1.0)),
+        ((-1.0, 1.6), (0.0, 1.0), (1.0, 1.6), (0.0, 2.2), (-1.0, 1.6)),
+    )
     pin = ShapePin("1", "pwr", "power_out", 0, 0, 90, 0)
     texts = ((0.0, 4.0), (0.0, 3.0))
     return Shape("PWR_FLAG", "#FLG", (Unit((pin,), lines, False),), texts, power=True)

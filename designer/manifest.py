@@ -6,16 +6,16 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from designer.errors import InputError
 from designer.provenance import sha256
 
 FORMAT = 1
 MANIFEST = "manifest.json"
-StageName = Literal["design", "study", "comparison", "sweep", "map", "basins", "rules"]
-STAGES: tuple[StageName, ...] = ("design", "study", "comparison", "sweep", "map", "basins", "rules")
-OF_DESIGN: tuple[StageName, ...] = ("study", "comparison", "rules")
+StageName = Literal["design", "kicad", "study", "comparison", "sweep", "map", "basins", "rules"]
+STAGES: tuple[StageName, ...] = get_args(StageName)
+OF_DESIGN: tuple[StageName, ...] = ("kicad", "study", "comparison", "rules")
 """Stages that depend on the design, and on it alone."""
 State = Literal["new", "same", "more", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import api, design_files, equation_check
+from designer import api, design_files, equation_check, kicad_files
 from designer.api import RunResult, Synthesis
 from designer.catalog import Catalog, load_catalog
 from designer.design_files import load
@@ -77,9 +77,12 @@ def run_into(
             made = api.synthesise(modelfile, catalog)
             with naming(modelfile):
                 files = design_files.texts(made)
+            inputs = wanted["design"][0]
+            project = kicad_files.beside(folder, made, inputs, options.overwrite, progress)
             folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
             design_files.write(folder, made, files)
             folder.finish("design")
+            kicad_files.write(folder, made, inputs, project)
         else:
             made = load(folder, modelfile, catalog)
             folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
@@ -151,6 +154,7 @@ def _studied(
     checked = check(made, help_.pool, progress)
     if checked[0].gate is not None and checked[0].gate.passed:
         folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
+        kicad_files.settle(folder, made, checked[0])
     gated = time.perf_counter()
     guard = folder.watch()
     stores = FolderStores(folder.path, guard, progress.note)
