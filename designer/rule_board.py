@@ -14,7 +14,7 @@ from designer.board_file import BoardFile
 from designer.board_rules import CustomRule
 from designer.circuit import NEGATIVE, POSITIVE
 from designer.components import Component
-from designer.kicad_names import circuit_net
+from designer.kicad_names import POWER, circuit_net
 from designer.rule import (
     FAIL,
     PASS,
@@ -108,7 +108,7 @@ def _by_kicad(
     if concerned:
         lost = sorted(concerned & checked.unconnected)
         if lost:
-            raise NotRun(f"not routed yet: {', '.join(lost)}")
+            raise NotRun(f"not routed yet: {', '.join(POWER.get(net, net) for net in lost)}")
         if not concerned & board.routed:
             raise NotRun("none of the nets that this speaks of is routed")
     elif rule.id in COPPER and not board.routed:

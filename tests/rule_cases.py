@@ -29,7 +29,7 @@ from tests.stages import CATALOG, PAPER, bought, rectifier, stage
 
 TEXT = """
 format = 1
-title = "rules"
+title = "<b>rules</b> & ]]> ${X}"
 [model]
 m = 0.5
 k = 0.5
@@ -41,6 +41,8 @@ b = 0.25
 [[response]]
 omega = 1.55
 expect = "1-1-1"
+[circuit]
+dead_zone = "rectifier"
 """
 Look = Callable[[], Outcome]
 
