@@ -20,6 +20,7 @@ from designer.circuit import GROUND, Capacitor, Circuit, Resistor, Section
 from designer.coefficients import coefficient_errors
 from designer.components import Component, components
 from designer.design import Certificate, Design
+from designer.model import Dimensionless
 from designer.modelfile import parse_model_file
 from designer.pins import Pin
 from designer.responses import find
@@ -50,18 +51,22 @@ Look = Callable[[], Outcome]
 @cache
 def base() -> Subject:
     """The rectifying design, with one response."""
-    circuit = stage("rectifier", "both", bought(rectifier()))
-    modelfile = parse_model_file(TEXT)
+    return subject_of(stage("rectifier", "both", bought(rectifier())), PAPER, TEXT)
+
+
+def subject_of(circuit: Circuit, model: Dimensionless, text: str) -> Subject:
+    """What the rules look at of a circuit for this model, with the model file's responses."""
+    modelfile = parse_model_file(text)
     design = Design(
-        model=PAPER,
+        model=model,
         circuit=circuit,
-        errors=coefficient_errors(circuit, PAPER.second_order()),
+        errors=coefficient_errors(circuit, model.second_order()),
         certificate=Certificate("bound", 0.0, "made by hand"),
         conditions={},
         solver={},
         seconds=0.0,
     )
-    made = Synthesis(modelfile, CATALOG, find(PAPER, modelfile.responses), design)
+    made = Synthesis(modelfile, CATALOG, find(model, modelfile.responses), design)
     fitted, choice = board_circuit(made)
     return Subject(made, fitted, components(fitted, CATALOG, choice))
 

@@ -19,10 +19,11 @@ from designer.rule_list import BY_ID
 from designer.rule_operating import operating, stuck
 from designer.rule_subject import Subject
 from designer.system import Drive
+from designer.zone import Kind, Sides
 from tests import rule_cases
 from tests.oracles import linear_matrix
-from tests.rule_cases import PAIRS, base, with_circuit, with_part
-from tests.stages import stage
+from tests.rule_cases import PAIRS, TEXT, base, subject_of, with_circuit, with_part
+from tests.stages import bought, model, one_sided, rectifier, stage
 from tests.test_reduction import EXACT, circuit_of
 
 SECONDS = float(np.sqrt(1e-4 * 36e3 * 100e-9))
@@ -45,6 +46,34 @@ def test_the_design_that_pairs_start_from_keeps_every_rule() -> None:
     found = rules.on_circuit(base(), {})
     assert {o.rule.id: o.found for o in found if o.status != PASS} == {}
     assert [o.rule.id for o in found] == list(rules.LOOKS)
+
+
+ANY = TEXT.replace('expect = "1-1-1"\n', "").replace('dead_zone = "rectifier"\n', "")
+"""Whatever response there is."""
+UNTRIMMED = '[board]\ndc_trim = "none"\n'
+"""Signals so small take resistors for a DC trim that nobody sells."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "sides", "f20"),
+    [
+        ("saturation", "both", 0.0),
+        ("saturation", "upper", 0.0),
+        ("saturation", "lower", 0.0),
+        ("rectifier", "lower", 0.0),
+        ("rectifier", "both", 0.3),
+    ],
+)
+def test_every_rule_can_look_at_every_kind_of_design(kind: Kind, sides: Sides, f20: float) -> None:
+    values = rectifier() if kind == "rectifier" else EXACT if sides == "both" else one_sided()
+    circuit = stage(kind, sides, bought({"R12": values["R6"], **values}), f20=f20)
+    subject = subject_of(circuit, model(sides, f20), ANY + UNTRIMMED)
+    found = {o.rule.id: o for o in rules.on_circuit(subject, {})}
+    assert {i: o.found for i, o in found.items() if o.status == NOT_RUN} == {}
+    nets = ("drivers", "floating-input", "single-pin", "references", "supply-pins", "decoupling")
+    assert {found[id_].status for id_ in (*nets, "feedback")} == {PASS}
+    # The thresholds of the saturating stages here are 0.06 V and 0.6 V: they drown in offsets.
+    assert (found["offset-force"].status == FAIL) is (kind == "saturation")
 
 
 # ---------------------------------------------------------------------------------------------
