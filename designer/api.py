@@ -78,6 +78,7 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
     """
     began = time.perf_counter()
     catalog = load_catalog() if catalog is None else catalog
+    catalog = catalog.mounted(modelfile.board.mounting)
     with naming(modelfile):
         found, design = pipeline.design_for(modelfile, catalog)
     return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)

@@ -6,6 +6,7 @@ addition is neutral while the circuit works (docs/board.md says why).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -24,19 +25,23 @@ from designer.circuit import (
 )
 from designer.dead_zone_parts import OUTPUT
 from designer.design import Design
-from designer.diode_model import diode_model
+from designer.diode_model import THERMAL, diode_model
 from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.modelfile import ModelFile
 from designer.responses import ModelResponse
 from designer.views import View
 
 if TYPE_CHECKING:
-    from designer.api import Synthesis
+    from designer.api import RunResult, Synthesis
 
 LEAST_TRIM = 0.01
 """Least reach of the DC trim, as a share of the generator's amplitude."""
 TRIMMER = 10e3
 """The trimmer's resistance [Ω]: it lies between the rails and loads them with some milliamperes."""
+LEAST_SERIES = 10e3
+"""Least resistance [Ω] after the wiper, so that the trimmer's own does not count."""
+GENERATOR_MOST = 10.0
+"""Most [V peak] that a usual function generator gives without a load."""
 
 
 def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
@@ -68,17 +73,11 @@ def board_choice(
     wanted responses (``[tuning]``, ``offset``), and at least ``LEAST_TRIM`` of that amplitude.
     """
     amplitude = max((design.amplitude(r.b) for r in found), default=design.amplitude())
-    spec = modelfile.circuit
-    return BoardChoice(
-        spec=modelfile.board,
-        resistor_grade=spec.resistor_grade,
-        capacitor_grade=spec.capacitor_grade,
-        diode=spec.diode,
-        trim=amplitude * max(modelfile.tuning.offset, LEAST_TRIM),
-    )
+    reach = amplitude * max(modelfile.tuning.offset, LEAST_TRIM)
+    return replace(BoardChoice.of(modelfile.circuit, modelfile.board), trim=reach)
 
 
-def board_circuit(made: Synthesis) -> tuple[Circuit, BoardChoice]:
+def board_circuit(made: Synthesis | RunResult) -> tuple[Circuit, BoardChoice]:
     """The circuit of a design with its fittings, and the choices that they were made by."""
     choice = board_choice(made.modelfile, made.design, made.found)
     return fitted(made.design.circuit, choice, made.catalog), choice
@@ -117,6 +116,33 @@ def drive_resistance(circuit: Circuit, node: str) -> float:
     return sum(r.value for r in path)
 
 
+def fault_current(circuit: Circuit, node: str, volts: float) -> float:
+    """Current [A] into a driven summing node that is at 0 V, from so many volts at the generator:
+    what the inputs of an unpowered op-amp, or the diodes before them, have to take."""
+    return volts / drive_resistance(circuit, node)
+
+
+def protection_offset(
+    circuit: Circuit, node: str, choice: BoardChoice, catalog: Catalog, across: float
+) -> float:
+    """DC at the generator [V] that acts as the leakage of the two diodes does, with ``across``
+    volts of input offset at the node: 2 Is sinh(V/nVt) through the drive's resistance."""
+    model = diode_model(catalog.diode(choice.diode))
+    leakage = 2.0 * model.saturation_current * math.sinh(across / (model.emission * THERMAL))
+    return leakage * drive_resistance(circuit, node)
+
+
+def trim_reach(circuit: Circuit) -> float:
+    """DC at the generator [V] that the trim stands for at either end of its travel; 0 without."""
+    trimmer = next((p for p in circuit.fittings if isinstance(p, Trimmer)), None)
+    if trimmer is None:
+        return 0.0
+    series = next(
+        p for p in circuit.fittings if isinstance(p, Resistor) and trimmer.wiper in p.nets
+    )
+    return circuit.supply * drive_resistance(circuit, series.b) / series.value
+
+
 def _spare(circuit: Circuit, catalog: Catalog) -> Iterator[Section]:
     """Sections of a package that the circuit has no use for: followers of ground."""
     used = {s.name for s in circuit.sections}
@@ -145,7 +171,7 @@ def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
     for i, net in enumerate(outputs(circuit), start=1):
         out = f"{net}_out"
         behind.append(out)
-        value, role = choice.spec.probe_resistor, f"keeps a probe's cable off {net}"
+        value, role = choice.spec.probe_resistor, f"probe of {net}"
         yield Resistor(f"R{900 + i}", net, out, value, role, View.FITTED)
         if choice.spec.test_points:
             yield TestPoint(f"TP{i}", out, f"probe of {net}")
@@ -172,8 +198,8 @@ def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[F
     if node is None:
         return
     wanted = circuit.supply * drive_resistance(circuit, node) / choice.trim
-    series = catalog.values("resistor", ["E24"], wanted / 1.2, wanted * 1.2, choice.resistor_grade)
-    value = float(min(series, key=lambda sold: abs(sold - wanted)))
+    sold = catalog.values("resistor", ["E24"], LEAST_SERIES, 10e6, choice.resistor_grade)
+    value = float(max((v for v in sold if v <= wanted), default=sold[0]))
     role = "DC trim"
     yield Trimmer("RV901", NEGATIVE, "trim", POSITIVE, TRIMMER, role, views)
     yield Resistor("R911", "trim", node, value, role, views)

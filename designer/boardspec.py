@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import BaseModel
 
 from designer.catalogentry import Mounting
-from designer.schema import STRICT, choice, flag, physical
+from designer.circuitspec import CircuitSpec
+from designer.schema import STRICT, Accepts, choice, flag, number, physical
 
 Trim = Literal["none", "unfitted", "fitted"]
 
@@ -20,7 +22,8 @@ class BoardSpec:
     mounting : the cases that it takes. test_points : pads for the outputs. probe_resistor [Ω] :
     between an output and its pad and pin. decoupling, bulk [F] : at each supply pin, and at the
     supply connector. dc_trim : the footprints of the DC trim, and whether they are fitted.
-    input_protection : diodes at the driven summing nodes.
+    input_protection : diodes at the driven summing nodes. bom : layouts in which the bill is
+    written beside ``bom.csv``.
     """
 
     mounting: Mounting = "mixed"
@@ -30,6 +33,7 @@ class BoardSpec:
     bulk: float = 10e-6
     dc_trim: Trim = "unfitted"
     input_protection: bool = True
+    bom: tuple[str, ...] = ("kicad", "jlcpcb")
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,34 @@ class BoardChoice:
     diode: str = "1N4148"
     trim: float = 0.25
 
+    @classmethod
+    def of(cls, circuit: CircuitSpec, board: BoardSpec | None = None) -> BoardChoice:
+        """The choices of a table [circuit], before the figures of a design are known."""
+        return cls(
+            spec=board or BoardSpec(),
+            resistor_grade=circuit.resistor_grade,
+            capacitor_grade=circuit.capacitor_grade,
+            diode=circuit.diode,
+        )
+
+
+def _layouts() -> Accepts:
+    """Their files are looked for when they are needed."""
+
+    def check(value: object) -> tuple[str, ...]:
+        if not isinstance(value, list):
+            raise ValueError
+        for name in value:
+            if not isinstance(name, str) or not re.fullmatch(r"[a-z0-9][a-z0-9-]{0,30}", name):
+                raise ValueError("names of small letters, digits and hyphens")
+        return tuple(dict.fromkeys(value))
+
+    return Accepts('a list of layouts such as ["kicad", "jlcpcb"]', check)
+
+
+def _within(low: float, high: float, unit: str, expected: str) -> Accepts:
+    return number(unit, expected, lambda value: low <= value <= high)
+
 
 class BoardTable(BaseModel):
     """The keys of ``[board]``, each with what it accepts."""
@@ -54,8 +86,11 @@ class BoardTable(BaseModel):
     model_config = STRICT
     mounting: Annotated[Mounting, choice("mixed", "smd", "tht")] = BoardSpec.mounting
     test_points: Annotated[bool, flag()] = BoardSpec.test_points
-    probe_resistor: Annotated[float, physical("Ω")] = BoardSpec.probe_resistor
+    probe_resistor: Annotated[
+        float, _within(100.0, 10e3, "Ω", 'from 100 Ω to 10 kΩ, such as "1k"')
+    ] = BoardSpec.probe_resistor
     decoupling: Annotated[float, physical("F")] = BoardSpec.decoupling
     bulk: Annotated[float, physical("F")] = BoardSpec.bulk
     dc_trim: Annotated[Trim, choice("none", "unfitted", "fitted")] = BoardSpec.dc_trim
     input_protection: Annotated[bool, flag()] = BoardSpec.input_protection
+    bom: Annotated[tuple[str, ...], _layouts()] = BoardSpec.bom

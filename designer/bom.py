@@ -1,18 +1,15 @@
-"""The bill of materials: one row for each thing to buy."""
+"""The bill of materials: one row for each thing to buy, in our columns."""
 
 from __future__ import annotations
 
 import csv
 import io
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from designer import catalogentry
-from designer.catalog import Catalog, Kind, Rating
-from designer.circuit import Capacitor, Circuit, Diode, Reference, Resistor
-from designer.modelfile import CircuitSpec
-from designer.quantity import format_quantity
+from designer.components import Component
+from designer.natural import natural
+from designer.views import View
 
 COLUMNS = (
     "quantity",
@@ -25,7 +22,19 @@ COLUMNS = (
     "rating",
     "price_class",
     "grade",
+    "substitute",
 )
+KINDS = (
+    "resistor",
+    "capacitor",
+    "diode",
+    "reference",
+    "op-amp",
+    "trimmer",
+    "connector",
+    "test point",
+)
+"""Kinds of components in the order of the bill."""
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
@@ -43,98 +52,52 @@ class Line:
     rating: str
     price_class: int
     grade: str
+    substitute: str = ""
 
     def cells(self) -> dict[str, str]:
         row = {name: str(getattr(self, name)) for name in COLUMNS}
         return {**row, "designators": " ".join(self.designators)}
 
 
-def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, ...]:
-    """Passives, diodes, references and op-amp packages; the generator is an instrument, no part.
+def bill(found: Iterable[Component]) -> tuple[Line, ...]:
+    """What is bought of these components, like parts together: by kind, then by value.
 
-    Raises
-    ------
-    Unreachable : a value that cannot be bought at the grade.
-    InputError : a diode, a reference or an op-amp that is not in the catalogue.
+    The generator is an instrument and stands on no bill; nor does what is not fitted.
     """
-    passives: tuple[tuple[Kind, str, float, Sequence[Resistor | Capacitor]], ...] = (
-        ("resistor", "Ω", spec.resistor_grade, circuit.resistors),
-        ("capacitor", "F", spec.capacitor_grade, circuit.capacitors),
-    )
-    lines = []
-    for kind, unit, grade, parts in passives:
-        for value in sorted({p.value for p in parts}):
-            here = [p for p in parts if p.value == value]
-            part = catalog.part(kind, value, grade)
-            lines.append(
-                Line(
-                    quantity=len(here),
-                    designators=tuple(sorted((p.name for p in here), key=natural)),
-                    value=format_quantity(value, unit),
-                    description="; ".join(dict.fromkeys(p.role for p in here)),
-                    manufacturer=part.manufacturer,
-                    part_number=part.part_number,
-                    footprint=part.footprint,
-                    rating=_rating(part.rating),
-                    price_class=part.price,
-                    grade=f"{part.family.grade:.3g}",
-                )
-            )
-    lines += [*_diodes(circuit, catalog), *_references(circuit, catalog)]
-    opamp = catalog.opamp(circuit.opamp)
-    if circuit.packages:
-        lines.append(
-            Line(
-                quantity=len(circuit.packages),
-                designators=circuit.packages,
-                value=opamp.name,
-                description=f"op-amp, {opamp.sections} sections; {len(circuit.sections)} used",
-                manufacturer=opamp.manufacturer,
-                part_number=opamp.part_number,
-                footprint=opamp.footprint,
-                rating=f"± {circuit.supply:g} V supply",
-                price_class=opamp.price,
-                grade="",
-            )
-        )
-    return tuple(lines)
+    groups: dict[tuple[str, str, str], list[Component]] = {}
+    for component in found:
+        if View.BOM in component.views and component.bought is not None:
+            bought = component.bought
+            key = (component.kind, bought.manufacturer, bought.part_number)
+            groups.setdefault(key, []).append(component)
+    lines = [(_place(here[0]), _line(here)) for here in groups.values()]
+    return tuple(line for _, line in sorted(lines, key=lambda pair: pair[0]))
 
 
-def _diodes(circuit: Circuit, catalog: Catalog) -> Iterator[Line]:
-    for name in sorted({d.model.name for d in circuit.diodes}):
-        here = [d for d in circuit.diodes if d.model.name == name]
-        part = catalog.diode(name)
-        volts = format_quantity(part.reverse_voltage.nominal, "V")
-        yield _named(part, here, "diode", f"{volts} reverse", "")
+def _place(component: Component) -> tuple[object, ...]:
+    number = component.bought.part_number if component.bought else ""
+    return KINDS.index(component.kind), component.quantity or 0.0, number
 
 
-def _references(circuit: Circuit, catalog: Catalog) -> Iterator[Line]:
-    for name in sorted({r.model for r in circuit.references}):
-        here = [r for r in circuit.references if r.model == name]
-        part = catalog.reference(name)
-        volts = format_quantity(part.voltage, "V")
-        yield _named(part, here, "shunt reference", volts, f"{part.grade:.3g}")
-
-
-def _named(
-    part: catalogentry.Diode | catalogentry.Reference,
-    here: Sequence[Diode | Reference],
-    kind: str,
-    rating: str,
-    grade: str,
-) -> Line:
-    """The line of parts that are bought by name."""
+def _line(here: Sequence[Component]) -> Line:
+    first = here[0]
+    bought = first.bought
+    assert bought is not None
+    said = [] if first.kind in ("resistor", "capacitor") else [c.description for c in here]
+    if first.kind != "op-amp":
+        said += [c.role for c in here]
     return Line(
         quantity=len(here),
-        designators=tuple(sorted((p.name for p in here), key=natural)),
-        value=part.name,
-        description="; ".join([kind, *dict.fromkeys(p.role for p in here)]),
-        manufacturer=part.manufacturer,
-        part_number=part.part_number,
-        footprint=part.footprint,
-        rating=rating,
-        price_class=part.price,
-        grade=grade,
+        designators=tuple(sorted((c.reference for c in here), key=natural)),
+        value=first.value,
+        description="; ".join(dict.fromkeys(said)),
+        manufacturer=bought.manufacturer,
+        part_number=bought.part_number,
+        footprint=first.footprint,
+        rating=bought.rating,
+        price_class=bought.price_class,
+        grade="" if bought.grade is None else f"{bought.grade:.3g}",
+        substitute=bought.substitute,
     )
 
 
@@ -162,17 +125,3 @@ def safe_cell(text: str) -> str:
     except ValueError:
         return "'" + text
     return text
-
-
-def natural(name: str) -> tuple[object, ...]:
-    """Sort key: R2 before R10."""
-    return tuple(int(t) if t.isdigit() else t for t in re.split(r"(\d+)", name))
-
-
-def _rating(rating: Rating) -> str:
-    shown = []
-    if rating.power is not None:
-        shown.append(format_quantity(rating.power, "W"))
-    if rating.voltage is not None:
-        shown.append(format_quantity(rating.voltage, "V"))
-    return ", ".join(shown)

@@ -16,10 +16,12 @@ import numpy as np
 from designer import loads, paper_design
 from designer.api import Synthesis
 from designer.attractor import settle
+from designer.boardspec import BoardChoice
 from designer.bom import bill
 from designer.catalog import PRICE_CLASSES, Catalog, Kind, OpAmp
 from designer.circuit import Board, Capacitor, Circuit, Resistor, Section, nominal_board
 from designer.coefficients import CoefficientErrors, coefficient_errors
+from designer.components import components
 from designer.errors import Unreachable
 from designer.flow import Flow
 from designer.loads import Load, Loads
@@ -304,7 +306,7 @@ def _bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
             except Unreachable:
                 unsold.append(part.name)
     sold = replace(circuit, parts=tuple(p for p in circuit.parts if p.name not in unsold))
-    lines = bill(sold, spec, catalog)
+    lines = bill(components(sold, catalog, BoardChoice.of(spec)))
     return Bill(
         parts=sum(not isinstance(p, Section) for p in circuit.parts) + len(circuit.packages),
         packages=len(circuit.packages),

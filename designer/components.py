@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from designer.catalog import Catalog, Kind, Use
 from designer.catalogentry import Rating
 from designer.circuit import Capacitor, Circuit, Diode, Fitting, Reference, Resistor, Section
 from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.natural import natural
 from designer.pins import Package, Pin, packages, pins
 from designer.quantity import format_quantity
 from designer.stage_names import SUPPLY, stage_names
@@ -215,7 +215,7 @@ class _Lister:
             role="; ".join(dict.fromkeys(s.role for s in used)),
             stage=next(iter(stages), SUPPLY),
             views=View.EVERYWHERE,
-            description=f"op-amp, {opamp.sections} sections; {len(used)} used",
+            description=f"op-amp, {opamp.sections} sections, {_spare(opamp.sections - len(used))}",
             bought=Bought(
                 opamp.manufacturer,
                 opamp.part_number,
@@ -253,6 +253,10 @@ class _Lister:
         )
 
 
+def _spare(count: int) -> str:
+    return f"{count} spare" if count else "all used"
+
+
 TEST_POINT = "TestPoint:TestPoint_Pad_D1.5mm"
 """Footprint of a bare pad."""
 
@@ -265,8 +269,3 @@ def rated(rating: Rating) -> str:
     if rating.voltage is not None:
         shown.append(format_quantity(rating.voltage, "V"))
     return ", ".join(shown)
-
-
-def natural(name: str) -> tuple[object, ...]:
-    """Sort key: R2 before R10."""
-    return tuple(int(t) if t.isdigit() else t for t in re.split(r"(\d+)", name))

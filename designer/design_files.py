@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from designer import deck, matching, topology
+from designer import board_files, deck, matching, topology
 from designer.api import Synthesis
-from designer.bom import bill, bill_csv
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
 from designer.coefficients import coefficient_errors
@@ -38,9 +37,9 @@ def texts(made: Synthesis) -> dict[str, str]:
     return {
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(made),
-        "bom.csv": bill_csv(bill(design.circuit, modelfile.circuit, made.catalog)),
         SETUP: setup_csv(design, made.found, start_recipes(made, cores())),
         "scales.csv": scales_csv(modelfile, design, made.found),
+        **board_files.texts(made),
     }
 
 
@@ -72,6 +71,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     said, file = folder.json(DESIGN), folder / DESIGN
     model, spec = modelfile.model, modelfile.circuit
     found = find(model, modelfile.responses)
+    catalog = catalog.mounted(modelfile.board.mounting)
     with naming(modelfile):
         opamp = catalog.opamp(spec.opamp)
     system = model.second_order()

@@ -33,7 +33,8 @@ REPORTS = ("report.html", "report.md")
 COMPARISON, COMPARISON_PICTURES = "compare.json", ("compare.svg", "compare.png")
 BLOCKS = "block-*.parquet"
 """Files of a folder of blocks; others in it are not ours."""
-DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "bom.csv", "setup.csv", "scales.csv")
+DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "setup.csv", "scales.csv")
+"""Of every design; ``board_files.names`` has those of its board."""
 
 
 class Folder:

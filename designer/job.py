@@ -14,6 +14,7 @@ from typing import Any
 from designer import (
     __version__,
     api,
+    board_files,
     compare_files,
     design_files,
     kicad_files,
@@ -212,7 +213,7 @@ def design_inputs(
         "catalogue": catalog.hash,
         "version": __version__,
     }
-    files = list(DESIGN_FILES)
+    files = [*DESIGN_FILES, *board_files.names(modelfile)]
     if modelfile.measured is not None:
         inputs["measured"] = modelfile.measured.sha256
         files.append(MEASURED)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -64,12 +63,13 @@ def shape(component: Component) -> Shape:
         return symbols.resistor()
     if kind == "capacitor":
         return symbols.capacitor()
-    if kind == "diode" and len(component.pins) == 2:
-        return symbols.diode(_named("D", component), numbers["anode"], numbers["cathode"])
-    if kind == "reference" and len(component.pins) == 2:
-        return symbols.diode(
-            _named("VR", component), numbers["anode"], numbers["cathode"], prefix="VR", zener=True
-        )
+    if kind in ("diode", "reference"):
+        zener = kind == "reference"
+        free = [(pin.number, pin.name) for pin in component.pins if not pin.net]
+        prefix = "VR" if zener else "D"
+        name = _named(prefix, component)
+        ends = numbers["anode"], numbers["cathode"]
+        return symbols.diode(name, *ends, prefix=prefix, zener=zener, free=free)
     if kind == "op-amp":
         found = _units(component)
         sections = [(u["-"], u["+"], u["OUT"]) for name, u in found.items() if name != SUPPLY_UNIT]
@@ -78,8 +78,7 @@ def shape(component: Component) -> Shape:
     if kind == "test point":
         return symbols.test_point()
     pins = [(pin.number, pin.name, pin.electrical) for pin in component.pins]
-    prefix = re.match(r"[A-Za-z]*", component.reference)
-    letters = prefix[0] if prefix else "X"
+    letters = component.reference.rstrip("0123456789")
     name = f"Header_{len(pins)}" if kind == "connector" else _named(letters, component)
     # Power symbols at neighbouring pins need room between them.
     return symbols.row(name, letters, pins, 3 if kind == "connector" else 4)

@@ -6,7 +6,7 @@ The same shapes make the symbols inside the sheet and the project's library, whi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.kicad_names import LIBRARY
 from designer.sexpr import Expression, expression, word
@@ -98,13 +98,30 @@ def capacitor() -> Shape:
     return two_pins("C", "C", ("1", "+"), ("2", "-"), plates, 0.4)
 
 
-def diode(name: str, anode: str, cathode: str, *, prefix: str = "D", zener: bool = False) -> Shape:
-    """anode, cathode : pin numbers. The anode is on the left."""
+def diode(
+    name: str,
+    anode: str,
+    cathode: str,
+    *,
+    prefix: str = "D",
+    zener: bool = False,
+    free: Sequence[tuple[str, str]] = (),
+) -> Shape:
+    """anode, cathode : pin numbers. The anode is on the left.
+
+    free : number and name of each pin of the case that stays open, below.
+    """
     bar = [(1.0, -1.0), (1.0, 1.0)]
     if zener:
         bar = [(0.5, -1.3), (1.0, -1.0), (1.0, 1.0), (1.5, 1.3)]
     triangle = ((-1.0, -1.0), (-1.0, 1.0), (1.0, 0.0), (-1.0, -1.0))
-    return two_pins(name, prefix, (anode, "A"), (cathode, "K"), [triangle, tuple(bar)], 1.0)
+    made = two_pins(name, prefix, (anode, "A"), (cathode, "K"), [triangle, tuple(bar)], 1.0)
+    if not free:
+        return made
+    first = -(len(free) - 1)
+    pins = [ShapePin(*pin, "no_connect", first + 2 * i, -3, 90, 2) for i, pin in enumerate(free)]
+    unit = replace(made.units[0], pins=(*made.units[0].pins, *pins))
+    return replace(made, units=(unit,), texts=((0.0, 1.9), (0.0, -4.2)))
 
 
 def source(name: str) -> Shape:

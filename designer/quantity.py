@@ -86,8 +86,9 @@ def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
 def encode_value(code: str, value: float) -> str:
     """``value`` (ohm or farad) as the named code of a part number spells it.
 
-    "yageo": 22100.0 is "22K1"; "eia3": 1e-9 is "102"; "multiplier-first": 2.2e-8 is "322";
-    "plain": 22100.0 is "22.1k".
+    "yageo": 22100.0 is "22K1"; "vishay": 10000.0 is "10K0"; "decade": 22100.0 is "2212", 18.2 is
+    "1829"; "eia3": 1e-9 is "102"; "multiplier-first": 2.2e-8 is "322"; "microfarads": 1e-5 is
+    "100"; "plain": 22100.0 is "22.1k".
 
     Raises
     ------
@@ -210,6 +211,55 @@ def _decode_multiplier_first(text: str) -> float:
     return float(f"{text[1:]}e{int(text[0]) - 12}")
 
 
+def _encode_vishay(value: float) -> str:
+    number, exponent = _significant(value, 3, "this code")
+    digits = f"{number * 10 ** (3 - len(str(number)))}"
+    power = exponent + len(str(number)) - 1  # of the first digit
+    for letter, base in (("M", 6), ("K", 3), ("R", 0)):
+        place = power - base + 1
+        if 1 <= place <= 3:
+            return f"{digits[:place]}{letter}{digits[place:]}"
+    raise ValueError("this code spells 1 Ω to less than 1 GΩ")
+
+
+def _decode_vishay(text: str) -> float:
+    if len(text) != 4:
+        raise ValueError("expected three digits with R, K or M as the decimal point")
+    return _decode_yageo(text)
+
+
+_DECADES = {-3: "7", -2: "8", -1: "9"} | {power: str(power) for power in range(7)}
+
+
+def _encode_decade(value: float) -> str:
+    number, exponent = _significant(value, 3, "this code")
+    missing = 3 - len(str(number))
+    if exponent - missing not in _DECADES:
+        raise ValueError("this code spells 0.1 Ω to 999 MΩ")
+    return f"{number * 10**missing}{_DECADES[exponent - missing]}"
+
+
+def _decode_decade(text: str) -> float:
+    if not re.fullmatch(r"[1-9]\d{3}", text, re.ASCII):
+        raise ValueError("expected three digits and one for the decade")
+    power = next(power for power, digit in _DECADES.items() if digit == text[3])
+    return float(f"{text[:3]}e{power}")
+
+
+def _encode_microfarads(value: float) -> str:
+    number, exponent = _significant(value, 2, "a three-digit code")
+    exponent += 6
+    if number < 10:
+        number, exponent = 10 * number, exponent - 1
+    if not 0 <= exponent <= 7:
+        raise ValueError("a three-digit code spells 10 µF to 990 F")
+    return f"{number}{exponent}"
+
+
+def _decode_microfarads(text: str) -> float:
+    return float(f"{_decode_eia3(text) * 1e6:.2g}")
+
+
 def _encode_plain(value: float) -> str:
     return format_quantity(value, digits=15).replace("µ", "u")
 
@@ -222,6 +272,9 @@ VALUE_CODES: dict[str, tuple[Callable[[float], str], Callable[[str], float]]] = 
     "yageo": (_encode_yageo, _decode_yageo),
     "eia3": (_encode_eia3, _decode_eia3),
     "multiplier-first": (_encode_multiplier_first, _decode_multiplier_first),
+    "vishay": (_encode_vishay, _decode_vishay),
+    "decade": (_encode_decade, _decode_decade),
+    "microfarads": (_encode_microfarads, _decode_microfarads),
     "plain": (_encode_plain, _decode_plain),
 }
 """How part numbers spell values: name of the code, and its encoder and decoder."""

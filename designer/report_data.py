@@ -8,7 +8,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from designer.all_on_one import all_on_one
+from designer.board_parts import board_circuit
 from designer.bom import bill
+from designer.circuit import Circuit
+from designer.components import components
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
@@ -31,7 +34,8 @@ class ReportData:
     one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
     command : the command line that makes these results again. equations : the equation check.
     heard : what ngspice said about boards of the study. layers : what else the study has.
-    starts : how to start each response, from ``setup.csv``; empty where there is none.
+    starts : how to start each response, from ``setup.csv``; empty where there is none. board : the
+    circuit with its fittings, to be drawn; None for no drawing.
     """
 
     modelfile: ModelFile
@@ -47,11 +51,13 @@ class ReportData:
     heard: tuple[Hearing, ...] = ()
     layers: Layers = field(default_factory=Layers)
     starts: tuple[str, ...] = ()
+    board: Circuit | None = None
 
     @classmethod
     def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
         """The data of a finished run."""
-        lines = bill(result.design.circuit, result.modelfile.circuit, result.catalog)
+        circuit, choice = board_circuit(result)
+        lines = bill(components(circuit, result.catalog, choice))
         return cls(
             modelfile=result.modelfile,
             design=result.design,
@@ -65,6 +71,7 @@ class ReportData:
             equations=result.equations,
             heard=result.study.heard,
             starts=tuple(starts),
+            board=circuit,
             layers=Layers(
                 tuned=result.study.tuned,
                 reached=result.study.reached,

@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from designer import blame_plots, map_plots, orbit_plots, study_plots
+from designer import blame_plots, drawing, map_plots, orbit_plots, study_plots
 from designer import report_words as words
 from designer.design import Design
 from designer.pipeline import traces
@@ -47,6 +47,7 @@ def pictures(data: ReportData) -> dict[str, Any]:
         "index_picture": _index_picture(data),
         "map_pictures": _map_pictures(data),
         "error_picture": _error_picture(data.design),
+        "schematic": _schematic(data),
     }
 
 
@@ -167,6 +168,16 @@ def _error_picture(design: Design) -> Picture | None:
     )
 
 
+def _schematic(data: ReportData) -> Picture | None:
+    if data.board is None:
+        return None
+    return Picture(
+        _svg_uri(drawing.svg(data.board)),
+        "Schematic: one stage a cell, nets joined by their names.",
+        "Drawn from the circuit's parts; the same as schematic.svg.",
+    )
+
+
 def _labels(data: ReportData) -> list[str]:
     return [
         f"ω = {words.number(c.model.omega)}   {c.model.expected or c.model.orbit.response}"
@@ -181,5 +192,8 @@ def _sides(design: Design) -> tuple[int, ...]:
 
 
 def _uri(figure: Figure) -> str:
-    svg = to_svg(figure).encode("utf-8")
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
+    return _svg_uri(to_svg(figure))
+
+
+def _svg_uri(svg: str) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from designer.bom import natural
 from designer.circuit import Circuit
 from designer.laws import Binned, Law, Normal, Split, Uniform
+from designer.natural import natural
 from designer.report_words import quantity
 from designer.spread import NO_BANDWIDTH, Spread
 

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from designer.bom import bill, bill_csv
+from designer.boardspec import BoardChoice
+from designer.bom import Line, bill, bill_csv
+from designer.circuit import Circuit
+from designer.components import components
 from designer.modelfile import CircuitSpec
 from designer.zone import Sides
 from tests.stages import CATALOG, rectifier, stage
 
 VALUES = {**rectifier(5.0), "R50": 4.7e3, "R202": 24.9e3, "R205": 24.9e3}
-SPEC = CircuitSpec()
+
+
+def bought_for(circuit: Circuit) -> tuple[Line, ...]:
+    return bill(components(circuit, CATALOG, BoardChoice.of(CircuitSpec())))
 
 
 @pytest.mark.parametrize(("sides", "halves"), [("both", 2), ("upper", 1), ("lower", 1)])
 def test_every_part_is_on_the_bill_once(sides: Sides, halves: int) -> None:
     circuit = stage("rectifier", sides, VALUES)
-    lines = bill(circuit, SPEC, CATALOG)
+    lines = bought_for(circuit)
     named = [name for line in lines for name in line.designators]
     parts = {p.name for p in circuit.parts} - {s.name for s in circuit.sections}
     assert sorted(named) == sorted(parts | set(circuit.packages))
@@ -40,12 +45,12 @@ def test_every_part_is_on_the_bill_once(sides: Sides, halves: int) -> None:
 def test_the_bill_of_a_circuit_without_them_has_none() -> None:
     from tests.test_reduction import EXACT, circuit_of
 
-    values = {line.value for line in bill(circuit_of(EXACT), SPEC, CATALOG)}
+    values = {line.value for line in bought_for(circuit_of(EXACT))}
     assert not values & {"1N4148", "LM4040C50"}
 
 
 def test_it_is_a_table_of_text(tmp_path: Path) -> None:
-    text = bill_csv(bill(stage("rectifier", "both", VALUES), SPEC, CATALOG))
+    text = bill_csv(bought_for(stage("rectifier", "both", VALUES)))
     (tmp_path / "bom.csv").write_text(text)
     assert "D200 D201 D202 D203" in text
     assert all(line.count(",") >= 9 for line in text.splitlines())
@@ -56,4 +61,4 @@ def test_an_unbuyable_value_is_named() -> None:
 
     circuit = stage("rectifier", "both", {**VALUES, "R202": 12345.6})
     with pytest.raises(Unreachable, match=r"12\.3"):
-        bill(circuit, replace(SPEC, resistors=("E96",)), CATALOG)
+        bought_for(circuit)

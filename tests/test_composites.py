@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from designer import composites
+from designer.boardspec import BoardChoice
 from designer.bom import bill
 from designer.catalog import load_catalog
 from designer.coefficients import EXACT
+from designer.components import components
 from designer.composites import Pair, Program, best, pairs_near
 from designer.design import Design, Peaks
 from designer.job import Options, read_design, synthesise_into
@@ -134,7 +136,11 @@ def test_the_paper_s_case_in_e24_is_exact_with_composites(names: bool | tuple[st
         assert {values[f"{name}A"], values[f"{name}B"]} <= set(series)
         net = f"{name.lower()}m"
         assert (net in made.circuit.nets) is (kind == "series")
-    bought = {d for row in bill(made.circuit, E24, CATALOG) for d in row.designators}
+    bought = {
+        d
+        for row in bill(components(made.circuit, CATALOG, BoardChoice.of(E24)))
+        for d in row.designators
+    }
     assert {f"{n}{part}" for n in made.composites for part in "AB"} <= bought
 
 

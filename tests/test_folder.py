@@ -14,12 +14,13 @@ import pytest
 
 from designer import cli
 from designer.api import synthesise
-from designer.bom import csv_text, natural, safe_cell
+from designer.bom import csv_text, safe_cell
 from designer.errors import InputError
 from designer.folder import MANIFEST, Folder, StageName, file_hash
 from designer.job import Options, read_design
 from designer.jsonout import dumps
 from designer.modelfile import read_model_file
+from designer.natural import natural
 from tests.paper_cases import PAPER, synthesised
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -217,6 +217,21 @@ def test_scaling_is_correctly_rounded(number: int, places: int, prefix: tuple[st
         ("multiplier-first", 22e-9, "322"),
         ("multiplier-first", 100e-9, "410"),
         ("multiplier-first", 1e-6, "510"),
+        # Vishay's chips: CRCW060310K0FKEA is 10 kΩ, TNPW060340K2BEEA 40.2 kΩ.
+        ("vishay", 10e3, "10K0"),
+        ("vishay", 40.2e3, "40K2"),
+        ("vishay", 1.0, "1R00"),
+        ("vishay", 620e3, "620K"),
+        ("vishay", 1e6, "1M00"),
+        # Vishay MRS, document 28724: 5119 is 51.1 Ω; 1829 is 18.2 Ω.
+        ("decade", 51.1, "5119"),
+        ("decade", 18.2, "1829"),
+        ("decade", 1.0, "1008"),
+        ("decade", 22.1e3, "2212"),
+        ("decade", 10e6, "1005"),
+        # Panasonic EEU-FC1H100: 10 µF; EEU-FC1V101: 100 µF.
+        ("microfarads", 10e-6, "100"),
+        ("microfarads", 100e-6, "101"),
         ("plain", 22.1e3, "22.1k"),
         ("plain", 4.7e-6, "4.7u"),
     ],
@@ -239,6 +254,14 @@ def test_codes_of_part_numbers(code: str, value: float, text: str) -> None:
         ("eia3", 1e-12),
         ("eia3", 1e-2),
         ("multiplier-first", 1.21e-9),
+        ("vishay", 1.234),
+        ("vishay", 0.5),
+        ("vishay", 1e9),
+        ("decade", 1.234),
+        ("decade", 1e-2),
+        ("decade", 1e9),
+        ("microfarads", 1e-6),
+        ("microfarads", 12.5e-6),
         ("morse", 1.0),
     ],
 )
@@ -249,7 +272,18 @@ def test_codes_refuse_what_they_cannot_spell(code: str, value: float) -> None:
 
 @pytest.mark.parametrize(
     ("code", "text"),
-    [("yageo", "22k1"), ("yageo", "K1"), ("eia3", "10"), ("eia3", "998"), ("morse", "…")],
+    [
+        ("yageo", "22k1"),
+        ("yageo", "K1"),
+        ("eia3", "10"),
+        ("eia3", "998"),
+        ("vishay", "10K"),
+        ("vishay", "1000"),
+        ("decade", "0109"),
+        ("decade", "100K"),
+        ("microfarads", "10"),
+        ("morse", "…"),
+    ],
 )
 def test_codes_refuse_what_is_not_theirs(code: str, text: str) -> None:
     with pytest.raises(ValueError, match=r"\w"):
@@ -260,10 +294,17 @@ def test_every_code_round_trips_over_its_values() -> None:
     for mantissa in eseries("E192") + eseries("E24"):
         for decade in range(-2, 5):
             value = float(f"{mantissa}e{decade}")
-            assert decode_value("yageo", encode_value("yageo", value)) == value
+            for code in ("yageo", "vishay", "decade"):
+                assert decode_value(code, encode_value(code, value)) == value
     for mantissa in eseries("E24"):
         for decade in range(-13, -6):
             value = float(f"{mantissa}e{decade}")
             for code in ("eia3", "multiplier-first", "plain"):
                 assert decode_value(code, encode_value(code, value)) == value
-    assert set(VALUE_CODES) == {"yageo", "eia3", "multiplier-first", "plain"}
+    for mantissa in eseries("E24"):
+        for decade in range(-7, -2):
+            value = float(f"{mantissa}e{decade}")
+            assert decode_value("microfarads", encode_value("microfarads", value)) == value
+    resistors = {"yageo", "vishay", "decade"}
+    capacitors = {"eia3", "multiplier-first", "microfarads"}
+    assert set(VALUE_CODES) == {*resistors, *capacitors, "plain"}

@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 
 from designer import pipeline
-from designer.api import RunResult
+from designer.api import RunResult, Synthesis
+from designer.board_parts import board_circuit
 from designer.bom import bill
 from designer.catalog import Catalog, load_catalog
+from designer.components import components
 from designer.confirmation import hear
 from designer.errors import InputError
 from designer.hearing import Hearing, Kind, ask_random
@@ -52,6 +54,7 @@ def whole(catalog: Catalog) -> ReportData:
         plan = pipeline.plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
         answers = Samples(plan, range(4))(2, lambda: None)
         heard = hear(plan, ask_random(answers), pool, 2)
+    circuit, choice = board_circuit(Synthesis(modelfile, catalog, found, design))
     return ReportData(
         modelfile=modelfile,
         design=design,
@@ -59,7 +62,7 @@ def whole(catalog: Catalog) -> ReportData:
         yields=pipeline.yields(plan, answers),
         answers=tuple(answers),
         plan=plan,
-        bom=[line.cells() for line in bill(design.circuit, modelfile.circuit, catalog)],
+        bom=[line.cells() for line in bill(components(circuit, catalog, choice))],
         provenance=provenance(modelfile, catalog.hash, seed=1, spread=plan.spread.as_dict()),
         command="designer run model.toml --samples 4 --seed 1 --out out",
         heard=tuple(heard),
@@ -228,6 +231,8 @@ def test_the_result_of_a_run_gives_the_data(whole: ReportData, catalog: Catalog)
     assert [y is None for y in data.yields or ()] == [False, False, True]
     assert data.question_of == (0, 1, None)
     assert data.bom == whole.bom
+    assert data.board is not None
+    assert 'alt="Schematic: ' in render_html(data)
     assert data.command == whole.command
     assert "1 response could not be studied" in render_markdown(data)
 

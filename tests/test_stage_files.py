@@ -10,9 +10,11 @@ import pytest
 
 from designer import design_files, pipeline
 from designer.api import Synthesis
+from designer.board_parts import board_circuit
 from designer.bom import bill
 from designer.circuit import Circuit
 from designer.coefficients import coefficient_errors
+from designer.components import components
 from designer.confirmation import hear
 from designer.folder import Folder
 from designer.hearing import ask_random
@@ -111,6 +113,7 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
     known = {(a.sample, a.question): a for a in answers}
     assert len(heard) == 2 * len(answers)
     assert all(h.agrees(known[h.sample, h.question]) is not False for h in heard)
+    circuit, choice = board_circuit(first)
     data = ReportData(
         modelfile=first.modelfile,
         design=first.design,
@@ -119,7 +122,7 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
         answers=tuple(answers),
         plan=plan,
         bom=[
-            line.cells() for line in bill(first.design.circuit, first.modelfile.circuit, CATALOG)
+            line.cells() for line in bill(components(circuit, CATALOG, choice))
         ],
         provenance=provenance(first.modelfile, CATALOG.hash, seed=1, spread={}),
         command="designer run model.toml",

@@ -13,7 +13,8 @@ from designer.components import components, joined
 from designer.deck import Excitation, SolverSettings, write
 from designer.errors import InputError
 from designer.views import View
-from tests.stages import CATALOG, EXACT, bought, one_sided, rectifier, stage
+from tests.stages import CATALOG, bought, one_sided, rectifier, stage
+from tests.test_reduction import EXACT
 
 CHOICE = BoardChoice()
 

@@ -1,0 +1,40 @@
+"""The files of a design folder that are about its board: bills of materials, notes, drawing."""
+
+from __future__ import annotations
+
+from designer import board_notes
+from designer.api import Synthesis
+from designer.board_parts import board_circuit
+from designer.bom import bill, bill_csv
+from designer.bom_layouts import file_of, layouts
+from designer.components import components
+from designer.modelfile import ModelFile
+
+BILL, NOTES, DRAWING = "bom.csv", "board.md", "schematic.svg"
+
+
+def names(modelfile: ModelFile) -> list[str]:
+    """The names of these files for a model."""
+    return [BILL, NOTES, DRAWING, *(file_of(name) for name in modelfile.board.bom)]
+
+
+def texts(made: Synthesis) -> dict[str, str]:
+    """Their content by name.
+
+    Raises
+    ------
+    InputError : a case, a part or a layout that the catalogue does not have.
+    Unreachable : a value that cannot be bought.
+    """
+    from designer import drawing  # with matplotlib, which nothing before this needs
+
+    circuit, choice = board_circuit(made)
+    found = components(circuit, made.catalog, choice)
+    bought = bill(found)
+    others = layouts(made.modelfile.board.bom, made.catalog.folders)
+    return {
+        BILL: bill_csv(bought),
+        NOTES: board_notes.markdown(made, circuit, choice, found),
+        DRAWING: drawing.svg(circuit, made.modelfile.title),
+        **{layout.file: layout.csv(bought) for layout in others},
+    }

@@ -1,0 +1,170 @@
+"""``board.md`` of a design folder: how its board is connected, protected and trimmed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from designer.api import Synthesis
+from designer.board_parts import (
+    GENERATOR_MOST,
+    drive_resistance,
+    driven_nodes,
+    fault_current,
+    protection_offset,
+    trim_reach,
+)
+from designer.boardspec import BoardChoice
+from designer.catalog import Catalog
+from designer.circuit import Circuit, Section
+from designer.components import Component
+from designer.fittings import Connector, Trimmer
+from designer.quantity import format_quantity
+from designer.views import View
+
+PROBE = 100e-12
+"""Capacitance [F] of a metre of coaxial cable, as the notes assume for a probe."""
+
+
+def markdown(
+    made: Synthesis, circuit: Circuit, choice: BoardChoice, found: Sequence[Component]
+) -> str:
+    """The notes as Markdown; nothing in them is text of the model file."""
+    parts = [
+        "# The board",
+        "What to buy is in `bom.csv`, the drawing in `schematic.svg`. The generator is set as "
+        "`setup.csv` says.",
+        _mounting(choice, found),
+        "## Connections",
+        _connections(circuit, found),
+        _supply(circuit, made.catalog),
+        _outputs(circuit, choice),
+        *_protection(made, circuit, choice),
+        *_trim(made, circuit, choice),
+        *_spare(circuit),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _q(value: float, unit: str, digits: int = 3) -> str:
+    return format_quantity(value, unit, digits)
+
+
+def _mounting(choice: BoardChoice, found: Sequence[Component]) -> str:
+    said = {
+        "mixed": "Parts are in the cases that the catalogue names first, soldered on the surface "
+        "or through holes.",
+        "smd": "All but connectors are soldered on the surface.",
+        "tht": "All parts are soldered through holes.",
+    }[choice.spec.mounting]
+    pads = [c.reference for c in found if c.bought is None]
+    bare = [c.reference for c in found if not c.fitted]
+    if pads:
+        said += f" Bare pads: {', '.join(pads)}."
+    if bare:
+        said += f" Not fitted: {', '.join(bare)}."
+    return said
+
+
+def _connections(circuit: Circuit, found: Sequence[Component]) -> str:
+    rows = ["| connector | pin | net |", "|---|---|---|"]
+    held = {p.name for p in circuit.fittings if isinstance(p, Connector)}
+    for component in found:
+        if component.reference in held:
+            for pin in component.pins:
+                net = "ground" if pin.net == "0" else pin.net
+                rows.append(f"| {component.reference}, {component.role} | {pin.number} | {net} |")
+    return "\n".join(rows)
+
+
+def _supply(circuit: Circuit, catalog: Catalog) -> str:
+    opamp = catalog.opamp(circuit.opamp)
+    sections = opamp.sections * len(circuit.packages)
+    current = opamp.supply_current
+    most = current.max if current.max is not None else current.nominal
+    return (
+        f"Supply: ± {circuit.supply:g} V at `vcc` and `vee`. The {sections} amplifiers draw "
+        f"{_q(sections * current.nominal, 'A')} from each rail, {_q(sections * most, 'A')} at "
+        "most; what they deliver comes on top."
+    )
+
+
+def _outputs(circuit: Circuit, choice: BoardChoice) -> str:
+    ohms = choice.spec.probe_resistor
+    corner = 1.0 / (2.0 * math.pi * ohms * PROBE)
+    return (
+        f"Each output is shown through {_q(ohms, 'Ω')}: with {_q(PROBE, 'F')} of cable the signal "
+        f"is right up to {_q(corner / 10.0, 'Hz')} or so, and the amplifier does not feel the "
+        "cable. Keep probes off the summing nodes: a few picofarads there move the circuit."
+    )
+
+
+def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
+    opamp = made.catalog.opamp(circuit.opamp)
+    most = None if opamp.input_current is None else opamp.input_current.max
+    lines = []
+    for node in driven_nodes(circuit):
+        ohms = drive_resistance(circuit, node)
+        current = fault_current(circuit, node, GENERATOR_MOST)
+        said = (
+            f"`{node}`: {_q(GENERATOR_MOST, 'V')} from the generator, the most that a usual one "
+            f"gives, drive {_q(current, 'A')} through {_q(ohms, 'Ω')}."
+        )
+        if most is not None:
+            word = "below" if current < most else "above"
+            said += f" That is {word} the {_q(most, 'A')} that an input of the op-amp stands."
+        if choice.spec.input_protection:
+            level = protection_offset(circuit, node, choice, made.catalog, opamp.offset_limit)
+            said += (
+                f" The two diodes take it to ground. With {_q(opamp.offset_limit, 'V')} of input "
+                f"offset across them they leak as much as {_q(level, 'V')} of DC at the generator."
+            )
+        lines.append(f"- {said}")
+    if not lines:
+        return []
+    head = "If the generator is on while the supply is off, its current goes into the inputs."
+    return ["## Generator before supply", head, "\n".join(lines)]
+
+
+def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
+    trimmers = [p for p in circuit.fittings if isinstance(p, Trimmer)]
+    if not trimmers:
+        return []
+    name = trimmers[0].name
+    series = next(
+        p for p in circuit.fittings if trimmers[0].wiper in p.nets and p is not trimmers[0]
+    )
+    reach = trim_reach(circuit)
+    fit = (
+        "It is fitted."
+        if View.BOM in trimmers[0].views
+        else f"It is not fitted, and not on the bill: the generator's DC offset does the same. Fit "
+        f"{name} and {series.name} where the generator has none."
+    )
+    steps = [
+        f"Turn {name} until its wiper, net `trim`, is at 0 V.",
+        "Start the board as `setup.csv` says, and wait until nothing changes any more.",
+        "Read the two voltages of `v1` at which `fv` leaves zero, and the highest and the lowest "
+        "value of `v1`. What goes past each stop is its excess.",
+        f"Turn {name} until both excesses are equal. A stop on one side has no second excess: turn "
+        "until the rest point of `v1`, read without the generator, is where it was calculated.",
+        "Wait for 100 periods after each turn. If the wanted response is there, leave it.",
+    ]
+    head = (
+        f"{name} and {series.name} add to the summing node what a DC of up to ± {_q(reach, 'V')} "
+        f"at the generator would (the design asks for ± {_q(choice.trim, 'V')}). They cancel the "
+        "constant force of offsets, bias currents and unequal limits."
+    )
+    numbered = "\n".join(f"{i}. {step}" for i, step in enumerate(steps, start=1))
+    return ["## DC trim", f"{head} {fit}", numbered]
+
+
+def _spare(circuit: Circuit) -> list[str]:
+    names = [p.name for p in circuit.fittings if isinstance(p, Section)]
+    if not names:
+        return []
+    return [
+        "## Spare amplifiers",
+        f"{', '.join(names)}: a follower with its input at ground, so that neither input nor "
+        "output floats or sits at a limit.",
+    ]
