@@ -73,7 +73,7 @@ def _example(rule: CustomRule, size: float, at: Point, nets: list[str]) -> Itera
         yield _segment((x, down), (x + 5.0, down), TRACK, nets.index(_B))
     elif rule.constraint == "clearance":
         for number, (name, left) in enumerate(((_A, x), (_B, x + PAD + size))):
-            yield _footprint(f"{rule.id}-{number}", (left, y), nets.index(name), name, None)
+            yield _footprint(f"{rule.id}-{number}", (left, y), nets.index(name), name, PAD / 2.0)
     elif rule.constraint == "courtyard_clearance":
         for number, (name, left) in enumerate(((_A, x), (_B, x + 4.0 * PAD + size))):
             net = nets.index(name)
@@ -120,21 +120,17 @@ def _via(at: Point, net: int) -> Expression:
     )
 
 
-def _footprint(name: str, at: Point, net: int, net_name: str, yard: float | None) -> Expression:
-    """One square pad; yard : half the width of its courtyard, or none."""
-    lines = []
-    if yard is not None:
-        lines.append(
-            expression(
-                "fp_rect",
-                expression("start", -yard, -yard),
-                expression("end", yard, yard),
-                expression("stroke", expression("width", 0.05), expression("type", word("solid"))),
-                expression("fill", word("no")),
-                expression("layer", "F.CrtYd"),
-                expression("uuid", identifier("yard", name)),
-            )
-        )
+def _footprint(name: str, at: Point, net: int, net_name: str, yard: float) -> Expression:
+    """One square pad; yard : half the width of its courtyard."""
+    courtyard = expression(
+        "fp_rect",
+        expression("start", -yard, -yard),
+        expression("end", yard, yard),
+        expression("stroke", expression("width", 0.05), expression("type", word("solid"))),
+        expression("fill", word("no")),
+        expression("layer", "F.CrtYd"),
+        expression("uuid", identifier("yard", name)),
+    )
     pad = expression(
         "pad",
         "1",
@@ -152,6 +148,6 @@ def _footprint(name: str, at: Point, net: int, net_name: str, yard: float | None
         expression("layer", "F.Cu"),
         expression("uuid", identifier("footprint", name)),
         expression("at", *at),
-        *lines,
+        courtyard,
         pad,
     )

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from designer.board_drc import DesignRuleCheck, Violation
+from designer.board_drc import CheckFailed, DesignRuleCheck, Violation, check
 from designer.board_file import BoardFile
 from designer.board_rules import CustomRule
 from designer.circuit import NEGATIVE, POSITIVE
 from designer.components import Component
-from designer.kicad_names import circuit_net
+from designer.kicad_names import POWER, circuit_net
 from designer.rule import (
     FAIL,
     PASS,
@@ -45,14 +45,28 @@ def without_board(
     return tuple(_idle(rule, rules, overrides, why) for rule in _wanted())
 
 
+def checked(
+    board: BoardFile,
+    components: Sequence[Component],
+    rules: Sequence[CustomRule],
+    overrides: Mapping[str, Override],
+) -> tuple[Outcome, ...]:
+    """Every rule on a board, with KiCad where that is installed and answers."""
+    try:
+        told: DesignRuleCheck | str = check(board, rules)
+    except CheckFailed as why:
+        told = str(why)
+    return on_board(board, components, rules, overrides, told)
+
+
 def on_board(
     board: BoardFile,
     components: Sequence[Component],
     rules: Sequence[CustomRule],
     overrides: Mapping[str, Override],
-    checked: DesignRuleCheck | str,
+    told: DesignRuleCheck | str,
 ) -> tuple[Outcome, ...]:
-    """Every rule on a board. checked : what KiCad found, or why it was not asked."""
+    """Every rule on a board. told : what KiCad found, or why it was not asked."""
     said = {custom.id: custom for custom in rules}
     out = []
     for rule in _wanted():
@@ -60,10 +74,10 @@ def on_board(
         try:
             if rule.id == READ:
                 out.append(judged(rule, decoupling_distance(board, components), override))
-            elif isinstance(checked, str):
-                out.append(_idle(rule, rules, overrides, checked))
+            elif isinstance(told, str):
+                out.append(_idle(rule, rules, overrides, told))
             else:
-                out.append(_by_kicad(rule, said[rule.id], board, checked, override))
+                out.append(_by_kicad(rule, said[rule.id], board, told, override))
         except NotRun as reason:
             out.append(_idle(rule, rules, overrides, str(reason)))
     return tuple(out)
@@ -96,19 +110,19 @@ def _by_kicad(
     rule: Rule,
     custom: CustomRule,
     board: BoardFile,
-    checked: DesignRuleCheck,
+    told: DesignRuleCheck,
     override: Override | None,
 ) -> Outcome:
-    if custom.id in checked.misunderstood:
+    if custom.id in told.misunderstood:
         raise NotRun("KiCad does not report a board that breaks this rule")
-    mine = [v for v in checked.violations if v.rule == custom.id]
+    mine = [v for v in told.violations if v.rule == custom.id]
     if mine:
         return _broken(rule, custom, mine, override)
     concerned = {circuit_net(net) for net in custom.nets}
     if concerned:
-        lost = sorted(concerned & checked.unconnected)
+        lost = sorted(concerned & told.unconnected)
         if lost:
-            raise NotRun(f"not routed yet: {', '.join(lost)}")
+            raise NotRun(f"not routed yet: {', '.join(POWER.get(net, net) for net in lost)}")
         if not concerned & board.routed:
             raise NotRun("none of the nets that this speaks of is routed")
     elif rule.id in COPPER and not board.routed:

@@ -67,6 +67,8 @@ def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) ->
     """
     through = 0.0
     for diode in circuit.diodes:
+        if diode.rest:
+            continue  # it conducts
         entry = catalog.diode(diode.model.name)
         through += abs(forces.between(diode.cathode, diode.anode)) * entry.reverse_current.nominal
     opposed = {frozenset(d.nets) for d in circuit.fittings if isinstance(d, Diode)}

@@ -13,7 +13,7 @@ from typing import Any
 
 from designer import __version__, junit, rule_board, rules, whole_file
 from designer.api import Synthesis
-from designer.board_drc import CheckFailed, DesignRuleCheck, check, kicad_version
+from designer.board_drc import kicad_version
 from designer.board_file import BoardFile, check_belongs, read_board
 from designer.board_parts import board_circuit
 from designer.board_rules import board_rules
@@ -110,12 +110,7 @@ def checked(made: Synthesis, board: BoardFile | None = None) -> Checked:
     on_circuit = rules.on_circuit(Subject(made, circuit, listed), limits)
     if board is None:
         return Checked((*on_circuit, *rule_board.without_board(custom, limits)), None)
-    told: DesignRuleCheck | str
-    try:
-        told = check(board, custom)
-    except CheckFailed as why:
-        told = str(why)
-    on_board = rule_board.on_board(board, listed, custom, limits, told)
+    on_board = rule_board.checked(board, listed, custom, limits)
     return Checked((*on_circuit, *on_board), kicad_version())
 
 

@@ -1,0 +1,596 @@
+"""Rules on a board: what is read from its file, what KiCad says, and when nothing counts."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from designer import board_drc, board_rules, board_specimen, kicad_files, rule_board, rules_job
+from designer.board_drc import CheckFailed, DesignRuleCheck
+from designer.board_file import BoardFile, arc_length, check_belongs, read_board
+from designer.board_rules import CustomRule, rules_text, spacing
+from designer.components import Component
+from designer.errors import InputError
+from designer.kicad_names import kicad_net
+from designer.rule import FAIL, NOT_RUN, PASS, Outcome, Override
+from designer.rule_list import RULES
+from designer.sexpr import Expression, expression, read, read_all, write
+from tests.rule_cases import base
+from tests.stages import stage
+from tests.test_reduction import EXACT
+
+BY_KICAD = (
+    "clearance",
+    "pad-clearance",
+    "component-spacing",
+    "summing-length",
+    "summing-vias",
+    "supply-width",
+)
+"""Rules whose pair is a board that breaks them in KiCad's check, and one that just keeps them."""
+BY_READING = ("decoupling-distance",)
+
+
+@cache
+def drawn() -> str:
+    """The exported board of the design that pairs start from: placed, not routed."""
+    files = kicad_files.texts(base().made)
+    return next(text for name, text in files.items() if name.endswith(".kicad_pcb"))
+
+
+def custom(**limits: float) -> tuple[CustomRule, ...]:
+    """The custom rules of that design, some with other limits."""
+    said = {name.replace("_", "-"): Override(limit, "a test") for name, limit in limits.items()}
+    return board_rules.board_rules(base().circuit, said)
+
+
+def board_of(text: str, folder: Path) -> BoardFile:
+    """A board's text as it is read from a file."""
+    path = folder / "some.kicad_pcb"
+    path.write_text(text, encoding="utf-8")
+    return read_board(path)
+
+
+def edited(change: Any) -> str:
+    """The exported board with every list of its top level changed, or left out for None."""
+    whole = read(drawn())
+    items = [change(i) if isinstance(i, Expression) else i for i in whole.items]
+    return write(Expression(tuple(i for i in items if i is not None)))
+
+
+def reference(footprint: Expression) -> str:
+    return next(p.text(1) for p in footprint.all("property") if p.text(0) == "Reference")
+
+
+def renamed(old: str, new: str) -> str:
+    return drawn().replace(f'(property "Reference" "{old}"', f'(property "Reference" "{new}"')
+
+
+def with_items(*items: Expression) -> str:
+    whole = read(drawn())
+    return write(Expression((*whole.items, *items)))
+
+
+def track(net: str, width: float, length: float, y: float = -20.0) -> Expression:
+    """A track on one of the board's nets, aside."""
+    numbers = {n.text(1): n.text(0) for n in read(drawn()).all("net")}
+    return expression(
+        "segment",
+        expression("start", -50.0, y),
+        expression("end", -50.0 + length, y),
+        expression("width", width),
+        expression("layer", "F.Cu"),
+        expression("net", int(numbers[kicad_net(net)])),
+    )
+
+
+def by_id(outcomes: tuple[Outcome, ...]) -> dict[str, Outcome]:
+    return {o.rule.id: o for o in outcomes}
+
+
+def looked(text: str, folder: Path) -> dict[str, Outcome]:
+    """What the rules say of a board of the design."""
+    board = board_of(text, folder)
+    return by_id(rule_board.checked(board, base().components, custom(), {}))
+
+
+@cache
+def small() -> str:
+    """A board of four components only."""
+    kept = ("U1", "C903", "C904", "R4")
+    return edited(lambda i: i if i.name != "footprint" or reference(i) in kept else None)
+
+
+def refused(text: str, folder: Path) -> InputError:
+    """The error of a board that cannot be read or is of another design."""
+    with pytest.raises(InputError) as error:
+        check_belongs(board_of(text, folder), base().components)
+    assert error.value.exit_status == 2
+    return error.value
+
+
+# ---------------------------------------------------------------------------------------------
+# The file
+
+
+def test_the_exported_board_is_of_its_design(tmp_path: Path) -> None:
+    board = board_of(drawn(), tmp_path)
+    check_belongs(board, base().components)
+    assert not board.tracks
+    assert not board.vias
+    assert not board.routed
+    listed = {c.reference: c for c in base().components}
+    for footprint in board.footprints:
+        there = {p.number: p.net for p in footprint.pads if p.net}
+        assert there == {n: net for n, net in listed[footprint.reference].nets.items() if net}
+        assert footprint.courtyard
+
+
+def test_a_board_of_another_design_is_told_apart(tmp_path: Path) -> None:
+    saturating = replace(base().made, design=replace(base().made.design, circuit=stage(
+        "saturation", "both", {n: v if n[0] == "C" else 10e3 for n, v in EXACT.items()}
+    )))  # fmt: skip
+    files = kicad_files.texts(saturating)
+    text = next(text for name, text in files.items() if name.endswith(".kicad_pcb"))
+    said = refused(text, tmp_path)
+    assert said.field == "footprints"
+    assert "without D200, D201, D202, D203" in str(said)
+    assert "with R210" in str(said)
+
+
+def test_other_references_are_named(tmp_path: Path) -> None:
+    said = refused(renamed("R4", "R4X"), tmp_path)
+    assert "without R4; with R4X" in str(said)
+    twice = refused(renamed("R4", "R5"), tmp_path)
+    assert "R5 twice" in str(twice)
+
+
+def test_pins_on_other_nets_are_named(tmp_path: Path) -> None:
+    def exchange(item: Expression) -> Expression:
+        if item.name != "footprint" or reference(item) != "R4":
+            return item
+        text = write(item)
+        first, second = (f'"{kicad_net(n)}"' for n in ("v1", "s2"))
+        return read(text.replace(first, '"?"').replace(second, first).replace('"?"', second))
+
+    said = refused(edited(exchange), tmp_path)
+    assert said.field == "nets"
+    assert "R4.1 on s2, not on v1; R4.2 on v1, not on s2" in str(said)
+
+
+def test_a_mounting_hole_may_be_there_besides(tmp_path: Path) -> None:
+    hole = expression(
+        "footprint",
+        "MountingHole:MountingHole_3.2mm_M3",
+        expression("layer", "F.Cu"),
+        expression("at", -10.0, -10.0),
+        expression("property", "Reference", "H1"),
+    )
+    check_belongs(board_of(with_items(hole), tmp_path), base().components)
+
+
+def test_a_newer_board_and_an_older_one_are_refused(tmp_path: Path) -> None:
+    said = refused(drawn().replace("(version 20241229)", "(version 20260206)"), tmp_path)
+    assert said.field == "version"
+    assert "from a newer one" in str(said)
+    said = refused(drawn().replace("(version 20241229)", "(version 20171130)"), tmp_path)
+    assert "save the board with KiCad 9" in str(said)
+    said = refused(drawn().replace("(version 20241229)", "(version new)"), tmp_path)
+    assert "a file version" in str(said)
+
+
+@given(cut=st.floats(0.0, 0.999))
+def test_a_board_that_is_cut_off_is_refused(
+    tmp_path_factory: pytest.TempPathFactory, cut: float
+) -> None:
+    text = small()[: int(cut * (len(small()) - 2))]
+    with pytest.raises(InputError, match=r"some\.kicad_pcb"):
+        board_of(text, tmp_path_factory.mktemp("cut"))
+
+
+@given(at=st.floats(0.0, 0.999), put=st.sampled_from(["(", ")", '"', "x", " nan ", "()", "\x00"]))
+def test_a_damaged_board_is_read_or_refused_but_never_more(
+    tmp_path_factory: pytest.TempPathFactory, at: float, put: str
+) -> None:
+    place = int(at * len(small()))
+    text = small()[:place] + put + small()[place:]
+    there = [c for c in base().components if f'"{c.reference}"' in small()]
+    with contextlib.suppress(InputError):
+        board = board_of(text, tmp_path_factory.mktemp("damaged"))
+        check_belongs(board, there)
+        list(rule_board.decoupling_distance(board, there))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "0 expressions"),
+        (b"(kicad_sch (version 20250114))", "kicad_sch"),
+        (b"\xff\xfe\x00", "UTF-8"),
+        (b"(kicad_pcb)", "version"),
+        (b"PCBNEW-BOARD Version 1", "PCBNEW"),
+    ],
+)
+def test_what_is_no_board(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "some.kicad_pcb"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=said):
+        read_board(path)
+
+
+def test_what_is_no_file(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none.kicad_pcb"):
+        with pytest.raises(InputError, match="--board"):
+            read_board(path)
+
+
+@given(radius=st.floats(0.1, 100.0), half=st.floats(0.02, 3.1), turn=st.floats(0.0, 6.2))
+def test_length_of_an_arc(radius: float, half: float, turn: float) -> None:
+    start, mid, end = (
+        (radius * math.cos(turn + a), radius * math.sin(turn + a)) for a in (0.0, half, 2.0 * half)
+    )
+    assert arc_length(start, mid, end) == pytest.approx(2.0 * half * radius, rel=1e-3)
+
+
+def test_tracks_arcs_vias_and_zones_are_read(tmp_path: Path) -> None:
+    numbers = {n.text(1): int(n.text(0)) for n in read(drawn()).all("net")}
+    arc = expression(
+        "arc",
+        expression("start", 0.0, 0.0),
+        expression("mid", 1.0, 1.0),
+        expression("end", 2.0, 0.0),
+        expression("width", 0.25),
+        expression("layer", "F.Cu"),
+        expression("net", numbers["/s1"]),
+    )
+    via = expression("via", expression("at", 0.0, 0.0), expression("net", numbers["/s2"]))
+    zone = expression("zone", expression("net", numbers["GND"]))
+    board = board_of(with_items(track("s1", 0.3, 7.0), arc, via, zone), tmp_path)
+    first, second = board.tracks
+    assert (first.net, first.width, first.length) == ("s1", 0.3, 7.0)
+    assert (second.net, second.width) == ("s1", 0.25)
+    assert second.length == pytest.approx(math.pi)
+    assert (board.vias, board.zones) == (("s2",), ("0",))
+    assert board.routed == {"s1", "s2", "0"}
+
+
+# ---------------------------------------------------------------------------------------------
+# Read from the file
+
+
+def decoupled(distance: float, folder: Path) -> Outcome:
+    """C903 moved so that its nearer pad is this far from U1's V+."""
+    board = board_of(drawn(), folder)
+    pin = next(p for p in board.pads("U1") if p.net == "vcc")
+    pad = next(p for p in board.pads("C903") if p.net == "vcc")
+
+    def moved(item: Expression) -> Expression:
+        if item.name != "footprint" or reference(item) != "C903":
+            return item
+        at = item.get("at")
+        x = at.number(0) + pin.at[0] + distance - pad.at[0]
+        y = at.number(1) + pin.at[1] - pad.at[1]
+        turn = at.number(2) if len(at.atoms) > 2 else None
+        new = expression("at", x, y, turn)
+        return Expression(tuple(new if i is at else i for i in item.items))
+
+    return by_id(
+        rule_board.on_board(
+            board_of(edited(moved), folder), base().components, custom(), {}, "not asked"
+        )
+    )["decoupling-distance"]
+
+
+def test_a_far_decoupling_capacitor_is_caught_and_a_near_miss_is_not(tmp_path: Path) -> None:
+    far = decoupled(10.05, tmp_path)
+    assert (far.status, far.where) == (FAIL, "U1.4")
+    assert far.value == pytest.approx(10.05, abs=1e-5)
+    near = decoupled(9.95, tmp_path)
+    assert near.status == PASS
+    assert "read from the board file" in near.found
+
+
+def test_a_capacitor_on_the_other_rail_does_not_decouple_this_one(tmp_path: Path) -> None:
+    listed = [c for c in base().components if c.reference != "C903"]
+    board = board_of(drawn(), tmp_path)
+    found = by_id(rule_board.on_board(board, listed, custom(), {}, "not asked"))
+    assert found["decoupling-distance"].status == NOT_RUN
+
+
+# ---------------------------------------------------------------------------------------------
+# Never a pass by itself
+
+
+def test_without_a_board_nothing_is_run() -> None:
+    found = rule_board.without_board(custom(), {})
+    assert {o.rule.id for o in found} == {*BY_KICAD, *BY_READING}
+    assert {o.status for o in found} == {NOT_RUN}
+    assert all("no board" in o.found for o in found)
+    assert by_id(found)["clearance"].limit_text == "at least 0.2 mm"
+
+
+def test_without_kicad_only_what_is_read_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    found = rules_job.checked(base().made, board_of(drawn(), tmp_path))
+    assert found.kicad is None
+    of_board = {o.rule.id: o for o in found.outcomes if o.rule.scope == "board"}
+    for id_ in BY_KICAD:
+        assert of_board[id_].status == NOT_RUN
+        assert "not installed" in of_board[id_].found
+    assert of_board["decoupling-distance"].status == PASS
+
+
+def program(folder: Path, script: str) -> None:
+    """Something in the place of kicad-cli."""
+    path = folder / "kicad-cli"
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("echo 8.0.4", "older than KiCad 9"),
+        ("echo something", "older than KiCad 9"),
+        ('[ "$1" = --version ] && echo 9.0.0; echo no such board >&2; exit 3', "no such board"),
+        ('[ "$1" = --version ] && echo 9.0.0; while [ $# -gt 1 ]; do shift; [ "$1" = --output ] '
+         '&& echo "{" > "$2"; done', "no JSON"),
+        ('[ "$1" = --version ] && echo 9.0.0; while [ $# -gt 1 ]; do shift; [ "$1" = --output ] '
+         '&& echo "[]" > "$2"; done', "another kind"),
+        # A KiCad that has dropped every rule finds nothing.
+        ('[ "$1" = --version ] && echo 9.0.0; while [ $# -gt 1 ]; do shift; [ "$1" = --output ] '
+         '&& echo "{\\"violations\\": []}" > "$2"; done', "dropped the custom rules"),
+    ],
+)  # fmt: skip
+def test_a_kicad_that_gives_no_answer_passes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str
+) -> None:
+    program(tmp_path, script)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    with pytest.raises(CheckFailed, match=said):
+        board_drc.check(board_of(drawn(), tmp_path), custom())
+    found = looked(drawn(), tmp_path)
+    assert {found[id_].status for id_ in BY_KICAD} == {NOT_RUN}
+
+
+def answer(*misunderstood: str, unconnected: frozenset[str] = frozenset()) -> DesignRuleCheck:
+    """KiCad has found nothing."""
+    return DesignRuleCheck("9.0.0", (), frozenset(misunderstood), unconnected)
+
+
+def on_drawn(text: str, folder: Path, told: DesignRuleCheck) -> dict[str, Outcome]:
+    board = board_of(text, folder)
+    return by_id(rule_board.on_board(board, base().components, custom(), {}, told))
+
+
+def test_a_rule_that_kicad_does_not_understand_is_not_run(tmp_path: Path) -> None:
+    found = on_drawn(drawn(), tmp_path, answer("pad-clearance"))
+    assert found["pad-clearance"].status == NOT_RUN
+    assert "does not report" in found["pad-clearance"].found
+    assert found["component-spacing"].status == PASS
+
+
+def test_what_is_not_routed_is_not_passed(tmp_path: Path) -> None:
+    found = on_drawn(drawn(), tmp_path, answer())
+    for id_ in ("clearance", "summing-length", "summing-vias", "supply-width"):
+        assert found[id_].status == NOT_RUN
+    part = with_items(track("s1", 0.3, 5.0), track("vcc", 0.3, 5.0))
+    found = on_drawn(part, tmp_path, answer(unconnected=frozenset({"s2", "0"})))
+    assert found["clearance"].status == PASS
+    assert found["summing-length"].found == "not routed yet: s2"
+    assert found["supply-width"].found == "not routed yet: GND"
+    found = on_drawn(part, tmp_path, answer())
+    assert found["summing-length"].status == PASS
+
+
+def test_footprints_without_a_courtyard_leave_the_spacing_open(tmp_path: Path) -> None:
+    def bare(item: Expression) -> Expression:
+        if item.name != "footprint" or reference(item) != "R4":
+            return item
+        kept = [
+            i
+            for i in item.items
+            if not (
+                isinstance(i, Expression) and any(c.text() == "F.CrtYd" for c in i.all("layer"))
+            )
+        ]
+        return Expression(tuple(kept))
+
+    found = on_drawn(edited(bare), tmp_path, answer())["component-spacing"]
+    assert found.status == NOT_RUN
+    assert "R4" in found.found
+
+
+# ---------------------------------------------------------------------------------------------
+# The rules in KiCad's words
+
+
+def test_the_table_of_ipc_2221() -> None:
+    """Steps of table 6-1, columns B2 and A6: at each step and just past it."""
+    assert spacing(15.0) == (0.1, 0.13)
+    assert spacing(30.0) == (0.1, 0.25)
+    assert spacing(30.1) == (0.6, 0.4)
+    assert spacing(100.0) == (0.6, 0.5)
+    assert spacing(500.0) == (2.5, 1.5)
+    with pytest.raises(InputError, match="500 V"):
+        spacing(501.0)
+
+
+def test_a_higher_supply_widens_the_clearance() -> None:
+    usual = {rule.id: rule.limit for rule in custom()}
+    high = {r.id: r.limit for r in board_rules.board_rules(replace(base().circuit, supply=18.0))}
+    assert (usual["clearance"], usual["pad-clearance"]) == (0.2, 0.25)
+    assert (high["clearance"], high["pad-clearance"]) == (0.6, 0.4)
+
+
+def test_the_text_reads_back_and_the_special_rule_comes_last() -> None:
+    read_back = read_all(rules_text(custom()))
+    assert [e.name for e in read_back] == ["version", *["rule"] * len(custom())]
+    order = [e.text() for e in read_back[1:]]
+    # Of two that fit, KiCad takes the later one.
+    assert order.index("pad-clearance") > order.index("clearance")
+
+
+def test_rules_name_the_nets_of_the_circuit() -> None:
+    rule = next(r for r in custom() if r.id == "summing-length")
+    assert set(rule.nets) == {kicad_net(s.inverting) for s in base().circuit.sections}
+    assert all(f"A.NetName == '{net}'" in rule.condition for net in rule.nets)
+
+
+def test_widths_are_told_by_limit_and_net() -> None:
+    """A width's violation names the board's setup in the place of the rule."""
+    said = "Track width (board setup constraints min width 0.3000 mm; actual 0.2000 mm)"
+    place = {"pos": {"x": 1.0, "y": 2.0}, "description": "Track [VCC] on F.Cu, length 5.0 mm"}
+    elsewhere = {**place, "description": "Track [/v1] on F.Cu, length 5.0 mm"}
+
+    def found(words: str, item: dict[str, Any], type_: str = "track_width") -> list[str]:
+        one = {"type": type_, "description": words, "items": [item]}
+        return [v.rule for v in board_drc.violations({"violations": [one]}, custom())]
+
+    assert found(said, place) == ["supply-width"]
+    assert found(said, elsewhere) == []
+    assert found(said.replace("0.3000", "0.1500"), place) == []
+    named = "Clearance violation (rule 'clearance' clearance 0.2000 mm; actual 0.1000 mm)"
+    assert found(named, place, "clearance") == ["clearance"]
+    assert found(named.replace("'clearance'", "'somebody else'"), place, "clearance") == []
+
+
+def test_places_are_said_in_printable_words() -> None:
+    one = {
+        "type": "clearance",
+        "description": "(rule 'clearance' clearance 0.2 mm; actual 0.1 mm)",
+        "items": [{"description": "Pad\x1b[31m 1", "pos": {"x": 1.5, "y": 2.0}}],
+    }
+    (found,) = board_drc.violations({"violations": [one]}, custom())
+    assert found.where == "Pad?[31m 1 (1.5 mm, 2.0 mm)"
+    assert found.actual == 0.1
+
+
+# ---------------------------------------------------------------------------------------------
+# With KiCad
+
+
+@cache
+def examples(*, breaking: bool, folder: Path) -> dict[str, Outcome]:
+    """What the rules say of a board whose examples break them, or just keep them."""
+    folder.mkdir(exist_ok=True)
+    board = board_of(board_specimen.specimen(custom(), breaking=breaking), folder)
+    listed: list[Component] = []
+    return by_id(rule_board.on_board(board, listed, custom(), {}, board_drc.check(board, custom())))
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("examples")
+
+
+@pytest.mark.kicad
+@pytest.mark.parametrize("id_", BY_KICAD)
+def test_a_board_that_breaks_the_rule_is_caught_and_a_near_miss_is_not(
+    id_: str, scratch: Path
+) -> None:
+    caught = examples(breaking=True, folder=scratch / "breaking")[id_]
+    assert caught.status == FAIL, caught.found
+    rule = next(r for r in custom() if r.id == id_)
+    # A tenth past the limit, a count one past it; a courtyard's line has a width.
+    expected = rule.limit * (0.9 if rule.least else 1.1)
+    assert caught.value == pytest.approx(3.0 if id_ == "summing-vias" else expected, abs=0.02)
+    kept = examples(breaking=False, folder=scratch / "keeping")[id_]
+    assert kept.status == PASS, kept.found
+
+
+@pytest.mark.kicad
+def test_one_syntax_error_drops_every_rule_and_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The real KiCad says nothing of it and finds a board clean that breaks every rule."""
+
+    def damaged(rules: Any) -> str:
+        return rules_text(rules).replace("(constraint track_width", "(constraint track_wide", 1)
+
+    text = board_specimen.specimen(custom(), breaking=True)
+    clean = board_drc.report(text, damaged(custom()), tmp_path / "damaged")
+    assert board_drc.violations(clean, custom()) == ()
+    monkeypatch.setattr(board_drc, "rules_text", damaged)
+    with pytest.raises(CheckFailed, match="dropped the custom rules"):
+        board_drc.check(board_of(drawn(), tmp_path), custom())
+    found = looked(drawn(), tmp_path)
+    assert {found[id_].status for id_ in BY_KICAD} == {NOT_RUN}
+    assert all("dropped" in found[id_].found for id_ in BY_KICAD)
+
+
+@pytest.mark.kicad
+def test_a_property_that_kicad_does_not_know_is_noticed(tmp_path: Path) -> None:
+    rules = tuple(
+        replace(r, condition="A.Speed == 'fast'") if r.id == "supply-width" else r for r in custom()
+    )
+    found = board_drc.check(board_of(drawn(), tmp_path), rules)
+    assert found.misunderstood == {"supply-width"}
+
+
+@pytest.mark.kicad
+def test_the_exported_board_keeps_what_can_be_looked_at(tmp_path: Path) -> None:
+    found = looked(drawn(), tmp_path)
+    assert not [o for o in found.values() if o.status == FAIL]
+    assert found["pad-clearance"].status == PASS
+    assert found["component-spacing"].status == PASS
+    assert found["decoupling-distance"].status == PASS
+    assert found["summing-length"].found.startswith("not routed yet: d1, d2, i1")
+    assert found["supply-width"].found.startswith("not routed yet: GND")
+
+
+@pytest.mark.kicad
+def test_what_a_drawn_board_breaks_is_found_on_it(tmp_path: Path) -> None:
+    """A thin supply track and a long summing node, though nothing else is routed."""
+    text = with_items(track("vcc", 0.29, 5.0), track("s2", 0.2, 50.5, -30.0))
+    found = looked(text, tmp_path)
+    assert found["supply-width"].status == FAIL
+    assert found["supply-width"].value == 0.29
+    assert "VCC" in found["supply-width"].where
+    assert found["summing-length"].status == FAIL
+    assert found["summing-length"].value == pytest.approx(50.5)
+    assert found["clearance"].status == PASS
+
+
+@pytest.mark.kicad
+def test_severities_of_the_board_s_own_project_hide_nothing(tmp_path: Path) -> None:
+    """A project beside the board that ignores every violation is not asked."""
+    (tmp_path / "some.kicad_pro").write_text(
+        '{"board": {"design_settings": {"rule_severities": {"track_width": "ignore"}}}}'
+    )
+    text = with_items(track("vcc", 0.29, 5.0))
+    found = looked(text, tmp_path)
+    assert found["supply-width"].status == FAIL
+
+
+@pytest.mark.kicad
+def test_pads_lie_where_kicad_puts_them(tmp_path: Path) -> None:
+    """Turned footprints: KiCad's report gives the place of every pad that is not connected."""
+    board = board_of(drawn(), tmp_path)
+    answer = board_drc.report(drawn(), rules_text(custom()), tmp_path / "pads")
+    read_here = {f"Pad {p.number} [{kicad_net(p.net)}] of {f.reference}": p.at
+                 for f in board.footprints for p in f.pads}  # fmt: skip
+    seen = 0
+    for each in answer["unconnected_items"]:
+        for item in each["items"]:
+            name = next((n for n in read_here if f"{n} on" in item["description"]), None)
+            if name is not None:
+                at = item["pos"]["x"], item["pos"]["y"]
+                assert at == pytest.approx(read_here[name], abs=1e-3), name
+                seen += 1
+    assert seen > 50
+
+
+def test_every_rule_on_a_board_stands_in_a_pair() -> None:
+    assert {*BY_KICAD, *BY_READING} == {r.id for r in RULES if r.scope == "board"}
