@@ -34,7 +34,7 @@ STUDY_KEYS = (
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 VERBS = tuple(
-    "run synthesise synthesize simulate bifurcation tolerance reproduce catalog new".split()
+    "run synthesise synthesize simulate bifurcation tolerance trade reproduce catalog new".split()
 )
 
 app = typer.Typer(
@@ -370,4 +370,5 @@ from designer import (  # noqa: E402
     commands_bifurcation,  # noqa: F401
     commands_reproduce,  # noqa: F401
     commands_tolerance,  # noqa: F401
+    commands_trade,  # noqa: F401
 )
