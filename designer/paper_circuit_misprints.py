@@ -143,7 +143,7 @@ MISPRINTS: tuple[Misprint, ...] = (
         "1/M1 = R1 C1",
         "M1 = R1 C1",
         "R1 C1 and R4 C2 as chosen, R2, R3, R8 and R9 from ζ: 2.2 Ω and 1.1 Ω; its responses are "
-        "not computed, with ζ = 1000 nothing moves at these frequencies",
+        "not computed: ζ = 1000 holds x₁ within about 1/(2ζω), a hundredth of b",
         _parts(_inverse_mass),
         run=False,
     ),

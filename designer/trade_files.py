@@ -186,21 +186,22 @@ def _percent(value: float | None) -> str:
 
 
 def _short(value: float) -> str:
-    return f"{value:.2g}"
+    """To two figures, without an exponent where it need not be."""
+    return f"{float(f'{value:.2g}'):.10g}"
 
 
 KEYS = {"trade": "error", "trade-numerics": "numerical_error"}
 """Pictures, and which error each shows."""
-_AXES = {"error": "RMS error of x₁ / peak", "numerical_error": "of it numerics alone"}
+_AXES = {"error": "RMS error of x₁ / peak", "numerical_error": "numerics alone: RMS of x₁ / peak"}
 
 
 @styled
 def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     """Error over the time of a drive period, a panel for each response; hollow where the n-p-q is
-    not the board's. The line joins what no other rung beats in both; what the error is measured
-    against is not shown.
+    not the board's. What the error is measured against is not shown.
 
-    key : "error", against the board, or "numerical_error", against the rung's own equations.
+    key : "error", against the board, where a line joins what no other rung beats in both; or
+    "numerical_error", against the rung's own equations, so that rungs do not compete.
     """
     omegas = list(dict.fromkeys(row["omega"] for row in answer["rungs"]))
     columns = min(3, len(omegas))
@@ -223,7 +224,8 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
         Line2D([], [], ls="", marker=_LOOKS[r][1], color=_LOOKS[r][0], ms=5, label=TITLES[r])
         for r in used
     ]
-    handles.append(Line2D([], [], color=MUTED, lw=0.9, label="front"))
+    if key == "error":
+        handles.append(Line2D([], [], color=MUTED, lw=0.9, label="front"))
     handles.append(Line2D([], [], color=MUTED, lw=0.9, ls=(0, (4, 2)), label="0.1 %"))
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
@@ -243,7 +245,7 @@ def _panel(axes: Axes, rows: Sequence[Mapping[str, Any]], key: str) -> None:
     for at in sorted(points):
         if not line or at[1] < line[-1][1]:
             line.append(at)
-    if line:
+    if key == "error" and line:
         axes.plot([p[0] for p in line], [p[1] for p in line], color=MUTED, lw=0.9, zorder=2)
     axes.axhline(WAVEFORM, color=MUTED, lw=0.9, ls=(0, (4, 2)), zorder=1)
     axes.set_xscale("log")

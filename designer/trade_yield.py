@@ -2,8 +2,8 @@
 
 Boards of the model file's spread, started on the nominal orbit, each by both engines. Where they
 differ by D = +1 or -1 a board, the mean of D is the error of the exact circuit's yield. Its 95 %
-interval joins the Wilson limits of both shares (Zou and Donner, Statistics in Medicine 27, 2008,
-1693): boards without any difference still leave room for one.
+interval joins the Wilson limits of both shares with their correlation (Zou and Donner, Statistics
+in Medicine 27, 2008, 1693): boards without any difference still leave room for one.
 """
 
 from __future__ import annotations
@@ -55,11 +55,14 @@ class BoardTrade:
             return math.nan, -1.0, 1.0
         up, down = self.lost / n, self.gained / n
         (up_low, up_high), (down_low, down_high) = wilson(self.lost, n), wilson(self.gained, n)
+        # A board counts for one share at most: they go against each other.
+        rest = (1.0 - up) * (1.0 - down)
+        against = math.sqrt(up * down / rest) if rest > 0.0 else 1.0
         d = up - down
         return (
             d,
-            d - math.hypot(up - up_low, down_high - down),
-            d + math.hypot(up_high - up, down - down_low),
+            d - _joined(up - up_low, down_high - down, against),
+            d + _joined(up_high - up, down - down_low, against),
         )
 
     @property
@@ -127,6 +130,10 @@ def boards(
         pairs = [(a, heard.get((a.sample, number))) for a in mine]
         out[i] = _of_one(plan.questions[number], pairs, exactly, spice_seconds[i])
     return tuple(out)
+
+
+def _joined(a: float, b: float, against: float) -> float:
+    return math.sqrt(a * a + b * b + 2.0 * against * a * b)
 
 
 def _of_one(
