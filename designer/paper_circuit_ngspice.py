@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer import deck, gate
-from designer.circuit import Circuit, Generator, Section, nominal_board
+from designer.circuit import GROUND, Circuit, Generator, Section, nominal_board
 from designer.circuit_kernel import POINTS
-from designer.dead_zone_parts import MOVING, OUTPUT
+from designer.dead_zone_parts import OUTPUT
 from designer.deck import Excitation, SolverSettings
 from designer.gate import GateResult, Subject
 from designer.ngspice import SimulationFailed, Sweep
@@ -107,30 +107,22 @@ def _heard(result: GateResult, one: Built, followed: Followed) -> Heard:
 
 
 def _stage(circuit: Circuit) -> set[str]:
-    """Names of the parts between v1 and the stage's output, its supplies' included."""
-    integrating = {
-        s.name
-        for s in circuit.sections
-        for c in circuit.capacitors
-        if s.inverting in c.nets and s.output in c.nets
-    }
-    kept: set[str] = set()
-    nets = {OUTPUT}
-    rails = {rail.net for rail in circuit.rails} | {"0", DISPLACEMENT}
+    """Names of the parts that make the stage's output of v1: what is met going back from the
+    output, but for integrators and what feeds them. A section is met at its output alone."""
+    summing = {c.minus for c in circuit.capacitors}
+    ends = {GROUND, DISPLACEMENT} | {rail.net for rail in circuit.rails}
+    left = [p for p in circuit.parts if not summing & set(p.nets)]
+    nets, kept = {OUTPUT}, set[str]()
     while True:
-        more = {
-            p.name
-            for p in circuit.parts
-            if p.name not in kept | integrating
-            and p.name != MOVING
-            and not (isinstance(p, Section) and p.output not in nets)
-            and (set(p.nets) & (nets - rails))
-            and not any(s.inverting in p.nets for s in circuit.sections if s.name in integrating)
-        }
-        if not more:
+        met = [
+            p
+            for p in left
+            if p.name not in kept and nets & {*([p.output] if isinstance(p, Section) else p.nets)}
+        ]
+        if not met:
             return kept
-        kept |= more
-        nets |= {net for p in circuit.parts if p.name in more for net in p.nets} - rails
+        kept |= {p.name for p in met}
+        nets |= {net for p in met for net in p.nets} - ends
 
 
 def _whole(sweep: Sweep) -> Sweep:

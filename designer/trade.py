@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -191,9 +190,8 @@ def alike(first: Orbit, second: Orbit) -> bool:
 
 def _rank(one: Cheapest) -> tuple[bool, float]:
     """Those that keep the bound by their cost, the others by how far they are off."""
-    if one.shown:
-        return (False, one.seconds)
-    return (True, one.measured if one.measured == one.measured else math.inf)
+    measure = one.seconds if one.shown else one.measured
+    return (not one.shown, math.inf if math.isnan(measure) else measure)
 
 
 def _competes(rung: str, level: str, of: str, rows: Sequence[Sequence[Compared]]) -> bool:
@@ -270,7 +268,7 @@ def _of_boards(boards: Sequence[BoardTrade | None]) -> list[Cheapest]:
     for some in [[b] for b in asked] + ([asked] if len(asked) > 1 else []):
         measured = max(b.bound for b in some)
         off = any(b.off(YIELD) for b in some)
-        rung: Any = "ideal" if off else CIRCUIT
+        rung = "ideal" if off else CIRCUIT
         seconds = sum(b.seconds[rung] for b in some)
         out.append(
             Cheapest(

@@ -178,15 +178,18 @@ def _cell(row: Mapping[str, Any] | None) -> str:
     if row is None:
         return "–"
     error = _percent(row["error"]) if row["right"][BOARD] else row["response"]
-    return f"{error}, {_short(1e3 * row['seconds_per_period'])}"
+    seconds = row["seconds_per_period"]
+    return f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
 
 
 def _percent(value: float | None) -> str:
     return "–" if value is None else f"{100.0 * value:.2g} %"
 
 
-def _short(value: float) -> str:
+def _short(value: float | None) -> str:
     """To two figures, without an exponent where it need not be."""
+    if value is None:
+        return "–"
     return f"{float(f'{value:.2g}'):.10g}"
 
 
@@ -210,7 +213,8 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for axes in grid[len(omegas) :]:
         axes.set_visible(False)
-    shown = [row for row in answer["rungs"] if row[key]]  # neither none nor exactly 0
+    # Neither none nor exactly 0: those are not on the axes.
+    shown = [row for row in answer["rungs"] if row[key] and row["seconds_per_period"]]
     for i, (axes, omega) in enumerate(zip(grid, omegas, strict=False)):
         _panel(axes, [row for row in shown if row["omega"] == omega], key)
         said = next(t["response"] for t in answer["truths"] if t["omega"] == omega)

@@ -127,6 +127,14 @@ def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
     assert (wave.rung, wave.level) == ("full", "× 1")  # the truth itself does not compete
 
 
+def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
+    untimed = said("rk4", "Δt = 0.01", 0.0, math.nan)
+    found = judged(untimed, *LADDER[1:])
+    assert picked(found, RESPONSE).rung == "model"
+    text = sheet(document(found))
+    assert "| model, Runge-Kutta | Δt = 0.01 | 0 %, – |" in text
+
+
 def test_a_truth_that_is_not_sure_answers_nothing() -> None:
     found = judged(
         said("model", "exact", 0.0, 1e-6),
