@@ -17,10 +17,13 @@ from designer.hearing import NOMINAL_SAMPLES, OWN_SAMPLES
 from designer.options import Options
 from designer.progress import Progress
 from designer.study import RungName
+from designer.trade import BOARD, RESPONSE, SHARE
+from designer.trade_rungs import CIRCUIT, MODEL, RK4
 
 TRADE = "trade.json"
-QUESTION = "yield within 1 %"
-RESPONSE = "n-p-q"
+"""What ``designer.trade_job`` writes."""
+DECIDE = (RK4, MODEL, CIRCUIT, "ideal")
+"""Rungs that a yield can be computed on, and those below them."""
 LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
 """Boards of each response that ngspice is asked about, whatever a trade says."""
 
@@ -66,21 +69,21 @@ def _choice(said: Mapping[str, Any]) -> Choice:
         f"ω = {c['omega']:g}"
         for c in said["cheapest"]
         if c["question"] == RESPONSE
-        and c["of"] == "board"
+        and c["of"] == BOARD
         and c["omega"] is not None
-        and not (c["shown"] and c["rung"] in ("rk4", "model", "circuit", "ideal"))
+        and not (c["shown"] and c["rung"] in DECIDE)
     ]
     warning = ""
     if wrong:
         warning = (
-            f"; at {', '.join(wrong)} only a rung above ideal op-amps shows the nominal board's "
-            "n-p-q, and yields are not computed there"
+            f"; at {', '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
+            "board's n-p-q, and yields are not computed above it"
         )
-    found = [c for c in said["cheapest"] if c["question"] == QUESTION]
+    found = [c for c in said["cheapest"] if c["question"] == SHARE]
     if not found:
         return Choice("auto", f"rung by trade.json: it asked no boards, so as usual{warning}")
     overall = found[-1]  # of all responses, or of the only one
-    if overall["rung"] == "circuit":
+    if overall["rung"] == CIRCUIT:
         kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %)"
         return Choice(
             "auto",

@@ -22,6 +22,7 @@ from designer.modelfile import ModelFile
 from designer.preconditions import cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.provenance import provenance
+from designer.rung_choice import TRADE
 from designer.stopwatch import SpiceClock
 from designer.study import check
 from designer.trade import Trade, trade
@@ -29,7 +30,7 @@ from designer.trade_rungs import LEVELS, ROUNDS, Answer
 from designer.trade_yield import BOARDS
 from designer.workers import SpicePool
 
-TRADE, SHEET = "trade.json", "trade.md"
+SHEET = "trade.md"
 PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")
 NAMES = (TRADE, SHEET, *PICTURES)
 TIMEOUT = 900.0
