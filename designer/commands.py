@@ -34,8 +34,8 @@ STUDY_KEYS = (
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 VERBS = tuple(
-    "run synthesise synthesize simulate bifurcation tolerance export rules reproduce catalog "
-    "new".split()
+    "run synthesise synthesize simulate bifurcation tolerance trade export rules reproduce "
+    "catalog new".split()
 )
 
 app = typer.Typer(
@@ -373,4 +373,5 @@ from designer import (  # noqa: E402
     commands_reproduce,  # noqa: F401
     commands_rules,  # noqa: F401
     commands_tolerance,  # noqa: F401
+    commands_trade,  # noqa: F401
 )

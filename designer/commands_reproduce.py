@@ -22,6 +22,7 @@ class Subject(StrEnum):
 
 PLACES = {
     Subject.DYNAMICS: Path("reports/paper-dynamics"),
+    Subject.CIRCUIT: Path("reports/paper-circuit"),
     Subject.TOLERANCE: Path("reports/tolerance"),
 }
 
@@ -32,7 +33,7 @@ def reproduce(
         Subject,
         typer.Argument(
             metavar="dynamics|circuit|tolerance",
-            help="Which part; circuit is not yet in this version.",
+            help="Which part of the paper.",
         ),
     ],
     out: Annotated[
@@ -40,8 +41,8 @@ def reproduce(
         typer.Option(
             "--out",
             metavar="DIR",
-            help="Where to [default: reports/paper-dynamics for dynamics, reports/tolerance "
-            "for tolerance].",
+            help="Where to [default: reports/paper-dynamics, reports/paper-circuit, "
+            "reports/tolerance].",
         ),
     ] = None,
     samples: Annotated[
@@ -62,20 +63,22 @@ def reproduce(
 
         if jobs is not None:
             at_least("--jobs", jobs, 1)
-        if what not in PLACES:
-            there = " or ".join(PLACES)
-            raise InputError(None, "what to reproduce", what.value, f"{there}, in this version")
         place = PLACES[what] if out is None else out
+        if what is not Subject.TOLERANCE:
+            for name, value in (("--samples", samples), ("--seed", seed)):
+                if value is not None:
+                    raise InputError(None, name, value, f"nothing: {what.value} draws no boards")
         if what is Subject.DYNAMICS:
             from designer import reproduce_dynamics
 
-            for name, value in (("--samples", samples), ("--seed", seed)):
-                if value is not None:
-                    raise InputError(None, name, value, "nothing: dynamics draws no boards")
             if resume:
                 expected = "nothing: dynamics is made anew each time"
                 raise InputError(None, "--resume", "given", expected)
             reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
+        elif what is Subject.CIRCUIT:
+            from designer import reproduce_circuit
+
+            reproduce_circuit.reproduce(place, jobs=jobs, progress=progress, resume=resume)
         else:
             from designer import reproduce_tolerance
 

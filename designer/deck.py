@@ -68,12 +68,14 @@ def write(
     initial: Array | None = None,
     rung: Rung = "ideal",
     kept_from: float = 0.0,
+    stage: bool = True,
 ) -> str:
     """The deck as text, ending in a newline.
 
     initial : (states,) capacitor voltages at t = 0; discharged where None. rung : the op-amps'
     model; those with a memory start at the output voltages that belong to ``initial``. kept_from :
-    time [s] before which ngspice keeps no point; what it computes is the same.
+    time [s] before which ngspice keeps no point; what it computes is the same. stage : whether it
+    keeps the nonlinear stage's output, beside the states and the generator.
 
     Raises
     ------
@@ -94,7 +96,11 @@ def write(
         lines.append(f"{c.name} {c.plus} {c.minus} {_n(board.values[c.name])} IC={_n(start)}")
     lines += _diodes(circuit, rung)
     lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
-    nets = [*circuit.state_nets, *([OUTPUT] if circuit.stops else []), circuit.generator.net]
+    nets = [
+        *circuit.state_nets,
+        *([OUTPUT] if circuit.stops and stage else []),
+        circuit.generator.net,
+    ]
     lines += [
         f".options method={settings.method} reltol={_n(settings.reltol)} "
         f"abstol={_n(settings.abstol)} vntol={_n(settings.vntol)} noopiter",

@@ -172,6 +172,7 @@ def job(
         rung=subject.rung,
         # A period before the first strobe, for the points around it: a long way takes no memory.
         kept_from=0.0 if whole else max(subject.discard - 1, 0) * subject.period,
+        stage=False,
     )
     signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
     return SpiceJob(text, signals, stop, partial(read, reading=reading))
@@ -249,8 +250,8 @@ def contact_lengths(touching: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.flatnonzero(change < 0) - np.flatnonzero(change > 0)
 
 
-def _steps(subject: Subject, contact: float) -> int:
-    """Steps of a period that the first level takes."""
+def first_steps(subject: Subject, contact: float) -> int:
+    """Steps of a period that the first level takes; contact : length of the shortest [s]."""
     wanted = int(np.ceil(STEPS_PER_CONTACT * subject.period / contact))
     return min(max(STEPS_PER_PERIOD, wanted), MOST_STEPS)
 
@@ -263,7 +264,7 @@ def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
     """
     subjects = warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
-    steps = [_steps(s, contact) for s, contact in zip(subjects, contacts, strict=True)]
+    steps = [first_steps(s, contact) for s, contact in zip(subjects, contacts, strict=True)]
     results: list[GateResult | None] = [None] * len(subjects)
     tried: list[list[int]] = [[] for _ in subjects]
     for level in range(LEVELS):
@@ -288,7 +289,7 @@ def warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
     for i in asked:
         s = subjects[i]
         contact = shortest_contact(s.orbit, s.system, s.excitation)
-        steps = 2 * _steps(s, contact)
+        steps = 2 * first_steps(s, contact)
         probe = replace(s, discard=max(warm_start.PROBE - 4, 0) * s.orbit.n)
         tasks.append(task(probe, SolverSettings("trap", s.period / steps, RELTOL), whole=True))
     for k, outcome in remedies.run(pool, tasks):

@@ -13,9 +13,11 @@ from designer.provenance import sha256
 
 FORMAT = 1
 MANIFEST = "manifest.json"
-StageName = Literal["design", "kicad", "study", "comparison", "sweep", "map", "basins", "rules"]
+StageName = Literal[
+    "design", "kicad", "study", "comparison", "trade", "sweep", "map", "basins", "rules"
+]
 STAGES: tuple[StageName, ...] = get_args(StageName)
-OF_DESIGN: tuple[StageName, ...] = ("kicad", "study", "comparison", "rules")
+OF_DESIGN: tuple[StageName, ...] = ("kicad", "study", "comparison", "trade", "rules")
 """Stages that depend on the design, and on it alone."""
 State = Literal["new", "same", "more", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000

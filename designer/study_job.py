@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import api, design_files, equation_check, kicad_files
+from designer import api, design_files, equation_check, kicad_files, rung_choice
 from designer.api import RunResult, Synthesis
 from designer.catalog import Catalog, load_catalog
 from designer.design_files import load
@@ -55,6 +55,7 @@ def run_into(
     need_responses(modelfile)
     catalog = load_catalog()
     folder = Folder(out)
+    options = rung_choice.chosen(folder, options, progress)
     wanted, options = _study_wanted(folder, modelfile, catalog, options)
     origin = made_from(folder)
     if (

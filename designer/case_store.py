@@ -1,0 +1,75 @@
+"""The pieces of a long report, each on disk as soon as it is done.
+
+A piece is a JSON file in the folder ``cases`` of the report, with a key that says what it was made
+of. The report's own files are made of the pieces; a file of somebody else's is not written over.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from designer.errors import InputError
+from designer.whole_file import write
+
+FOLDER = "cases"
+
+
+class CaseStore:
+    """The pieces of one report.
+
+    Parameters
+    ----------
+    out : the report's folder, which is made. key : of all that decides the pieces. files : names
+    of the report's own files. resume : go on with the pieces that are there.
+
+    Raises
+    ------
+    InputError : pieces are there already and ``resume`` is not given; a file stands where one of
+        the report's goes, and no piece that it could be made of; the folder cannot be made.
+    """
+
+    def __init__(self, out: Path, key: str, files: Iterable[str], *, resume: bool) -> None:
+        self._folder, self._key = out / FOLDER, key
+        begun = self._folder.is_dir() and any(self._folder.iterdir())
+        if begun and not resume:
+            raise InputError(self._folder, "--out", "results", "an empty folder, or --resume")
+        if not (begun and any(self._read(p) for p in sorted(self._folder.glob("*.json")))):
+            for name in files:
+                if (out / name).exists():
+                    found = "a file that the report would replace, and no piece of it to go on with"
+                    raise InputError(out / name, "--out", found, "a folder without it")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            said = error.strerror or str(error)
+            raise InputError(self._folder, "--out", said, "a place that can be written") from None
+
+    def piece(self, name: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+        """A piece as it was kept, or made now and kept.
+
+        Raises
+        ------
+        InputError : what is there was made with other settings, or is no piece.
+        """
+        path = self._folder / f"{name}.json"
+        known = self._read(path)
+        if known is None:
+            known = {"key": self._key, **make()}
+            text = json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False)
+            write(path, text + "\n")
+        return {k: v for k, v in known.items() if k != "key"}
+
+    def _read(self, path: Path) -> dict[str, Any] | None:
+        try:
+            known = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            raise InputError(path, "--resume", str(error), "a piece of this report") from None
+        if not isinstance(known, dict) or known.get("key") != self._key:
+            found = "a piece of other settings"
+            raise InputError(path, "--resume", found, "the same settings")
+        return known

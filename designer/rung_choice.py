@@ -1,0 +1,97 @@
+"""Which rung decides: by what ``designer trade`` measured of this design, else the usual one.
+
+A study decides on the exact circuit and asks ngspice about some boards of each response, `LEAST` at
+least (``auto``). Where a trade has shown that the exact circuit's yield is further from ngspice's
+than its bound, every board goes to ngspice. What a user asks for with ``--rung`` stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from designer.errors import InputError
+from designer.folder import Folder
+from designer.hearing import NOMINAL_SAMPLES, OWN_SAMPLES
+from designer.options import Options
+from designer.progress import Progress
+from designer.study import RungName
+from designer.trade import BOARD, RESPONSE, SHARE
+from designer.trade_rungs import CIRCUIT, MODEL, RK4
+
+TRADE = "trade.json"
+"""What ``designer.trade_job`` writes."""
+DECIDE = (RK4, MODEL, CIRCUIT, "ideal")
+"""Rungs that a yield can be computed on, and those below them."""
+LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
+"""Boards of each response that ngspice is asked about, whatever a trade says."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """rung : of a study. reason : one line for people; "" where nothing was measured."""
+
+    rung: RungName
+    reason: str
+
+
+def choose(folder: Folder) -> Choice:
+    """By the folder's ``trade.json``, if its stage is complete; else ``auto``.
+
+    Raises
+    ------
+    InputError : the file is not what ``trade`` wrote.
+    """
+    stage = folder.manifest.stages.get("trade") if folder.manifest else None
+    if stage is None or not stage.complete:
+        return Choice("auto", "")
+    said = folder.json(TRADE)
+    try:
+        return _choice(said)
+    except (KeyError, TypeError, ValueError) as error:
+        found = f"{type(error).__name__}: {error}"
+        raise InputError(folder / TRADE, "cheapest", found, "what trade wrote") from None
+
+
+def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
+    """The options with the rung that was chosen, which is said; one that was asked for stands."""
+    if options.rung != "auto":
+        return options
+    choice = choose(folder)
+    if choice.reason:
+        progress.note(choice.reason)
+    return replace(options, rung=choice.rung)
+
+
+def _choice(said: Mapping[str, Any]) -> Choice:
+    wrong = [
+        f"ω = {c['omega']:g}"
+        for c in said["cheapest"]
+        if c["question"] == RESPONSE
+        and c["of"] == BOARD
+        and c["omega"] is not None
+        and not (c["shown"] and c["rung"] in DECIDE)
+    ]
+    warning = ""
+    if wrong:
+        warning = (
+            f"; at {', '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
+            "board's n-p-q, and yields are not computed above it"
+        )
+    found = [c for c in said["cheapest"] if c["question"] == SHARE]
+    if not found:
+        return Choice("auto", f"rung by trade.json: it asked no boards, so as usual{warning}")
+    overall = found[-1]  # of all responses, or of the only one
+    if overall["rung"] == CIRCUIT:
+        kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %)"
+        return Choice(
+            "auto",
+            f"rung by trade.json: the exact circuit decides, {kept}; ngspice is asked about "
+            f"{LEAST} boards of each response at least{warning}",
+        )
+    return Choice(
+        "ngspice",
+        "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
+        f"than {100.0 * overall['bound']:g} %{warning}",
+    )

@@ -1,0 +1,230 @@
+"""Every rung on one response of a design: its answer at several steps, and what a period costs.
+
+The rungs, by what they compute: the model (fixed-step Runge-Kutta as the paper's baseline, and the
+exact flow), the nominal circuit by the exact flow, and ngspice with ideal op-amps, with bandwidth
+and slew (``dynamic``), with a macromodel (``full``). The largest step of ngspice is a fraction of
+the period that follows the shortest contact (``gate.first_steps``): × 1 at 1e-5 is what the
+numerics gate tries first, × 0.25 four times that step. Its tolerance goes with the step, for beside
+a tight one ngspice takes the small steps anyway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from designer import fixed_step, gate, pipeline
+from designer.api import Synthesis
+from designer.circuit_kernel import POINTS
+from designer.deck import Excitation, SolverSettings
+from designer.exact import displacement
+from designer.flow import Flow
+from designer.gate import Subject
+from designer.model import Dimensionless
+from designer.ngspice import SimulationFailed, Waveforms
+from designer.opamp_model import RUNGS as SPICE_RUNGS
+from designer.opamp_model import Rung
+from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.responses import ModelResponse, on_circuit
+from designer.stopwatch import Entrant, SpiceClock, here, rounds
+from designer.system import Array, Drive
+from designer.waveform_orbit import Read, Reading, read
+from designer.workers import SpicePool
+
+RK4, MODEL, CIRCUIT = "rk4", "model", "circuit"
+RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS)
+TOP: Rung = "full"
+"""The most faithful rung."""
+LEVELS = ((0.25, 1e-3), (0.5, 1e-4), (1.0, gate.RELTOL), (2.0, 0.1 * gate.RELTOL))
+"""Steps of ngspice over those that the gate tries first, and its relative tolerance."""
+STEPS = (0.04, 0.02, 0.01, fixed_step.PAPERS_STEP)
+"""Of Runge-Kutta, in dimensionless time."""
+SETTLED = 40
+"""Drive periods of Runge-Kutta before it is judged, from the exact orbit."""
+TIMED = 8
+"""Drive periods of a timed run of ngspice."""
+ROUNDS = 3
+BASELINE = 4
+"""Periods of a timed run of Runge-Kutta and of the exact flow, at least."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one rung at one setting says of a response.
+
+    level : names the setting alike for all responses. settings : of the solver. orbit : in model
+    units as far as it is used: n-p-q, status, impacts. shown : (n · POINTS,) first displacement in
+    model units; empty where there is none. seconds : CPU time of a drive period. reason : why there
+    is no answer.
+    """
+
+    rung: str
+    level: str
+    settings: dict[str, Any]
+    orbit: Orbit
+    shown: Array
+    seconds: float = float("nan")
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A response with what ngspice and the exact flow need of it."""
+
+    response: ModelResponse
+    model: Dimensionless
+    volts: Array
+    subject: Subject
+    entrants: list[Entrant] = field(default_factory=list)
+
+
+def answers(
+    made: Synthesis,
+    pool: SpicePool,
+    clock: SpiceClock,
+    *,
+    levels: Sequence[tuple[float, float]] = LEVELS,
+    rounds_: int = ROUNDS,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[tuple[Answer, ...], ...]:
+    """For each response of the design what every rung says; progress : called once a response.
+
+    pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
+    """
+    reduction = pipeline.nominal_reduction(made.design)
+    system = reduction.system()
+    out = []
+    for r in made.found:
+        excitation = Excitation(
+            made.design.errors.scales.frequency(r.omega), made.design.amplitude(r.b)
+        )
+        orbit = on_circuit(system, made.design, r)
+        asked = _Asked(
+            r,
+            replace(made.design.model, b=r.b),
+            made.design.volts(r.b),
+            Subject(reduction, excitation, orbit),
+        )
+        entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
+        taken = rounds([entrant for _, entrant in entries], rounds_)
+        seconds = np.median(taken, axis=0)
+        out.append(
+            tuple(
+                replace(answer, seconds=float(s))
+                for (answer, _), s in zip(entries, seconds, strict=True)
+            )
+        )
+        progress()
+    return tuple(out)
+
+
+def _exact(asked: _Asked) -> Iterator[tuple[Answer, Entrant]]:
+    """Runge-Kutta at its steps, and both exact flows."""
+    r, model, omega = asked.response, asked.model, asked.response.omega
+    flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
+    start = r.orbit.start
+    for step in STEPS:
+        steps = max(1, round(flow.drive.period / step / POINTS)) * POINTS
+        answer = Answer(
+            RK4,
+            f"Δt = {step:g}",
+            {"steps_a_period": steps},
+            *_runge_kutta(model, r, steps),
+        )
+        yield (
+            answer,
+            here(RK4, lambda n, s=steps: fixed_step.run(model, omega, start, n, s), BASELINE),  # type: ignore[misc]
+        )
+    yield (
+        Answer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
+        here(MODEL, lambda n: flow.run(start, n), BASELINE),
+    )
+    own, subject = asked.subject.orbit, asked.subject
+    on = Flow(subject.system, subject.excitation.drive)
+    begin = own.start if len(own.start) else np.zeros(on.system.size)
+    yield (
+        Answer(
+            CIRCUIT,
+            "exact",
+            {},
+            _in_model_units(own, asked.volts),
+            _drawn(on, own, float(asked.volts[0])),
+        ),
+        here(CIRCUIT, lambda n: on.run(begin, n), BASELINE),
+    )
+
+
+def _runge_kutta(model: Dimensionless, r: ModelResponse, steps: int) -> tuple[Orbit, Array]:
+    """The orbit that Runge-Kutta settles on, read off as ngspice's are, and its displacement."""
+    n = r.orbit.n or MAX_PERIOD
+    x = fixed_step.run(model, r.omega, r.orbit.start, SETTLED * n, steps)
+    states = fixed_step.trace(model, r.omega, x, 4 * n, steps, steps)
+    period = 2.0 * np.pi / r.omega
+    time = np.arange(len(states)) * period / steps
+    names = tuple(f"x{i}" for i in range(4))
+    signals = dict(zip(names, states.T, strict=True)) | {"u": np.sin(r.omega * time)}
+    positions = {p for stop in model.second_order().clearances for p in stop.positions}
+
+    def row(side: int) -> Array | None:
+        return np.array([side, 0.0, 0.0, 0.0, 0.0, -model.b]) if side in positions else None
+
+    reading = Reading(period, 0, names, np.zeros(4), row(1), row(-1), "u", 0, keep=True)
+    found = read(Waveforms(time, signals, "", 0.0), reading)
+    return found.orbit, _traced(found, 1.0)
+
+
+def _spice(
+    asked: _Asked, pool: SpicePool, clock: SpiceClock, levels: Sequence[tuple[float, float]]
+) -> Iterator[tuple[Answer, Entrant]]:
+    subject = asked.subject
+    contact = gate.shortest_contact(subject.orbit, subject.system, subject.excitation)
+    first = gate.first_steps(subject, contact)
+    on = [replace(subject, rung=rung) for rung in SPICE_RUNGS]
+    if not len(subject.orbit.start):
+        return
+    runs: list[tuple[Subject, str, SolverSettings]] = []
+    for one in gate.warmed(pool, on):
+        for share, reltol in levels:
+            step = one.period / max(1, round(share * first))
+            name = f"× {share:g}, {reltol:g}"
+            runs.append((one, name, SolverSettings("trap", step, reltol)))
+    jobs = [gate.job(one, settings, keep=True) for one, _, settings in runs]
+    heard = dict(pool.map(jobs))
+    for k, (one, name, settings) in enumerate(runs):
+        short = replace(one, discard=TIMED - 4 * (one.orbit.n or MAX_PERIOD))
+        job = gate.job(replace(short, discard=max(short.discard, 0)), settings)
+        periods = gate.length(replace(short, discard=max(short.discard, 0)))
+        entrant = clock.entrant(one.rung, job, periods)
+        said = {**settings.as_dict(), "steps_a_period": round(one.period / settings.max_step)}
+        said["discarded_periods"] = one.discard
+        found = heard[k]
+        if isinstance(found, SimulationFailed):
+            failed = Orbit(OrbitStatus.FAILED, reason=found.reason)
+            yield Answer(one.rung, name, said, failed, np.zeros(0), reason=found.reason), entrant
+            continue
+        orbit = _in_model_units(found.orbit, asked.volts)
+        shown = _traced(found, float(asked.volts[0]))
+        yield Answer(one.rung, name, said, orbit, shown, reason=orbit.reason), entrant
+
+
+def _in_model_units(orbit: Orbit, volts: Array) -> Orbit:
+    return replace(orbit, impact_velocities=orbit.impact_velocities / volts[1])
+
+
+def _drawn(flow: Flow, orbit: Orbit, volts: float) -> Array:
+    if orbit.status is not OrbitStatus.PERIODIC:
+        return np.zeros(0)
+    return displacement(flow.system, flow.drive, orbit) / volts
+
+
+def _traced(found: Read, volts: float) -> Array:
+    """(n · POINTS,) first displacement of a run's last n periods."""
+    if not found.orbit.n or found.trace is None:
+        return np.zeros(0)
+    time, states = found.trace
+    count = found.orbit.n * POINTS
+    grid = time[-1] * np.arange(count) / count
+    return np.asarray(np.interp(grid, time, states[:, 0])) / volts

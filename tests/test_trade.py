@@ -1,0 +1,377 @@
+"""What accuracy costs: how rungs are judged, the yield's bound, the verb and its folder."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from designer import cli, hearing, rung_choice
+from designer.circuit_kernel import POINTS
+from designer.errors import InputError
+from designer.folder import Folder
+from designer.manifest import Stage
+from designer.options import Options
+from designer.orbit import Orbit, OrbitStatus
+from designer.progress import Progress
+from designer.rung_choice import choose, chosen
+from designer.trade import (
+    BOARD,
+    EQUATIONS,
+    IMPACT,
+    RESPONSE,
+    SHARE,
+    WAVE,
+    Trade,
+    alike,
+    cheapest,
+    difference,
+    trade,
+)
+from designer.trade_files import front, sheet, trade_json
+from designer.trade_job import NAMES
+from designer.trade_rungs import Answer
+from designer.trade_yield import BoardTrade
+
+WAVEFORM = np.sin(2.0 * np.pi * np.arange(POINTS) / POINTS)
+MODEL = """format = 1
+title = "one response"
+[model]
+m = 0.5
+k = 0.5
+k0 = 0.95
+c = 0.5
+zeta = 0.1
+f20 = 0.0
+b = 0.25
+[[response]]
+omega = 1.55
+expect = "1-1-1"
+"""
+
+
+def orbit(
+    p: int = 1, q: int = 1, up: tuple[float, ...] = (1.0,), down: tuple[float, ...] = (1.0,)
+) -> Orbit:
+    return Orbit(
+        OrbitStatus.PERIODIC,
+        1,
+        p,
+        q,
+        impact_velocities=np.array([*up, *(-v for v in down)]),
+        impact_sides=np.array([1.0] * len(up) + [-1.0] * len(down)),
+    )
+
+
+def said(rung: str, level: str, error: float, seconds: float, kind: Orbit | None = None) -> Answer:
+    """An answer whose displacement is off by ``error`` of the peak, RMS, and its velocities too."""
+    found = orbit(up=(1.0 + error,), down=(1.0,)) if kind is None else kind
+    shown = WAVEFORM + math.sqrt(2.0) * error * np.cos(2.0 * np.pi * 7 * np.arange(POINTS) / POINTS)
+    return Answer(rung, level, {}, found, shown, seconds)
+
+
+def judged(*answers: Answer, boards: tuple[BoardTrade | None, ...] = ()) -> Trade:
+    made: Any = SimpleNamespace(found=[SimpleNamespace(omega=1.55, expected="1-1-1")])
+    return trade(made, [answers], boards)
+
+
+LADDER = (
+    said("rk4", "Δt = 0.01", 0.02, 1e-5),
+    said("model", "exact", 0.02, 1e-6),
+    said("circuit", "exact", 0.004, 2e-6),
+    said("ideal", "× 1", 0.004, 5e-3),
+    said("full", "× 0.5", 0.0005, 1e-2),
+    said("full", "× 1", 0.0001, 2e-2),
+    said("full", "× 2", 0.0, 4e-2),
+)
+
+
+def picked(found: Trade, question: str, of: str = BOARD) -> Any:
+    (one,) = (c for c in found.cheapest if c.question == question and c.of == of)
+    return one
+
+
+def test_the_cheapest_keeps_the_bound_with_the_truths_own_uncertainty() -> None:
+    found = judged(*LADDER)
+    (truth,) = found.truths
+    assert truth.error == pytest.approx(1e-4)
+    assert truth.sure
+    response, impact, wave = (picked(found, q) for q in (RESPONSE, IMPACT, WAVE))
+    assert (response.rung, response.measured, response.shown) == ("model", 0.0, True)
+    assert impact.rung == "circuit"
+    assert impact.measured == pytest.approx(0.004 + 1e-4, rel=1e-3)
+    assert (wave.rung, wave.level) == ("full", "× 0.5")
+    assert wave.measured == pytest.approx(0.0005 + 1e-4, rel=1e-3)
+    own = picked(found, WAVE, EQUATIONS)
+    assert (own.rung, own.measured, own.shown) == ("model", 0.0, True)
+
+
+def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
+    found = judged(
+        said("model", "exact", 0.02, 1e-6),
+        said("circuit", "exact", 0.01, 1e-6),
+        said("full", "× 1", 0.005, 1e-2),
+        said("full", "× 2", 0.0, 2e-2),
+    )
+    wave = picked(found, WAVE)
+    assert not wave.shown
+    assert (wave.rung, wave.level) == ("full", "× 1")  # the truth itself does not compete
+
+
+def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
+    untimed = said("rk4", "Δt = 0.01", 0.0, math.nan)
+    found = judged(untimed, *LADDER[1:])
+    assert picked(found, RESPONSE).rung == "model"
+    text = sheet(document(found))
+    assert "| model, Runge-Kutta | Δt = 0.01 | 0 %, – |" in text
+
+
+def test_a_truth_that_is_not_sure_answers_nothing() -> None:
+    found = judged(
+        said("model", "exact", 0.0, 1e-6),
+        said("full", "× 1", 0.0, 1e-2, orbit(2, 2, (1.0, 1.0), (1.0, 1.0))),
+        said("full", "× 2", 0.0, 2e-2),
+    )
+    assert not found.truths[0].sure
+    assert not picked(found, RESPONSE).shown
+    assert not picked(found, WAVE).shown
+
+
+def test_a_rung_with_another_response_keeps_no_bound() -> None:
+    wrong = said("circuit", "exact", 0.0, 1e-6, orbit(1, 2, (1.0,), (1.0, 1.0)))
+    found = judged(said("model", "exact", 0.02, 1e-5), wrong, *LADDER[4:])
+    assert picked(found, RESPONSE).rung == "model"
+    assert picked(found, WAVE).rung == "full"
+
+
+def test_all_responses_together_ask_one_setting() -> None:
+    """The cheapest alone differs; together the one that is right on both is taken."""
+    good = judged(*LADDER).rows[0]
+    bad = judged(
+        said("rk4", "Δt = 0.01", 0.02, 1e-5),
+        said("model", "exact", 0.02, 1e-6, orbit(2, 2, (1.0, 1.0), (1.0, 1.0))),
+        *LADDER[2:],
+    )
+    both = cheapest(RESPONSE, BOARD, [good, bad.rows[0]], [bad.truths[0]] * 2)
+    assert both is not None
+    assert both.omega is None
+    assert both.rung == "circuit"
+    assert both.seconds == pytest.approx(4e-6)
+
+
+def test_velocities_are_compared_in_order_of_size_and_across_twins() -> None:
+    a = orbit(2, 1, (1.0, 0.5), (0.8,))
+    assert difference(a, orbit(2, 1, (0.5, 1.01), (0.8,))) == pytest.approx(0.01 / 1.01)
+    assert difference(a, orbit(1, 2, (0.8,), (0.5, 1.0))) == pytest.approx(0.0)
+    assert math.isnan(difference(a, orbit(1, 1)))
+    assert alike(a, orbit(1, 2, (0.8,), (0.5, 1.0)))
+    assert not alike(a, orbit())
+    assert alike(Orbit(OrbitStatus.APERIODIC), Orbit(OrbitStatus.APERIODIC))
+    assert not alike(Orbit(OrbitStatus.FAILED), Orbit(OrbitStatus.FAILED))
+
+
+def of_boards(boards: int, gained: int, lost: int) -> BoardTrade:
+    return BoardTrade(
+        1.55,
+        "1-1-1",
+        boards,
+        boards - gained,
+        gained,
+        lost,
+        0,
+        10.0,
+        {"circuit": 1e-4, "ideal": 0.05},
+    )
+
+
+@given(st.integers(1, 2000), st.data())
+def test_the_interval_of_a_difference_holds_it_and_shrinks(n: int, data: st.DataObject) -> None:
+    gained = data.draw(st.integers(0, n))
+    lost = data.draw(st.integers(0, n - gained))
+    one = of_boards(n, gained, lost)
+    d, low, high = one.difference
+    assert d == pytest.approx((lost - gained) / n)
+    assert low - 1e-12 <= d <= high + 1e-12
+    assert one.bound >= abs(d) - 1e-12
+    wide = of_boards(4 * n, 4 * gained, 4 * lost)
+    assert wide.bound <= one.bound + 1e-12
+
+
+def test_boards_without_a_difference_leave_room_for_one() -> None:
+    """0 of n: the Wilson limit is z²/(n + z²) on each side, by hand."""
+    z2 = 1.959963984540054**2
+    for n in (40, 400):
+        assert of_boards(n, 0, 0).bound == pytest.approx(z2 / (n + z2))
+    assert of_boards(40, 0, 0).bound > 0.01
+    assert not of_boards(40, 0, 0).off(0.01)
+    assert of_boards(40, 30, 0).off(0.01)
+
+
+@pytest.mark.slow
+def test_the_interval_covers_the_truth_nineteen_times_in_twenty() -> None:
+    rng = np.random.default_rng(5)
+    for up, down in ((0.02, 0.0), (0.05, 0.03), (0.3, 0.2)):
+        draws = rng.multinomial(150, [up, down, 1.0 - up - down], size=2000)
+        held = 0
+        for lost, gained, _ in draws:
+            _, low, high = of_boards(150, int(gained), int(lost)).difference
+            held += low <= up - down <= high
+        assert held / 2000 > 0.94
+
+
+def test_the_yield_goes_to_the_exact_circuit_unless_it_is_shown_to_be_off() -> None:
+    near = judged(*LADDER, boards=(of_boards(1000, 0, 0),))
+    assert (picked(near, SHARE).rung, picked(near, SHARE).shown) == ("circuit", True)
+    few = judged(*LADDER, boards=(of_boards(40, 0, 0),))
+    assert (picked(few, SHARE).rung, picked(few, SHARE).shown) == ("circuit", False)
+    off = judged(*LADDER, boards=(of_boards(200, 60, 0),))
+    assert (picked(off, SHARE).rung, picked(off, SHARE).shown) == ("ideal", True)
+
+
+def document(found: Trade) -> dict[str, Any]:
+    return trade_json(found, {}, 1.0, "a title")
+
+
+def test_the_json_has_the_keys_of_the_contract_and_the_sheet_says_them() -> None:
+    answer = document(judged(*LADDER, boards=(of_boards(40, 1, 0),)))
+    assert json.loads(json.dumps(answer, allow_nan=False)) == answer
+    for row in answer["rungs"]:
+        assert {"rung", "settings", "omega", "error", "seconds_per_period"} <= set(row)
+    assert [row["error"] for row in answer["rungs"]][-1] == 0.0
+    text = sheet(answer)
+    assert (
+        "| waveform within 0.1 % | board | ngspice, full op-amps | × 0.5 | 0.06 % | yes |" in text
+    )
+    assert "| 1.55 | 40 | 39 | 0 | 1 | 0 | -2.5 % |" in text
+    for key in ("error", "numerical_error"):
+        assert len(front(answer, key).axes) == 1
+
+
+# ---------------------------------------------------------------------------------------------
+# The rung of a study
+
+
+def folder_with(path: Path, answer: dict[str, Any] | None) -> Folder:
+    folder = Folder(path)
+    folder.begin({"trade": ({}, ["trade.json"])}, {})
+    if answer is not None:
+        folder.write("trade.json", json.dumps(answer))
+        folder.finish("trade")
+    return Folder(path)
+
+
+def test_a_study_takes_the_rung_that_was_measured(tmp_path: Path) -> None:
+    assert choose(Folder(tmp_path / "none")) == rung_choice.Choice("auto", "")
+    assert choose(folder_with(tmp_path / "begun", None)).rung == "auto"
+    near = document(judged(*LADDER, boards=(of_boards(1000, 0, 0),)))
+    choice = choose(folder_with(tmp_path / "near", near))
+    assert choice.rung == "auto"
+    assert "40 boards of each response" in choice.reason
+    off = document(judged(*LADDER, boards=(of_boards(200, 60, 0),)))
+    choice = choose(folder_with(tmp_path / "off", off))
+    assert choice.rung == "ngspice"
+    assert "every board in ngspice" in choice.reason
+
+
+def test_a_response_that_ideal_op_amps_do_not_show_is_named(tmp_path: Path) -> None:
+    other = orbit(2, 2, (1.0, 1.0), (1.0, 1.0))
+    answers = [replace(a, orbit=other) if a.rung == "full" else a for a in LADDER]
+    choice = choose(folder_with(tmp_path / "d", document(judged(*answers))))
+    assert "ω = 1.55" in choice.reason
+
+
+@pytest.mark.parametrize("rung", ["exact", "ngspice"])
+def test_what_was_asked_for_stands(tmp_path: Path, rung: Any) -> None:
+    near = document(judged(*LADDER, boards=(of_boards(1000, 0, 0),)))
+    folder = folder_with(tmp_path / "near", near)
+    options = Options(rung=rung)
+    assert chosen(folder, options, Progress()) is options
+    notes: list[str] = []
+
+    class Heard(Progress):
+        def note(self, text: str) -> None:
+            notes.append(text)
+
+    assert chosen(folder, Options(), Heard()).rung == "auto"
+    assert len(notes) == 1
+    assert chosen(Folder(tmp_path / "no"), Options(), Heard()).rung == "auto"
+    assert len(notes) == 1
+
+
+def test_ngspice_is_asked_about_forty_boards_at_least() -> None:
+    assert rung_choice.LEAST >= 40
+    answers: Any = [
+        SimpleNamespace(sample=i, question=0, verdict="ok", radius=0.1) for i in range(200)
+    ]
+    for kind in hearing.Kind:
+        asked = [a for a in hearing.ask_random(answers) if a.kind is kind]
+        assert len(asked) >= rung_choice.LEAST
+
+
+def test_a_trade_that_somebody_changed_is_refused(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path / "d", {"format": 1, "cheapest": [{"question": SHARE}]})
+    with pytest.raises(InputError, match="what trade wrote"):
+        choose(folder)
+
+
+def test_a_stage_of_its_own_that_goes_with_the_design() -> None:
+    from designer.manifest import OF_DESIGN, STAGES
+
+    assert "trade" in STAGES
+    assert "trade" in OF_DESIGN
+    assert Stage({"a": 1}).hash == Stage({"a": 1}).hash
+
+
+# ---------------------------------------------------------------------------------------------
+# The verb
+
+
+@pytest.mark.slow
+def test_trade_measures_a_design_and_keeps_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(MODEL, encoding="utf-8")
+    words = ["trade", str(model), "--out", str(out), "--boards", "2", "--jobs", "2"]
+    assert cli.status([*words, "--json", "-q"]) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert set(NAMES) <= {p.name for p in out.iterdir()}
+    rows = answer["rungs"]
+    assert {row["rung"] for row in rows} == {"rk4", "model", "circuit", "ideal", "dynamic", "full"}
+    assert all(row["seconds_per_period"] > 0.0 for row in rows)
+    by = {rung: [r for r in rows if r["rung"] == rung] for rung in ("rk4", "model", "ideal")}
+    assert by["model"][0]["error_of_equations"] == 0.0
+    steps = [r["error_of_equations"] for r in by["rk4"]]
+    assert steps[-1] < steps[0] / 10.0  # four times eight the steps of a method of order 4
+    assert by["ideal"][-1]["numerical_error"] < 1e-3
+    assert {r["response"] for r in rows} == {"1-1-1"}
+    questions = {(c["question"], c["of"]) for c in answer["cheapest"]}
+    assert questions == {*product((RESPONSE, IMPACT, WAVE), (BOARD, EQUATIONS)), (SHARE, BOARD)}
+    assert cli.status(["trade", str(out), "--boards", "2", "--json", "-q"]) == 0
+    assert json.loads(capfd.readouterr().out) == answer  # reused
+    assert cli.status(["trade", str(out), "--boards", "3", "-q"]) == 2
+    assert "--overwrite" in capfd.readouterr().err
+    assert cli.status(["tolerance", str(out), "--samples", "2", "--jobs", "2"]) == 0
+    assert "rung by trade.json" in capfd.readouterr().err
+
+
+def test_numbers_that_cannot_be_are_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(MODEL, encoding="utf-8")
+    assert cli.status(["trade", str(model), "--boards", "-1"]) == 2
+    assert "--boards" in capfd.readouterr().err
+    model.write_text(MODEL[: MODEL.index("[[")], encoding="utf-8")
+    assert cli.status(["trade", str(model), "--out", str(tmp_path / "out")]) == 2
+    assert "response" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
