@@ -30,8 +30,8 @@ from designer.circuit import Capacitor, Reference, Resistor, Section
 from designer.corners import Corner, worst_corners
 from designer.ensemble import Ensemble
 from designer.exact import drive_of
-from designer.margin_indices import Index, sobol
 from designer.jsonout import plain
+from designer.margin_indices import Index, sobol
 from designer.margins import Margin, Prediction
 from designer.quantities import exact_in, quantities
 from designer.spread import draw_many

@@ -125,12 +125,12 @@ def limits(spec: CircuitSpec, kept: frozenset[str], opamp: OpAmp, saturation: fl
     return Limits(
         kept=kept,
         seconds=seconds,
-        swing=SWING_SHARE * saturation,
+        swing=min(SWING_SHARE, spec.aims.swing) * saturation,
         level=LEVEL_RATIO if "level" in kept else inf,
-        share=SHARE if "level" in kept else inf,
+        share=min(SHARE, spec.aims.share) if "level" in kept else inf,
         load=LOAD if "load" in kept else 0.0,
         signal=SIGNAL if "resistors" in kept else (0.0, inf),
-        noise_gain=NOISE_GAIN if "noise_gain" in kept else inf,
+        noise_gain=min(NOISE_GAIN, spec.aims.noise_gain) if "noise_gain" in kept else inf,
     )
 
 

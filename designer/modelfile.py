@@ -46,6 +46,7 @@ from designer.schema import (
     shown,
     span,
 )
+from designer.searchspec import SearchSpec, SearchTable
 from designer.spreadspec import BENCH_1, SpreadSpec, SpreadTable
 
 __all__ = [
@@ -139,6 +140,7 @@ class ModelFile:
     spread: SpreadSpec = BENCH_1
     measured: Measured | None = None
     tuning: Bands = field(default_factory=Bands)
+    search: SearchSpec = field(default_factory=SearchSpec)
 
     @property
     def sha256(self) -> str:
@@ -216,8 +218,18 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
     title = tables.title or (source.stem if source is not None else "untitled")
     tuning = Bands(**dict(tables.tuning))
+    search = SearchSpec(**dict(tables.search))
     return ModelFile(
-        title, model, mechanical, responses, circuit, text, source, spread, tuning=tuning
+        title,
+        model,
+        mechanical,
+        responses,
+        circuit,
+        text,
+        source,
+        spread,
+        tuning=tuning,
+        search=search,
     )
 
 
@@ -401,4 +413,5 @@ class _File(BaseModel):
     )
     circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
     tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
+    search: SearchTable = Field(SearchTable(), description="a table [search]")
     spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")

@@ -71,11 +71,14 @@ def synthesise(
     catalog: Catalog,
     peaks: Peaks,
     found: Sequence[ModelResponse] = (),
+    *,
+    binding: bool = True,
 ) -> Design:
     """Choose the parts.
 
     found : the wanted responses; the finished circuit is held to the voltages and currents that
-    they need. Without them it is held to ``peaks``.
+    they need. Without them it is held to ``peaks``. binding : whether it is asked what each side
+    condition costs, which changes no part.
 
     Raises
     ------
@@ -90,7 +93,9 @@ def synthesise(
     reached = _reach(wanted, spec.kept, found)
     if isinstance(reached, Shortfall):
         _refuse(wanted, reached, found)
-    design = replace(reached.design, binding=_binding(wanted, reached, found))
+    design = reached.design
+    if binding:
+        design = replace(design, binding=_binding(wanted, reached, found))
     if spec.composites:
         design = _with_composites(wanted, reached, design, found)
     return replace(design, seconds=time.perf_counter() - began)
@@ -115,7 +120,10 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
         raise InputError(None, "circuit.saturation", limit, f"above 0 and up to {spec.supply:g} V")
     if spec.objective != "match":
         raise InputError(
-            None, "circuit.objective", spec.objective, '"match" (all that this version builds)'
+            None,
+            "circuit.objective",
+            spec.objective,
+            '"match": a design for the yield comes from search, run or synthesise with --out',
         )
     check_names(parts_of(model, spec, catalog, zone_of_spec(model, spec, catalog)), spec)
 
