@@ -11,7 +11,6 @@ Nothing of the chain (model, match, circuit, predictions) imports a module of th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -172,7 +171,6 @@ class _Hunt:
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
-        self.least = math.inf
 
     def run(self) -> Searched:
         middle = tuple(
@@ -218,6 +216,8 @@ class _Hunt:
         if best is None:
             assert self.short is not None
             raise self.short
+        if own not in topologies(self.modelfile, self.catalog):  # what the levers are worth
+            start = self._candidate(own, middle, "the match design")
         return start, best
 
     def _placed(self, best: Candidate) -> Candidate:

@@ -7,7 +7,8 @@ boards stretched λ times would be Φ(d/λ), with d the distance of the nominal 
 response in standard deviations of the margin ("scaled-sigma sampling": Sun, Li, Liu, Luo and Gu,
 IEEE Trans. CAD 34, 2015). d is fitted to all λ by largest likelihood; Φ(d) is the yield that it
 predicts. Spreads are bounded and margins curved, so this ranks designs and places; yields that are
-reported are counted on boards as they are.
+reported are counted on boards as they are. A prediction does not wait: a board that has not
+settled after 140 drive periods counts as lost.
 """
 
 from __future__ import annotations

@@ -128,9 +128,8 @@ def search_into(
 ) -> Outcome:
     """The verb ``search`` for a model file: design, study of fresh boards, confirmation."""
     final = searched_into(modelfile, out, options, progress)
-    again = replace(options, overwrite=False, resume=True)
-    study = run_into(final, out, replace(again, rung="exact"), progress, command)
-    confirmed = _confirmed(final, out, study, again, progress)
+    study = run_into(final, out, replace(options, rung="exact"), progress, command)
+    confirmed = _confirmed(final, out, options, progress)
     folder = Folder(out)
     answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
     answer["search"] = {
@@ -143,7 +142,7 @@ def search_into(
 
 
 def _confirmed(
-    modelfile: ModelFile, out: Path, study: Outcome, options: Options, progress: Progress
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress
 ) -> dict[str, Any]:
     """What ngspice says of boards of the study, and what limits each response."""
     folder, catalog = Folder(out), load_catalog()
@@ -157,7 +156,7 @@ def _confirmed(
     wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
         "confirmation": (inputs, [CONFIRMATION])
     }
-    if folder.decide(wanted, overwrite=False, resume=True):
+    if folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
         began = time.perf_counter()
         jobs = cores() if options.jobs is None else options.jobs
         made = design_files.load(folder, modelfile, catalog)

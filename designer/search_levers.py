@@ -63,7 +63,8 @@ class Choice:
 
 
 def topologies(modelfile: ModelFile, catalog: Catalog) -> list[Choice]:
-    """Every op-amp with every dead zone that the search may take, the file's own first.
+    """Every op-amp with every dead zone that the search may take, the file's own first if it is
+    one of them.
 
     Raises
     ------

@@ -9,6 +9,7 @@ whichever mechanism makes them, other attractors among them.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +18,8 @@ from designer.modelfile import Response
 from designer.search_distance import LADDER, Counts, Stand, Stretched
 from designer.search_windows import CLEARANCE_STEP, Place, Stretch
 
-SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Of a stretch: where it is scanned."""
+SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
+"""Of a stretch: where it is scanned. The first of equal places is taken, so the middle is first."""
 SCAN, SOME, MANY = 8, 24, 64
 """Boards of the scan, of the second round and of the pattern."""
 SCANNED, KEPT, STARTS = (2.0,), 10, 2
@@ -69,9 +70,10 @@ def places(
 
     bench : with ``MANY`` boards at least. progress : called every few boards.
     """
-    scanned = [place for stretch in stretches for place in stretch.at(SHARES)]
+    every = [stretch.at(SHARES) for stretch in stretches]
+    scanned = [p for row in itertools.zip_longest(*every) for p in row if p is not None]
     first = score(bench, spec, scanned, SCAN, SCANNED, progress)
-    # The scan's distances are coarse; among equals a wide stretch comes first, by its order.
+    # The scan's distances are coarse: among equals the middle of a wide stretch comes first.
     second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER, progress)
     tried, found = len(scanned) + len(second), []
     for start in best(second, STARTS):

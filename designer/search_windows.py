@@ -59,9 +59,10 @@ class Stretch:
         return self.places[-1].omega
 
     def at(self, shares: Sequence[float]) -> list[Place]:
-        """The places nearest to these shares of the way from the lower end to the upper."""
+        """The places nearest to these shares of the way from the lower end to the upper, in the
+        order of the shares."""
         last = len(self.places) - 1
-        return [self.places[i] for i in sorted({round(s * last) for s in shares})]
+        return [self.places[i] for i in dict.fromkeys(round(s * last) for s in shares)]
 
 
 def open_in(spec: Response) -> bool:

@@ -38,7 +38,7 @@ def _is_table(value: object) -> bool:
 
 
 def _key(key: str) -> str:
-    return key if _BARE.fullmatch(key) else json.dumps(key)
+    return key if _BARE.fullmatch(key) else _text(key)
 
 
 def _value(value: Any) -> str:
@@ -49,10 +49,15 @@ def _value(value: Any) -> str:
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, str):
-        # JSON's escapes are TOML's, but for DEL, which TOML wants escaped too.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return _text(value)
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
     if isinstance(value, Sequence):
         return "[" + ", ".join(_value(v) for v in value) + "]"
     raise TypeError(f"{type(value).__name__} has no form in TOML here")
+
+
+def _text(text: str) -> str:
+    """JSON's escapes are TOML's, but for DEL, which TOML wants escaped too, and for pairs of
+    surrogates, which it has not."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
