@@ -38,20 +38,6 @@ _PART = re.compile(r"[RC][1-9][0-9]{0,3}", re.ASCII)
 
 
 @dataclass(frozen=True)
-class Aims:
-    """What a choice of parts aims at inside its side conditions; a search moves these.
-
-    swing : share of the op-amp's limit that the peaks of the outputs may use. share : how much
-    larger than x1's peak voltage another state's may be. noise_gain : of a stage whose gain is a
-    ratio of resistors.
-    """
-
-    swing: float = 0.85
-    share: float = 1.6
-    noise_gain: float = 30.0
-
-
-@dataclass(frozen=True)
 class CircuitSpec:
     """What the circuit is to be made of and how it is to be chosen; the defaults of a model file.
 
@@ -60,7 +46,7 @@ class CircuitSpec:
     parts of the rectifying dead zone. matched : groups of parts with equal values. preferred :
     values [Ω or F] that do not count among the distinct ones. most_values : limit on distinct
     values. slack : how much the error may exceed its least for fewer distinct values. composites :
-    resistors that may be two parts. side_conditions : those that are kept. aims : not of the file.
+    resistors that may be two parts. side_conditions : those that are kept.
     """
 
     opamp: str = "TL074C"
@@ -83,7 +69,6 @@ class CircuitSpec:
     slack: float = 0.0
     composites: Names = False
     side_conditions: Names = True
-    aims: Aims = Aims()
 
     @property
     def kept(self) -> frozenset[str]:

@@ -258,7 +258,9 @@ class _Hunt:
         model, spec = self.modelfile.model, choice.spec(self.modelfile.circuit)
         try:
             held = responses.peaks(model, found)
-            design = synthesis.synthesise(model, spec, self.catalog, held, found, binding=False)
+            design = synthesis.synthesise(
+                model, spec, self.catalog, held, found, aims=choice.aims, binding=False
+            )
             most, error = self.modelfile.search.match_error, design.errors.max_error
             if error > most:
                 raise Unreachable(
@@ -346,7 +348,9 @@ class _Hunt:
         self.said.stage("the design that was found, what its conditions cost")
         model, spec = self.modelfile.model, best.choice.spec(self.modelfile.circuit)
         held = responses.peaks(model, best.found)
-        design = synthesis.synthesise(model, spec, self.catalog, held, best.found)
+        design = synthesis.synthesise(
+            model, spec, self.catalog, held, best.found, aims=best.choice.aims
+        )
         return Synthesis(self._resolved(best.choice, best.found), self.catalog, best.found, design)
 
     def _note(self, lever: str, setting: str, made: Candidate | None, kept: bool) -> None:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from designer.catalog import Catalog
-from designer.circuitspec import Aims, CircuitSpec, DeadZone
+from designer.circuitspec import CircuitSpec, DeadZone
 from designer.errors import InputError
+from designer.limits import NO_AIMS, Aims
 from designer.modelfile import ModelFile
 
 PLACES = "places"
@@ -18,27 +19,33 @@ SWINGS = (0.85, 0.7, 0.5)
 """Of the op-amps' limits: what the peaks may use, so the threshold in volts follows."""
 SHARES = (1.6, 1.2, 1.0)
 """Peaks of the other states over x1's."""
-NOISE_GAINS = (30.0, 6.0, 3.5)
+NOISE_GAINS = (30.0, 6.0)
 """Of the stages whose gain is a ratio of resistors."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """How a design is made. frequency : band for ω = 1 [Hz]."""
+    """How a design is made. frequency : band for ω = 1 [Hz]. aims : inside its conditions."""
 
     opamp: str
     dead_zone: DeadZone
-    aims: Aims
     frequency: tuple[float, float]
+    aims: Aims = NO_AIMS
 
     @classmethod
     def of(cls, spec: CircuitSpec) -> Choice:
         """What the model file says."""
-        return cls(spec.opamp, spec.dead_zone, spec.aims, spec.frequency)
+        return cls(spec.opamp, spec.dead_zone, spec.frequency)
 
     def spec(self, base: CircuitSpec) -> CircuitSpec:
         """The table ``[circuit]`` of a design made so; the match decides over its parts."""
-        return replace(base, objective="match", **self.__dict__)
+        return replace(
+            base,
+            objective="match",
+            opamp=self.opamp,
+            dead_zone=self.dead_zone,
+            frequency=self.frequency,
+        )
 
     def get(self, lever: str) -> object:
         """What it says of one of the ``LEVERS``."""

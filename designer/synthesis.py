@@ -25,7 +25,7 @@ from designer.coefficients import EXACT
 from designer.design import Certificate, Check, Design, Peaks
 from designer.errors import InputError, Unreachable
 from designer.freeing import FREES
-from designer.limits import LOAD, SIGNAL, SWING_SHARE, Limits, limits
+from designer.limits import LOAD, NO_AIMS, SIGNAL, SWING_SHARE, Aims, Limits, limits
 from designer.linear_search import LinearBlock
 from designer.model import Dimensionless
 from designer.partnames import check_names, check_preferred, parts_of, wishes_of
@@ -72,13 +72,14 @@ def synthesise(
     peaks: Peaks,
     found: Sequence[ModelResponse] = (),
     *,
+    aims: Aims = NO_AIMS,
     binding: bool = True,
 ) -> Design:
     """Choose the parts.
 
     found : the wanted responses; the finished circuit is held to the voltages and currents that
-    they need. Without them it is held to ``peaks``. binding : whether it is asked what each side
-    condition costs, which changes no part.
+    they need. Without them it is held to ``peaks``. aims : inside the side conditions. binding :
+    whether it is asked what each side condition costs, which changes no part.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def synthesise(
     began = time.perf_counter()
     check_choices(model, spec, catalog)
     largest = max((model.b / r.b for r in found), default=1.0)
-    wanted = order(model, spec, catalog, peaks, max(largest, 1.0))
+    wanted = replace(order(model, spec, catalog, peaks, max(largest, 1.0)), aims=aims)
     check_preferred(spec, wanted.resistors, wanted.capacitors)
     reached = _reach(wanted, spec.kept, found)
     if isinstance(reached, Shortfall):
@@ -146,7 +147,9 @@ def _rounds(
     order: Order, kept: frozenset[str], found: Sequence[ModelResponse], *, slower: bool
 ) -> Reached | Missed:
     """Search, verify, tighten what is not kept, and again."""
-    within = limits(order.spec, kept, order.opamp, order.saturation, order.peaks.fastest)
+    within = limits(
+        order.spec, kept, order.opamp, order.saturation, order.peaks.fastest, order.aims
+    )
     broken: list[Check] = []
     # Under the conditions as they are stated: later rounds search less than they allow.
     widest = linear_block(order, within, wishes_of(order.spec))
@@ -297,7 +300,7 @@ def _acts(order: Order, reached: Reached, name: str) -> bool:
     """Whether the search could notice that this condition is left out."""
     kept = order.spec.kept
     first, without = (
-        limits(order.spec, names, order.opamp, order.saturation, order.peaks.fastest)
+        limits(order.spec, names, order.opamp, order.saturation, order.peaks.fastest, order.aims)
         for names in (kept, kept - {name})
     )
     if reached.limits != first:  # some limit had to be tightened

@@ -54,8 +54,13 @@ def test_a_resolved_file_says_what_was_open() -> None:
 def test_a_search_from_end_to_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model, whole, cut = tmp_path / "model.toml", tmp_path / "whole", tmp_path / "cut"
+    model, whole, cut = (
+        tmp_path / "model.toml",
+        tmp_path / "whole" / "found",
+        tmp_path / "cut" / "found",
+    )
     model.write_text(asked(OPEN, band=(0.75, 0.95)), encoding="utf-8")
+    # The folders have one name: the report states the command.
     options = ("--samples", 60, "--jobs", 2, "-q")
     assert run("search", model, "--out", whole, *options, "--json") == 0
     answer = json.loads(capsys.readouterr().out)

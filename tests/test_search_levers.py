@@ -96,7 +96,8 @@ def test_the_search_finds_the_best_of_every_combination(monkeypatch: pytest.Monk
 def _enumerated(modelfile: ModelFile, choice: Choice) -> Candidate:
     model, spec = modelfile.model, choice.spec(modelfile.circuit)
     found = responses.find(model, modelfile.responses)
-    design = synthesis.synthesise(model, spec, catalog(), responses.peaks(model, found), found)
+    held = responses.peaks(model, found)
+    design = synthesis.synthesise(model, spec, catalog(), held, found, aims=choice.aims)
     spread = Spread.of(modelfile, design.circuit, catalog())
     bench = Stretched(design, spread, 1, BOARDS)
     places = [Place(r.omega, r.b, r.orbit.start) for r in found]

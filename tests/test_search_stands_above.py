@@ -14,7 +14,6 @@ ABOVE = (
     "commands",
     "cure",
     "limiting",
-    "robust_report",
     "search",
     "show_search",
     "upgrade",
