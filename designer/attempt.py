@@ -18,7 +18,7 @@ from designer.coefficients import CoefficientErrors, CutShort, coefficient_error
 from designer.dead_zone import DeadZone
 from designer.design import Peaks
 from designer.diode_model import diode_model
-from designer.limits import GENERATOR_PEAK, Limits
+from designer.limits import GENERATOR_PEAK, NO_AIMS, Aims, Limits
 from designer.linear_block import Targets
 from designer.linear_search import LinearBlock
 from designer.matching import Term
@@ -43,7 +43,8 @@ class Order:
 
     resistors, capacitors : values that can be bought [ohm], [F], ascending; prices : price class of
     each capacitor; resistor_prices : by value. terms : of the model; parts : its circuit with every
-    value 1. largest : of the generator's amplitudes, over that at the model's clearance.
+    value 1. largest : of the generator's amplitudes, over that at the model's clearance. aims :
+    inside the side conditions.
     """
 
     model: Dimensionless
@@ -59,6 +60,7 @@ class Order:
     terms: tuple[Term, ...]
     parts: Circuit
     largest: float
+    aims: Aims = NO_AIMS
 
     @property
     def base(self) -> float:

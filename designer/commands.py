@@ -34,7 +34,7 @@ STUDY_KEYS = (
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
 VERBS = tuple(
-    "run synthesise synthesize simulate bifurcation tolerance trade export rules reproduce "
+    "run synthesise synthesize simulate bifurcation tolerance search trade export rules reproduce "
     "catalog new".split()
 )
 
@@ -126,12 +126,13 @@ def run(
 ) -> int:
     """Everything: parts, circuit, check in ngspice, yield, report."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
-        from designer import job, study_job
+        from designer import job, search_job, study_job
         from designer.options import Options
 
         options = Options(seed, jobs, samples, overwrite, resume)
         options.check()
         modelfile, folder = job.source(model, out)
+        modelfile = search_job.chosen(modelfile, folder, options, progress)
         command = partial(Options.command, verb="run", model=model, out=out)
         outcome = study_job.run_into(modelfile, folder, options, progress, command)
     return _answer(outcome, json, quiet, "run")
@@ -155,7 +156,7 @@ def synthesise(
 ) -> int:
     """Choose the parts and write the design folder."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
-        from designer import job
+        from designer import job, search_job
         from designer.modelfile import read_model_file
 
         options = job.Options(seed, jobs, overwrite=overwrite, resume=resume)
@@ -164,6 +165,7 @@ def synthesise(
             outcome = job.compare_in_memory(read_model_file(model), options, progress)
         else:
             modelfile, folder = job.source(model, out)
+            modelfile = search_job.chosen(modelfile, folder, options, progress)
             outcome = job.synthesise_into(modelfile, folder, options, progress, compare=compare)
     return _answer(outcome, json, quiet, "synthesise")
 
@@ -372,6 +374,7 @@ from designer import (  # noqa: E402
     commands_export,  # noqa: F401
     commands_reproduce,  # noqa: F401
     commands_rules,  # noqa: F401
+    commands_search,  # noqa: F401
     commands_tolerance,  # noqa: F401
     commands_trade,  # noqa: F401
 )

@@ -82,7 +82,7 @@ def tolerance(
 ) -> int:
     """How many boards will work; writes into the design folder (a model file needs --out)."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
-        from designer import job, study_job
+        from designer import job, search_job, study_job
         from designer.options import Options
 
         options = Options(
@@ -100,6 +100,7 @@ def tolerance(
         )
         options.check()
         modelfile, folder = job.source(model, out)
+        modelfile = search_job.chosen(modelfile, folder, options, progress)
         command = partial(Options.command, verb="tolerance", model=model, out=out)
         outcome = study_job.run_into(modelfile, folder, options, progress, command)
     return _answer(outcome, json, quiet, "tolerance")

@@ -169,7 +169,7 @@ def column(
             reduction, *loads.runs([r.omega for r in found], drives, [s.orbit for s in shown])
         ),
         shown=shown,
-        bill=_bill(circuit, spec, catalog),
+        bill=bill_of(circuit, spec, catalog),
     )
 
 
@@ -293,7 +293,7 @@ def _shift(moved: dict[int, float], nominal: dict[int, float]) -> float:
     return sum(side * (nominal[side] - moved[side]) for side in nominal) / len(nominal)
 
 
-def _bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
+def bill_of(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
     passives: tuple[tuple[Kind, float, Sequence[Resistor | Capacitor]], ...] = (
         ("resistor", spec.resistor_grade, circuit.resistors),
         ("capacitor", spec.capacitor_grade, circuit.capacitors),

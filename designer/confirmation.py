@@ -20,6 +20,7 @@ from designer.flow import Flow, FlowStatus
 from designer.gate import Subject
 from designer.hearing import UNDECIDED, Ask, Hearing, Kind
 from designer.ngspice import SimulationFailed
+from designer.opamp_model import Rung
 from designer.orbit import Orbit, OrbitStatus
 from designer.system import Array
 from designer.verdict import StudyPlan
@@ -68,11 +69,14 @@ def hear(
     pool: SpicePool,
     jobs: int,
     progress: Callable[[], None] = lambda: None,
+    *,
+    rung: Rung = "ideal",
 ) -> list[Hearing]:
     """ngspice's answers, in the order of ``asks``; ``progress`` is called once for each.
 
     The exact rung is asked again for the boards in question: where to start and how long to run
-    is its to say.
+    is its to say. rung : the op-amps' model. Above ``ideal`` a board's own orbit is only near
+    ngspice's, so that as many periods are discarded as shrink a deviation to a hundredth.
     """
     subjects = _subjects(plan, asks, jobs)
     queries: dict[int, Query] = {}
@@ -90,6 +94,9 @@ def hear(
                 continue
             subject = replace(subject, start=question.start.start, discard=int(way))
             refinements = NOMINAL_REFINEMENTS
+        elif rung != "ideal":
+            subject = replace(subject, discard=_way_to_rung(subject.orbit))
+        subject = replace(subject, rung=rung)
         expected = subject.orbit.response
         queries[k] = Query(subject, question.settings, expected, refinements)
     answers = confirm(pool, list(queries.values()), progress)
@@ -130,6 +137,14 @@ def _runs(samples: Sequence[int]) -> list[range]:
         else:
             runs.append(range(i, i + 1))
     return runs
+
+
+def _way_to_rung(orbit: Orbit) -> int:
+    """Drive periods from the exact circuit's orbit to that of another rung: n·5/(1 - ρ)."""
+    if orbit.n == 0:
+        return UNKNOWN_PERIODS
+    way = orbit.n * 5.0 / (1.0 - orbit.radius) if orbit.radius < 1.0 else math.inf
+    return math.ceil(min(max(way, gate.DISCARD), gate.MOST_DISCARDED))
 
 
 def _too_long(ask: Ask, way: float) -> Hearing:

@@ -42,6 +42,24 @@ MARGIN = 1e-3
 
 
 @dataclass(frozen=True)
+class Aims:
+    """What a choice of parts aims at inside its side conditions; a search moves these.
+
+    swing : share of the op-amp's limit that the peaks of the outputs may use. share : how much
+    larger than x1's peak voltage another state's may be. noise_gain : of a stage whose gain is a
+    ratio of resistors. Wider than the side conditions they have no effect.
+    """
+
+    swing: float = SWING_SHARE
+    share: float = SHARE
+    noise_gain: float = NOISE_GAIN
+
+
+NO_AIMS = Aims()
+"""The side conditions themselves."""
+
+
+@dataclass(frozen=True)
 class Limits:
     """kept : names of the conditions that hold; the limits of the others are infinite or zero.
 
@@ -110,8 +128,14 @@ class Limits:
         return replace(self, load=max(floor, self.load), signal=(low, self.signal[1]))
 
 
-def limits(spec: CircuitSpec, kept: frozenset[str], opamp: OpAmp, saturation: float,
-           fastest: float) -> Limits:  # fmt: skip
+def limits(
+    spec: CircuitSpec,
+    kept: frozenset[str],
+    opamp: OpAmp,
+    saturation: float,
+    fastest: float,
+    aims: Aims = NO_AIMS,
+) -> Limits:
     """The limits of these conditions for an op-amp with this output limit [V].
 
     fastest : angular frequency, in model units, of the highest harmonic that matters.
@@ -125,12 +149,12 @@ def limits(spec: CircuitSpec, kept: frozenset[str], opamp: OpAmp, saturation: fl
     return Limits(
         kept=kept,
         seconds=seconds,
-        swing=SWING_SHARE * saturation,
+        swing=min(SWING_SHARE, aims.swing) * saturation,
         level=LEVEL_RATIO if "level" in kept else inf,
-        share=SHARE if "level" in kept else inf,
+        share=min(SHARE, aims.share) if "level" in kept else inf,
         load=LOAD if "load" in kept else 0.0,
         signal=SIGNAL if "resistors" in kept else (0.0, inf),
-        noise_gain=NOISE_GAIN if "noise_gain" in kept else inf,
+        noise_gain=min(NOISE_GAIN, aims.noise_gain) if "noise_gain" in kept else inf,
     )
 
 

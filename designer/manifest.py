@@ -14,10 +14,27 @@ from designer.provenance import sha256
 FORMAT = 1
 MANIFEST = "manifest.json"
 StageName = Literal[
-    "design", "kicad", "study", "comparison", "trade", "sweep", "map", "basins", "rules"
+    "search",
+    "design",
+    "kicad",
+    "study",
+    "comparison",
+    "trade",
+    "confirmation",
+    "sweep",
+    "map",
+    "basins",
+    "rules",
 ]
 STAGES: tuple[StageName, ...] = get_args(StageName)
-OF_DESIGN: tuple[StageName, ...] = ("kicad", "study", "comparison", "trade", "rules")
+OF_DESIGN: tuple[StageName, ...] = (
+    "kicad",
+    "study",
+    "comparison",
+    "trade",
+    "confirmation",
+    "rules",
+)
 """Stages that depend on the design, and on it alone."""
 State = Literal["new", "same", "more", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000

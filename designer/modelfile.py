@@ -50,6 +50,7 @@ from designer.schema import (
     shown,
     span,
 )
+from designer.searchspec import SearchSpec, SearchTable
 from designer.spreadspec import BENCH_1, SpreadSpec, SpreadTable
 
 __all__ = [
@@ -145,6 +146,7 @@ class ModelFile:
     tuning: Bands = field(default_factory=Bands)
     board: BoardSpec = field(default_factory=BoardSpec)
     rules: Mapping[str, Override] = field(default_factory=dict)
+    search: SearchSpec = field(default_factory=SearchSpec)
 
     @property
     def sha256(self) -> str:
@@ -222,9 +224,18 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
     title = tables.title or (source.stem if source is not None else "untitled")
     tuning = Bands(**dict(tables.tuning))
-    board = BoardSpec(**dict(tables.board))
     made = ModelFile(
-        title, model, mechanical, responses, circuit, text, source, spread, None, tuning, board
+        title,
+        model,
+        mechanical,
+        responses,
+        circuit,
+        text,
+        source,
+        spread,
+        tuning=tuning,
+        board=BoardSpec(**dict(tables.board)),
+        search=SearchSpec(**dict(tables.search)),
     )
     return replace(made, rules=overrides(tables.rules, file))
 
@@ -411,4 +422,5 @@ class _File(BaseModel):
     tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
     board: BoardTable = Field(BoardTable(), description="a table [board]")
     rules: dict[str, object] = Field({}, description="tables [rules.<id>]")
+    search: SearchTable = Field(SearchTable(), description="a table [search]")
     spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")

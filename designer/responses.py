@@ -65,14 +65,17 @@ def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelRespons
     for number, spec in enumerate(wanted, start=1):
         if spec.omega is None:
             raise InputError(
-                None, f"response[{number}].omega", "best", "a number: this version does not choose"
+                None,
+                f"response[{number}].omega",
+                "best",
+                'a number, or circuit.objective = "yield": only a search chooses',
             )
         if isinstance(spec.b, tuple):
             raise InputError(
                 None,
                 f"response[{number}].b",
                 list(spec.b),
-                "a number: this version does not choose",
+                'a number, or circuit.objective = "yield": only a search chooses',
             )
         check_omega(f"response[{number}].omega", spec.omega)
         b = model.b if spec.b is None else spec.b

@@ -25,7 +25,7 @@ from designer.coefficients import EXACT
 from designer.design import Certificate, Check, Design, Peaks
 from designer.errors import InputError, Unreachable
 from designer.freeing import FREES
-from designer.limits import LOAD, SIGNAL, SWING_SHARE, Limits, limits
+from designer.limits import LOAD, NO_AIMS, SIGNAL, SWING_SHARE, Aims, Limits, limits
 from designer.linear_search import LinearBlock
 from designer.model import Dimensionless
 from designer.partnames import check_names, check_preferred, parts_of, wishes_of
@@ -71,11 +71,15 @@ def synthesise(
     catalog: Catalog,
     peaks: Peaks,
     found: Sequence[ModelResponse] = (),
+    *,
+    aims: Aims = NO_AIMS,
+    binding: bool = True,
 ) -> Design:
     """Choose the parts.
 
     found : the wanted responses; the finished circuit is held to the voltages and currents that
-    they need. Without them it is held to ``peaks``.
+    they need. Without them it is held to ``peaks``. aims : inside the side conditions. binding :
+    whether it is asked what each side condition costs, which changes no part.
 
     Raises
     ------
@@ -85,12 +89,14 @@ def synthesise(
     began = time.perf_counter()
     check_choices(model, spec, catalog)
     largest = max((model.b / r.b for r in found), default=1.0)
-    wanted = order(model, spec, catalog, peaks, max(largest, 1.0))
+    wanted = replace(order(model, spec, catalog, peaks, max(largest, 1.0)), aims=aims)
     check_preferred(spec, wanted.resistors, wanted.capacitors)
     reached = _reach(wanted, spec.kept, found)
     if isinstance(reached, Shortfall):
         _refuse(wanted, reached, found)
-    design = replace(reached.design, binding=_binding(wanted, reached, found))
+    design = reached.design
+    if binding:
+        design = replace(design, binding=_binding(wanted, reached, found))
     if spec.composites:
         design = _with_composites(wanted, reached, design, found)
     return replace(design, seconds=time.perf_counter() - began)
@@ -115,7 +121,10 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
         raise InputError(None, "circuit.saturation", limit, f"above 0 and up to {spec.supply:g} V")
     if spec.objective != "match":
         raise InputError(
-            None, "circuit.objective", spec.objective, '"match" (all that this version builds)'
+            None,
+            "circuit.objective",
+            spec.objective,
+            '"match": a design for the yield comes from search, run or synthesise with --out',
         )
     check_names(parts_of(model, spec, catalog, zone_of_spec(model, spec, catalog)), spec)
 
@@ -138,7 +147,9 @@ def _rounds(
     order: Order, kept: frozenset[str], found: Sequence[ModelResponse], *, slower: bool
 ) -> Reached | Missed:
     """Search, verify, tighten what is not kept, and again."""
-    within = limits(order.spec, kept, order.opamp, order.saturation, order.peaks.fastest)
+    within = limits(
+        order.spec, kept, order.opamp, order.saturation, order.peaks.fastest, order.aims
+    )
     broken: list[Check] = []
     # Under the conditions as they are stated: later rounds search less than they allow.
     widest = linear_block(order, within, wishes_of(order.spec))
@@ -289,7 +300,7 @@ def _acts(order: Order, reached: Reached, name: str) -> bool:
     """Whether the search could notice that this condition is left out."""
     kept = order.spec.kept
     first, without = (
-        limits(order.spec, names, order.opamp, order.saturation, order.peaks.fastest)
+        limits(order.spec, names, order.opamp, order.saturation, order.peaks.fastest, order.aims)
         for names in (kept, kept - {name})
     )
     if reached.limits != first:  # some limit had to be tightened

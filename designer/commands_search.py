@@ -1,0 +1,113 @@
+"""The verb ``search``: a design that real parts cannot spoil, or the cheapest cure of one."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from designer.commands import (
+    Jobs,
+    Json,
+    Log,
+    Out,
+    Overwrite,
+    Quiet,
+    Resume,
+    Seed,
+    Source,
+    Verbose,
+    _compiling,
+    _print_json,
+    _session,
+    app,
+)
+from designer.errors import InputError
+from designer.progress import Progress
+
+if TYPE_CHECKING:
+    from designer.cure import CureResult  # type: ignore[import-not-found]
+    from designer.options import Options
+
+SAMPLES = 4000
+"""Boards of the final study; as ``search_job.SAMPLES``."""
+
+
+@app.command()
+def search(
+    model: Source,
+    out: Out = None,
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", metavar="N", help=f"Fresh boards at the end [{SAMPLES}]."),
+    ] = None,
+    wanted: Annotated[
+        float | None,
+        typer.Option("--yield", metavar="Y", help="Cure this design folder: the yield wanted."),
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option("--budget", metavar="PRICE", help="Of a cure, at most.")
+    ] = None,
+    seed: Seed = 1,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """The design of the highest yield for a model file; with --yield the cure of a folder."""
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
+        from designer.options import Options
+
+        count = SAMPLES if samples is None else samples
+        options = Options(seed, jobs, count, overwrite, resume)
+        options.check()
+        if model.is_dir():
+            if samples is not None:
+                raise InputError(None, "--samples", samples, "no such option with a design folder")
+            result = _cured(model, out, wanted, budget, options, progress)
+            if json:
+                _print_json(result.answer)
+            elif not quiet:
+                from designer import cure_table
+
+                print(cure_table.text(result.answer), file=sys.stderr)
+            return 0 if result.reached else 1
+        for name, value in (("--yield", wanted), ("--budget", budget)):
+            if value is not None:
+                expected = "a design folder to cure; a model file gets its highest yield"
+                raise InputError(None, name, value, expected)
+        from designer import job, search_job
+
+        modelfile, folder = job.source(model, out)
+        command = partial(Options.command, verb="search", model=model, out=out)
+        outcome = search_job.search_into(modelfile, folder, options, progress, command)
+    if json:
+        _print_json(outcome.answer)
+    elif not quiet:
+        from designer import show, show_search
+
+        show.run(outcome.answer)
+        show_search.searched(outcome.answer)
+        show.files(folder, outcome.reused)
+    return 0 if outcome.satisfied else 1
+
+
+def _cured(
+    folder: Path,
+    out: Path | None,
+    wanted: float | None,
+    budget: float | None,
+    options: Options,
+    progress: Progress,
+) -> CureResult:
+    from designer.cure import cure
+
+    if wanted is None:
+        raise InputError(None, "--yield", "nothing", "the yield that the cure shall reach")
+    return cure(folder, target=wanted, budget=budget, out=out, options=options, progress=progress)

@@ -1,0 +1,371 @@
+"""The design that real parts cannot spoil: parts and places with the highest predicted yield.
+
+Over all wanted responses, in this order: the smallest of their distances from being lost
+(``designer.search_distance``), hence the smallest predicted yield; where two designs agree in it,
+the product of the predicted yields. One lever after the other is moved, from the match design on:
+op-amp and dead zone first, then the places of the responses, then what the synthesis aims at. A
+lever stays where it is unless something is gained.
+
+Nothing of the chain (model, match, circuit, predictions) imports a module of the search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from scipy.stats import norm
+
+from designer import responses, synthesis
+from designer.api import Synthesis
+from designer.attempt import zone_of_spec
+from designer.catalog import Catalog
+from designer.design import Design
+from designer.errors import InputError, Unreachable
+from designer.modelfile import ModelFile, Response
+from designer.partnames import parts_of
+from designer.preconditions import naming, need_responses
+from designer.progress import Progress
+from designer.responses import ModelResponse
+from designer.search_distance import Stretched
+from designer.search_levers import LEVERS, PLACES, Choice, topologies, variants
+from designer.search_memory import Memory
+from designer.search_places import MANY, Scored, places, room_of, score
+from designer.search_windows import Place, Stretch, open_in, stretches
+from designer.spread import Spread
+from designer.spreadrules import check_names
+
+BOARDS = 128
+"""Boards by which designs are compared, at each stretch of the spread."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design with its responses at their places, and what boards of it showed.
+
+    scored : by response. tried : places that were asked on its boards.
+    """
+
+    choice: Choice
+    design: Design
+    found: tuple[ModelResponse, ...]
+    scored: tuple[Scored, ...]
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        return tuple(s.distance for s in self.scored)
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """The smallest distance; the logarithm of the product of the predicted yields."""
+        return min(self.distances), sum(float(norm.logcdf(d)) for d in self.distances)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A lever that was tried. setting : where it was put. rank : of the design then; None where
+    there is none, for the reason given. kept : whether it stayed there."""
+
+    lever: str
+    setting: str
+    rank: tuple[float, float] | None
+    kept: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What a lever is worth. alone : rank of the match design with this lever moved; without : of
+    the final design with it moved back; None where there is no such design."""
+
+    lever: str
+    start: str
+    final: str
+    alone: tuple[float, float] | None
+    without: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a search found.
+
+    made : the design with its resolved model file. start : the match design with every response
+    in the middle of its widest stretch. final : what was found, as it was predicted.
+    candidates : designs; places : that were asked. asked : answers of boards to questions.
+    """
+
+    made: Synthesis
+    start: Candidate | None
+    final: Candidate
+    steps: tuple[Step, ...]
+    contributions: tuple[Contribution, ...]
+    windows: tuple[tuple[Stretch, ...], ...]
+    candidates: int
+    places: int
+    seed: int
+
+
+def search(
+    modelfile: ModelFile,
+    catalog: Catalog,
+    *,
+    seed: int = 1,
+    jobs: int = 1,
+    memory: Memory | None = None,
+    windows: Sequence[tuple[Stretch, ...]] | None = None,
+    progress: Progress | None = None,
+) -> Searched:
+    """Seek the design and the places of the highest predicted yield.
+
+    seed : of the boards of the search, which no study draws. memory : of an earlier, interrupted
+    search of the same. windows : of ``look``, if they are known.
+
+    Raises
+    ------
+    InputError : something is open that no search can find (``search_windows.check``), or the model
+        does not show a response.
+    Unreachable : no design keeps its conditions and the match error.
+    """
+    said = Progress() if progress is None else progress
+    with naming(modelfile):
+        seen = look(modelfile, catalog, jobs, said) if windows is None else tuple(windows)
+        hunt = _Hunt(
+            modelfile, catalog, seen, seed, jobs, Memory() if memory is None else memory, said
+        )
+        return hunt.run()
+
+
+def look(
+    modelfile: ModelFile, catalog: Catalog, jobs: int, progress: Progress
+) -> tuple[tuple[Stretch, ...], ...]:
+    """Everything that may be refused, refused; and where the model shows each response."""
+    need_responses(modelfile)
+    with naming(modelfile):
+        for choice in topologies(modelfile, catalog):
+            spec = choice.spec(modelfile.circuit)
+            synthesis.check_choices(modelfile.model, spec, catalog)
+            zone = zone_of_spec(modelfile.model, spec, catalog)
+            if choice == Choice.of(modelfile.circuit):
+                check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone))
+        step = progress.stage("windows of the responses on the model")
+        return stretches(
+            modelfile.model, modelfile.responses, modelfile.search, jobs=jobs, progress=step
+        )
+
+
+class _Hunt:
+    """One search. ``steps`` and the counters grow while it runs."""
+
+    def __init__(
+        self,
+        modelfile: ModelFile,
+        catalog: Catalog,
+        seen: tuple[tuple[Stretch, ...], ...],
+        seed: int,
+        jobs: int,
+        memory: Memory,
+        said: Progress,
+    ) -> None:
+        self.modelfile, self.catalog, self.seen = modelfile, catalog, seen
+        self.seed, self.jobs, self.memory, self.said = seed, jobs, memory, said
+        self.steps: list[Step] = []
+        self.candidates = self.places = 0
+        self.short: Unreachable | None = None
+
+    def run(self) -> Searched:
+        middle = tuple(
+            self._there(spec, [s.at((0.5,))[0] for s in found])
+            for spec, found in zip(self.modelfile.responses, self.seen, strict=True)
+        )
+        start, best = self._topology(middle)
+        if any(open_in(spec) for spec in self.modelfile.responses):
+            best = self._placed(best)
+        for lever in LEVERS[2:]:
+            for choice in variants(best.choice, lever):
+                best = self._try(lever, choice, best)
+        contributions = self._contributions(start, best)
+        return Searched(
+            self._made(best),
+            start,
+            best,
+            tuple(self.steps),
+            contributions,
+            self.seen,
+            self.candidates,
+            self.places,
+            self.seed,
+        )
+
+    def _topology(self, middle: tuple[ModelResponse, ...]) -> tuple[Candidate | None, Candidate]:
+        """The match design, if there is one, and the best of all op-amps and dead zones."""
+        own = Choice.of(self.modelfile.circuit)
+        start: Candidate | None = None
+        best: Candidate | None = None
+        for choice in topologies(self.modelfile, self.catalog):
+            setting = f"{choice.opamp}, {choice.dead_zone}"
+            made = self._candidate(choice, middle, setting)
+            if made is None:
+                self._note("opamp and dead zone", setting, None, False)
+                continue
+            better = best is None or made.rank > best.rank
+            self._note("opamp and dead zone", setting, made, better)
+            if choice == own:
+                start = made
+            if better:
+                best = made
+        if best is None:
+            assert self.short is not None
+            raise self.short
+        if own not in topologies(self.modelfile, self.catalog):  # what the levers are worth
+            start = self._candidate(own, middle, "the match design")
+        return start, best
+
+    def _placed(self, best: Candidate) -> Candidate:
+        """The same choice with every open response at its best place."""
+        spread = Spread.of(self.modelfile, best.design.circuit, self.catalog)
+        bench = Stretched(best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory)
+        chosen = []
+        for number, spec in enumerate(self.modelfile.responses):
+            if not open_in(spec):
+                chosen.append(best.found[number])
+                continue
+            step = self.said.stage(f"place of response {number + 1}, {spec.expect}")
+            room = room_of(spec, self.modelfile.model.b, self.modelfile.search.omega)
+            ranked, tried = places(bench, spec, self.seen[number], room, progress=step)
+            self.places += tried
+            if not ranked:
+                raise self._nowhere(number, spec)
+            chosen.append(self._there(spec, [s.place for s in ranked]))
+        setting = "; ".join(f"{r.expected}: ω = {r.omega:.5g}, b = {r.b:.4g}" for r in chosen)
+        made = self._candidate(best.choice, tuple(chosen), PLACES)
+        better = made is not None and made.rank > best.rank
+        self._note(PLACES, setting, made, better)
+        return made if made is not None and better else best
+
+    def _try(self, lever: str, choice: Choice, best: Candidate) -> Candidate:
+        setting = _shown(choice.get(lever))
+        made = self._candidate(choice, best.found, f"{lever} {setting}")
+        better = made is not None and made.rank > best.rank
+        self._note(lever, setting, made, better)
+        return made if made is not None and better else best
+
+    def _candidate(
+        self, choice: Choice, found: tuple[ModelResponse, ...], what: str
+    ) -> Candidate | None:
+        """A design made so; None where there is none, and then ``short`` says why."""
+        step = self.said.stage(f"candidate {self.candidates + 1}: {what}")
+        self.candidates += 1
+        model, spec = self.modelfile.model, choice.spec(self.modelfile.circuit)
+        try:
+            held = responses.peaks(model, found)
+            design = synthesis.synthesise(
+                model, spec, self.catalog, held, found, aims=choice.aims, binding=False
+            )
+            most, error = self.modelfile.search.match_error, design.errors.max_error
+            if error > most:
+                raise Unreachable(
+                    None,
+                    "search.match_error",
+                    most,
+                    f"a limit that a design keeps: the least error is {error:.3g}; a wider "
+                    "choice (circuit.resistors, circuit.capacitors, circuit.composites) has less",
+                )
+            spread = Spread.of(self._resolved(choice, found), design.circuit, self.catalog)
+        except Unreachable as error:
+            self.short = error
+            return None
+        bench = Stretched(design, spread, self.seed, BOARDS, jobs=self.jobs, memory=self.memory)
+        scored = tuple(
+            score(bench, r.spec, [Place(r.omega, r.b, r.orbit.start)], BOARDS, progress=step)[0]
+            for r in found
+        )
+        self.places += len(scored)
+        return Candidate(choice, design, found, scored)
+
+    def _contributions(self, start: Candidate | None, final: Candidate) -> tuple[Contribution, ...]:
+        """One lever at a time: moved from the match design, and moved back from the final one."""
+        if start is None:
+            return ()
+        out = []
+        if final.found != start.found:
+            out.append(
+                Contribution(
+                    PLACES,
+                    "middle of the widest window",
+                    "chosen",
+                    self._rank(start.choice, final.found),
+                    self._rank(final.choice, start.found),
+                )
+            )
+        for lever in LEVERS:
+            before, after = start.choice.get(lever), final.choice.get(lever)
+            if before != after:
+                out.append(
+                    Contribution(
+                        lever,
+                        _shown(before),
+                        _shown(after),
+                        self._rank(start.choice.with_lever(lever, after), start.found),
+                        self._rank(final.choice.with_lever(lever, before), final.found),
+                    )
+                )
+        return tuple(out)
+
+    def _rank(self, choice: Choice, found: tuple[ModelResponse, ...]) -> tuple[float, float] | None:
+        made = self._candidate(choice, found, "what a lever is worth")
+        return None if made is None else made.rank
+
+    def _there(self, spec: Response, ranked: Sequence[Place]) -> ModelResponse:
+        """The first of these places at which ``responses.find`` meets the response too."""
+        model = self.modelfile.model
+        for place in ranked:
+            asked = replace(spec, omega=place.omega, b=place.b)
+            if spec.b is None and place.b == model.b:
+                asked = replace(asked, b=None)
+            found = responses.find(model, [asked])[0]
+            if found.found:
+                return found
+        raise self._nowhere(self.modelfile.responses.index(spec), spec)
+
+    def _nowhere(self, number: int, spec: Response) -> InputError:
+        open_ = "omega" if spec.omega is None else "b"
+        return InputError(
+            None,
+            f"response[{number + 1}].{open_}",
+            "best" if spec.omega is None else spec.b,
+            f"a place that starts reach and the nominal circuit shows; {spec.expect} has none "
+            "within this range",
+        )
+
+    def _resolved(self, choice: Choice, found: Sequence[ModelResponse]) -> ModelFile:
+        wanted = tuple(r.spec for r in found)
+        return replace(
+            self.modelfile, circuit=choice.spec(self.modelfile.circuit), responses=wanted
+        )
+
+    def _made(self, best: Candidate) -> Synthesis:
+        """The final design with its certificate whole: what each condition costs included."""
+        self.said.stage("the design that was found, what its conditions cost")
+        model, spec = self.modelfile.model, best.choice.spec(self.modelfile.circuit)
+        held = responses.peaks(model, best.found)
+        design = synthesis.synthesise(
+            model, spec, self.catalog, held, best.found, aims=best.choice.aims
+        )
+        return Synthesis(self._resolved(best.choice, best.found), self.catalog, best.found, design)
+
+    def _note(self, lever: str, setting: str, made: Candidate | None, kept: bool) -> None:
+        rank = None if made is None else made.rank
+        reason = str(self.short) if made is None else ""
+        self.steps.append(Step(lever, setting, rank, kept, reason))
+        if made is not None:
+            worst = float(norm.cdf(made.rank[0]))
+            self.said.note(
+                f"  {lever}: {setting}: smallest distance {made.rank[0]:.2f} σ "
+                f"(predicted yield {worst:.4f}){', kept' if kept else ''}"
+            )
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple):
+        return " to ".join(f"{v:.4g}" for v in value) + " Hz"
+    return f"{value:g}" if isinstance(value, float) else str(value)

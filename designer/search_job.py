@@ -1,0 +1,220 @@
+"""The search of a design folder: what is done, in which order it is written, what is reused.
+
+A found design is written as any other: ``model.toml`` is the model file with everything filled in,
+``asked.toml`` the one that was given. Nothing here prints; ``designer.commands_search`` does.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from designer import __version__, confirmation, design_files, gate, pipeline
+from designer.api import Synthesis
+from designer.catalog import Catalog, load_catalog
+from designer.errors import InputError
+from designer.folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder, StageName
+from designer.gate import Subject
+from designer.hearing import OWN_SAMPLES, Kind, ask_random
+from designer.job import Outcome, design_inputs, model_file
+from designer.jsonout import dumps, run_json
+from designer.limiting import limitings
+from designer.modelfile import ModelFile
+from designer.opamp_model import Rung
+from designer.options import Options
+from designer.preconditions import cores, naming, require_ngspice
+from designer.progress import Progress
+from designer.provenance import provenance
+from designer.search import look, search
+from designer.search_json import confirmation_json, search_json
+from designer.search_memory import Memory
+from designer.search_resolved import resolved
+from designer.study import check, tolerance
+from designer.study_folder import FolderStores
+from designer.study_job import SPICE_TIMEOUT, run_into
+from designer.workers import SpicePool
+
+ASKED, SEARCH, CANDIDATES = "asked.toml", "search.json", "candidates.jsonl"
+FILES = [ASKED, SEARCH, CANDIDATES]
+CONFIRMATION = "confirmation.json"
+SAMPLES = 4000
+"""Boards of the final study, at least."""
+RUNG: Rung = "dynamic"
+"""Of ngspice, on which the final figures are confirmed."""
+RULES = 1
+"""Number of the rules by which a search goes; whoever changes what it finds raises it."""
+
+
+def chosen(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> ModelFile:
+    """The model file that a verb is to work with: as it is, or where it leaves the design to a
+    search, that of the folder ``out``, with the design found and written there.
+
+    A design folder's own model file has its design already.
+    """
+    if modelfile.circuit.objective != "yield" or modelfile.source == out / MODEL:
+        return modelfile
+    return searched_into(modelfile, out, options, progress)
+
+
+def searched_into(
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress
+) -> ModelFile:
+    """Search for a design of this model file, unless the folder has it; the folder's model file.
+
+    Raises
+    ------
+    InputError, Unreachable : see ``search.search``; nothing was written by then, but for what a
+        design could not be made of.
+    """
+    options.check()
+    catalog, folder = load_catalog(), Folder(out)
+    inputs = _inputs(modelfile, catalog, options)
+    todo = folder.decide(
+        {"search": (inputs, [*FILES, *DESIGN_FILES])},
+        overwrite=options.overwrite,
+        resume=options.resume,
+    )
+    if not todo:
+        return model_file(out / MODEL)
+    begun = folder.state("search", inputs) == "unfinished"
+    if not (begun or options.overwrite) and folder.manifest and "design" in folder.manifest.stages:
+        raise InputError(
+            folder / MODEL,
+            "the design",
+            "one that no search made",
+            "another folder, or --overwrite to replace what manifest.json lists",
+        )
+    began = time.perf_counter()
+    jobs = cores() if options.jobs is None else options.jobs
+    windows = look(modelfile, catalog, jobs, progress)
+    source = provenance(modelfile, catalog.hash, seed=options.seed, settings={"rules": RULES})
+    if not (begun and options.resume):
+        (folder / CANDIDATES).unlink(missing_ok=True)
+    folder.begin({"search": (inputs, FILES)}, source)
+    folder.write(ASKED, modelfile.text)
+    memory = Memory(folder / CANDIDATES, inputs["model"])
+    found = search(
+        modelfile,
+        catalog,
+        seed=options.seed,
+        jobs=jobs,
+        memory=memory,
+        windows=windows,
+        progress=progress,
+    )
+    final = resolved(modelfile, found.made, found.final.choice, out / MODEL)
+    made = replace(found.made, modelfile=final, seconds=time.perf_counter() - began)
+    progress.stage("start recipes, files of the design")
+    with naming(final):
+        files = design_files.texts(made)
+    folder.begin(design_inputs(final, catalog), design_files.design_provenance(made))
+    design_files.write(folder, made, files)
+    folder.finish("design")
+    said = {**search_json(found), "provenance": source}
+    folder.write(SEARCH, dumps({**said, "cost": {"seconds": time.perf_counter() - began}}))
+    folder.finish("search")
+    return model_file(out / MODEL)
+
+
+def search_into(
+    modelfile: ModelFile,
+    out: Path,
+    options: Options,
+    progress: Progress,
+    command: Callable[[Options], str],
+) -> Outcome:
+    """The verb ``search`` for a model file: design, study of fresh boards, confirmation."""
+    final = searched_into(modelfile, out, options, progress)
+    study = run_into(final, out, replace(options, rung="exact"), progress, command)
+    confirmed = _confirmed(final, out, options, progress)
+    folder = Folder(out)
+    answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
+    answer["search"] = {
+        k: v for k, v in folder.json(SEARCH).items() if k not in ("format", "provenance", "cost")
+    }
+    answer["confirmation"] = confirmed
+    for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
+        row["limited_by"] = other["limited_by"]
+    return replace(study, answer=answer)
+
+
+def _confirmed(
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress
+) -> dict[str, Any]:
+    """What ngspice says of boards of the study, and what limits each response."""
+    folder, catalog = Folder(out), load_catalog()
+    inputs = {
+        **design_inputs(modelfile, catalog)["design"][0],
+        "seed": options.seed,
+        "samples": options.samples,
+        "rung": RUNG,
+        "boards": OWN_SAMPLES,
+    }
+    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
+        "confirmation": (inputs, [CONFIRMATION])
+    }
+    if folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
+        began = time.perf_counter()
+        jobs = cores() if options.jobs is None else options.jobs
+        made = design_files.load(folder, modelfile, catalog)
+        said = _confirm(made, folder, options, jobs, progress)
+        folder.begin(wanted, provenance(modelfile, catalog.hash, seed=options.seed))
+        cost = {"seconds": time.perf_counter() - began}
+        folder.write(CONFIRMATION, dumps({"format": 1, **said, "cost": cost}))
+        folder.finish("confirmation")
+    answer = folder.json(CONFIRMATION)
+    return {k: v for k, v in answer.items() if k not in ("format", "cost")}
+
+
+def _confirm(
+    made: Synthesis, folder: Folder, options: Options, jobs: int, progress: Progress
+) -> dict[str, Any]:
+    checked = check(made, None, progress)
+    stores = FolderStores(folder.path, folder.watch())
+    study = tolerance(
+        made,
+        samples=options.samples,
+        rung="exact",
+        blamed=False,
+        seed=options.seed,
+        jobs=jobs,
+        checked=checked,
+        stores=stores,
+        progress=progress,
+    )
+    step = progress.stage("what limits each response")
+    limits = limitings(study.plan, study.answers, jobs=jobs, progress=step)
+    with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
+        require_ngspice(pool)
+        progress.stage(f"ngspice, rung {RUNG}, numerics gate")
+        reduction = pipeline.nominal_reduction(made.design)
+        gates = gate.check(
+            pool,
+            [Subject(reduction, q.excitation, q.start, rung=RUNG) for q in study.plan.questions],
+        )
+        plan = replace(
+            study.plan,
+            questions=tuple(
+                replace(q, settings=g.settings if g.passed else None)
+                for q, g in zip(study.plan.questions, gates, strict=True)
+            ),
+        )
+        asks = [ask for ask in ask_random(study.answers, 0) if ask.kind is Kind.OWN]
+        asks = [ask for ask in asks if plan.questions[ask.question].settings is not None]
+        step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
+        heard = confirmation.hear(plan, asks, pool, jobs, step, rung=RUNG)
+    answers = {(a.sample, a.question): a for a in study.answers}
+    rows = confirmation_json(heard, answers, study.asked, len(study.checked))
+    for index, limit in zip(study.asked, limits, strict=True):
+        rows[index]["limited_by"] = limit.as_dict()
+    for index, found in zip(study.asked, gates, strict=True):
+        rows[index]["gate"] = found.as_dict()
+    return {"rung": RUNG, "responses": rows}
+
+
+def _inputs(modelfile: ModelFile, catalog: Catalog, options: Options) -> dict[str, Any]:
+    inputs = dict(design_inputs(modelfile, catalog)["design"][0])
+    return {**inputs, "version": __version__, "rules": RULES, "seed": options.seed}

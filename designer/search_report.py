@@ -1,0 +1,243 @@
+"""The report on the design that a search finds, beside the paper's circuits.
+
+    python -m designer.search_report reports/robust-design
+
+A search of ``examples/robust.toml`` (every place free) and one at the model's own clearance (ω
+free), the paper's circuit as printed and as corrected, and the rectifier stage by the match alone:
+yields as built on fresh boards, tuned and reached for what was searched, blame, what limits each
+response, price and parts, and what every lever is worth. Each case is on disk when it is done.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from designer import compare, exact, pipeline
+from designer.all_on_one import all_on_one
+from designer.api import Synthesis
+from designer.blame import blame
+from designer.catalog import Catalog, load_catalog
+from designer.circuitspec import CircuitSpec
+from designer.design_files import load
+from designer.errors import DesignerError
+from designer.folder import Folder
+from designer.jsonout import plain
+from designer.limiting import limitings
+from designer.modelfile import ModelFile, parse_model_file, read_model_file
+from designer.options import Options
+from designer.preconditions import cores
+from designer.progress import Progress, progress_for
+from designer.provenance import provenance
+from designer.search_job import search_into, searched_into
+from designer.study import tolerance
+from designer.tolerance_cases import TITLES, cases, model_file
+from designer.toml_text import toml_text
+from designer.verdict import StudyPlan, Yield, count
+from designer.whole_file import write
+
+FORMAT = 1
+MODEL = Path("examples/robust.toml")
+SAMPLES, SHORT, SEED = 4000, 400, 71
+"""Boards as built; boards that are tuned and powered up; of the boards that count."""
+FREE, NOMINAL = "searched", "searched, nominal b"
+FILES = ("robust-design.json", "yields.png", "yields.svg", "levers.png", "levers.svg", "README.md")
+
+
+def report(
+    out: Path,
+    *,
+    model: Path = MODEL,
+    samples: int = SAMPLES,
+    short: int = SHORT,
+    seed: int = SEED,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Make the report in the folder ``out``; finished cases that are there are not made again.
+
+    Raises
+    ------
+    InputError, Unreachable, EnvironmentMissing : as of a search.
+    """
+    said = Progress() if progress is None else progress
+    jobs = cores() if jobs is None else jobs
+    catalog, file = load_catalog(), read_model_file(model)
+    (out / "cases").mkdir(parents=True, exist_ok=True)
+    options = Options(seed, jobs, samples, resume=True)
+    settings = [FORMAT, file.sha256, catalog.hash, samples, short, seed]
+
+    def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        path = out / "cases" / f"{name.replace(', ', '-').replace(' ', '-')}.json"
+        if path.exists():
+            known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            if known["settings"] == settings:
+                return known
+        made: dict[str, Any] = plain({"settings": settings, "name": name, **make()})
+        write(path, _json(made))
+        return made
+
+    def command(asked: Options) -> str:
+        return asked.command("search", model, out / "free")
+
+    def free() -> dict[str, Any]:
+        outcome = search_into(file, out / "free", options, said, command)
+        made = _made(out / "free", catalog)
+        row = _searched(made, out / "free", options, short, said, tuned=False)
+        return {**row, "confirmation": outcome.answer["confirmation"]}
+
+    def nominal() -> dict[str, Any]:
+        text = at_model_clearance(file)
+        fixed = parse_model_file(text, out / "nominal.toml")
+        searched_into(fixed, out / "nominal", options, said)
+        made = _made(out / "nominal", catalog)
+        return _searched(made, out / "nominal", options, short, said, tuned=True)
+
+    found = []
+    for other in cases(catalog, samples=samples, seed=seed):
+        if other.reference:
+            spec = model_file().circuit
+            title = TITLES[other.circuit]
+            make = partial(_as_built, other.plan, spec, catalog, jobs, said)
+            found.append(case(title, make))
+    found += [case(FREE, free), case(NOMINAL, nominal)]
+    numbers = {"samples": samples, "short": short}
+    source = provenance(file, catalog.hash, seed=seed, settings=numbers)
+    document = {"format": FORMAT, "cases": found, "provenance": source}
+    for name, content in _files(document, model, samples, short, seed).items():
+        write(out / name, content)
+    return document
+
+
+def at_model_clearance(file: ModelFile) -> str:
+    """The text of the model file with every response at the model's own clearance."""
+    data = tomllib.loads(file.text)
+    for response in data["response"]:
+        response.pop("b", None)
+    data["title"] = f"{file.title}, nominal b"
+    return toml_text(data)
+
+
+def _made(folder: Path, catalog: Catalog) -> Synthesis:
+    return load(Folder(folder), read_model_file(folder / "model.toml"), catalog)
+
+
+def _searched(
+    made: Synthesis, place: Path, options: Options, short: int, said: Progress, *, tuned: bool
+) -> dict[str, Any]:
+    """A searched design: as built on all boards, reached (and tuned) on some."""
+    checked = pipeline.check(made.design, made.found, None)
+    jobs = cores() if options.jobs is None else options.jobs
+    asked = [c for c in checked if c.model.found]
+    plan = pipeline.plan_study(
+        made.modelfile, made.design, asked, made.catalog, samples=options.samples, seed=options.seed
+    )
+    row = _as_built(plan, made.modelfile.circuit, made.catalog, jobs, said)
+    study = tolerance(
+        made,
+        samples=short,
+        rung="exact",
+        tuned=tuned,
+        reached=True,
+        blamed=False,
+        seed=options.seed,
+        jobs=jobs,
+        checked=checked,
+        progress=said,
+    )
+    for i in range(len(checked)):
+        layers = {"reached": study.reached_of(i)} | ({"tuned": study.tuned_of(i)} if tuned else {})
+        row["responses"][i] |= {name: _counted(count(rows)) for name, rows in layers.items()}
+        row["responses"][i]["b"] = made.found[i].b
+    row["all_on_one"] |= {
+        name: None if one is None else _counted(one)
+        for name, one in (("tuned", study.all_tuned), ("reached", study.all_reached))
+    }
+    search = json.loads((place / "search.json").read_text(encoding="utf-8"))
+    kept = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
+    return {**row, "search": {key: search[key] for key in kept}}
+
+
+def _as_built(
+    plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int, said: Progress
+) -> dict[str, Any]:
+    """Yields, blame, limits, price and parts of a circuit."""
+    step = said.stage("boards as built", plan.samples * len(plan.questions))
+    answers = exact.block(plan, range(plan.samples), jobs, step)
+    blamed = blame(plan, answers, jobs=jobs, progress=said.stage("blame")).responses
+    limits = limitings(plan, answers, jobs=jobs, progress=said.stage("limits"))
+    rows = []
+    for k, question in enumerate(plan.questions):
+        counted = count([a for a in answers if a.question == k])
+        rows.append(
+            {
+                "expect": str(question.spec.expect),
+                "omega": question.spec.omega,
+                "as built": _counted(counted),
+                "blame": blamed[k].limited_by,
+                "limited_by": limits[k].line,
+            }
+        )
+    return {
+        "responses": rows,
+        "all_on_one": {"as built": _counted(all_on_one(answers))},
+        "bill": dict(compare.bill_of(plan.circuit, spec, catalog).__dict__),
+        "parts": plan.circuit.values,
+    }
+
+
+def _counted(counted: Yield) -> dict[str, Any]:
+    low, high = counted.interval
+    return {**counted.__dict__, "rate": counted.rate, "low": low, "high": high}
+
+
+def _files(
+    document: Mapping[str, Any], model: Path, samples: int, short: int, seed: int
+) -> dict[str, bytes]:
+    from designer.plots import to_png, to_svg  # Matplotlib takes a while to import
+    from designer.search_sheet import lever_chart, readme, yield_chart
+
+    contents = {"robust-design.json": _json(document)}
+    found: Sequence[Mapping[str, Any]] = document["cases"]
+    for name, figure in (("yields", yield_chart(found)), ("levers", lever_chart(found))):
+        picture = io.BytesIO()
+        to_png(figure, picture)
+        contents |= {f"{name}.png": picture.getvalue(), f"{name}.svg": to_svg(figure).encode()}
+    numbers = f"--samples {samples} --short {short} --seed {seed}"
+    command = f"python -m designer.search_report reports/robust-design {numbers}"
+    contents["README.md"] = readme(found, command, model.name).encode()
+    return contents
+
+
+def _json(value: Mapping[str, Any]) -> bytes:
+    text = json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
+    return f"{text}\n".encode()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m designer.search_report")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--model", type=Path, default=MODEL)
+    parser.add_argument("--samples", type=int, default=SAMPLES)
+    parser.add_argument("--short", type=int, default=SHORT)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--jobs", type=int)
+    asked = parser.parse_args(arguments)
+    try:
+        with progress_for(False) as progress:
+            report(progress=progress, **vars(asked))
+    except DesignerError as error:
+        print(f"search_report: {error}", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+"""Levers: what they change, and the search against every combination of a small set."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from designer import responses, search_levers, synthesis
+from designer.errors import InputError, Unreachable
+from designer.modelfile import ModelFile
+from designer.progress import Progress
+from designer.search import BOARDS, Candidate, look, search
+from designer.search_distance import Stretched
+from designer.search_levers import LEVERS, Choice, topologies, variants
+from designer.search_places import score
+from designer.search_windows import Place
+from designer.spread import Spread
+from tests.search_cases import catalog, file
+
+PLACE = 'omega = 0.8\nexpect = "1-2-2"'
+BOTH = file(PLACE, zone="saturation", zones='"saturation", "rectifier"')
+
+
+def test_the_file_s_own_choice_is_first() -> None:
+    found = topologies(BOTH, catalog())
+    assert found[0] == Choice.of(BOTH.circuit)
+    assert [c.dead_zone for c in found] == ["saturation", "rectifier"]
+    wider = replace(BOTH, search=replace(BOTH.search, opamps=("TL074H", "TL074C")))
+    found = topologies(wider, catalog())
+    assert len(found) == 4
+    assert found[0] == Choice.of(BOTH.circuit)
+
+
+def test_an_unknown_op_amp_is_refused() -> None:
+    wider = replace(BOTH, search=replace(BOTH.search, opamps=("LM741X",)))
+    with pytest.raises(InputError) as refused:
+        topologies(wider, catalog())
+    assert refused.value.field == "search.opamps"
+
+
+@pytest.mark.parametrize("lever", LEVERS[2:])
+def test_a_variant_moves_one_lever(lever: str) -> None:
+    own = Choice.of(BOTH.circuit)
+    found = list(variants(own, lever))
+    assert found
+    for other in found:
+        assert other.get(lever) != own.get(lever)
+        assert other.with_lever(lever, own.get(lever)) == own
+
+
+@pytest.mark.slow
+def test_the_match_error_binds() -> None:
+    strict = replace(BOTH, search=replace(BOTH.search, match_error=0.0, dead_zones=("rectifier",)))
+    strict = replace(
+        strict, circuit=replace(strict.circuit, resistors=("E12",), capacitors=("E3",))
+    )
+    with pytest.raises(Unreachable) as refused:
+        search(strict, catalog())
+    assert refused.value.field == "search.match_error"
+    assert "least error" in refused.value.expected
+
+
+def test_what_is_refused_is_refused_before_any_work() -> None:
+    open_ = file('omega = "best"')
+    with pytest.raises(InputError) as refused:
+        look(open_, catalog(), 1, Progress())
+    assert refused.value.field == "response[1].expect"
+
+
+@pytest.mark.slow
+def test_the_search_finds_the_best_of_every_combination(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two dead zones and two amplitudes at one place: the search is as good as all four."""
+    monkeypatch.setattr(search_levers, "SWINGS", (0.85, 0.5))
+    monkeypatch.setattr(search_levers, "SHARES", (1.6,))
+    monkeypatch.setattr(search_levers, "NOISE_GAINS", (30.0,))
+    monkeypatch.setattr("designer.search.LEVERS", ("opamp", "dead zone", "amplitude"))
+    hard = file(
+        'omega = 0.215\nexpect = "1-8-8"', zone="saturation", zones='"saturation", "rectifier"'
+    )
+    found = search(hard, catalog())
+    every = [
+        _enumerated(hard, choice.with_lever("amplitude", swing))
+        for choice in topologies(hard, catalog())
+        for swing in (0.85, 0.5)
+    ]
+    assert found.final.rank == max(c.rank for c in every)
+    assert found.candidates > 3
+    (worth,) = [c for c in found.contributions if c.lever == "dead zone"]
+    assert found.final.choice.dead_zone == "rectifier"
+    assert worth.alone is not None
+    assert found.start is not None
+    assert worth.alone > found.start.rank
+
+
+def _enumerated(modelfile: ModelFile, choice: Choice) -> Candidate:
+    model, spec = modelfile.model, choice.spec(modelfile.circuit)
+    found = responses.find(model, modelfile.responses)
+    held = responses.peaks(model, found)
+    design = synthesis.synthesise(model, spec, catalog(), held, found, aims=choice.aims)
+    spread = Spread.of(modelfile, design.circuit, catalog())
+    bench = Stretched(design, spread, 1, BOARDS)
+    places = [Place(r.omega, r.b, r.orbit.start) for r in found]
+    scored = tuple(score(bench, r.spec, [p], BOARDS)[0] for r, p in zip(found, places, strict=True))
+    return Candidate(choice, design, found, scored)
