@@ -49,8 +49,15 @@ class Line:
         return {**row, "designators": " ".join(self.designators)}
 
 
-def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, ...]:
+def bill(
+    circuit: Circuit,
+    spec: CircuitSpec,
+    catalog: Catalog,
+    grades: Mapping[str, float] | None = None,
+) -> tuple[Line, ...]:
     """Passives, diodes, references and op-amp packages; the generator is an instrument, no part.
+
+    grades : of the parts that are bought at another grade than their kind (``partgrades.bought``).
 
     Raises
     ------
@@ -63,9 +70,10 @@ def bill(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> tuple[Line, .
     )
     lines = []
     for kind, unit, grade, parts in passives:
-        for value in sorted({p.value for p in parts}):
-            here = [p for p in parts if p.value == value]
-            part = catalog.part(kind, value, grade)
+        of = {p.name: (grades or {}).get(p.name, grade) for p in parts}
+        for value, own in sorted({(p.value, of[p.name]) for p in parts}):
+            here = [p for p in parts if (p.value, of[p.name]) == (value, own)]
+            part = catalog.part(kind, value, own)
             lines.append(
                 Line(
                     quantity=len(here),

@@ -33,6 +33,7 @@ from designer.catalogentry import (
     PartChoice,
     PartFamily,
     PartNumber,
+    Price,
     Rating,
     Reference,
     Section,
@@ -54,6 +55,7 @@ __all__ = [
     "PartChoice",
     "PartFamily",
     "PartNumber",
+    "Price",
     "Rating",
     "Reference",
     "Section",
@@ -80,6 +82,19 @@ class Catalog:
     references: tuple[Reference, ...]
     hash: str
     folders: tuple[Path, ...]
+    prices: tuple[Price, ...] = ()
+
+    def euro(self, price_class: int) -> float:
+        """What a part of this class counts with, in euro apiece.
+
+        Raises
+        ------
+        InputError : no file states it.
+        """
+        for price in self.prices:
+            if price.price_class == price_class:
+                return price.euro
+        raise InputError(None, "price", price_class, "a class with a table [[price]]")
 
     def values(
         self, kind: Kind, series: Sequence[str], lo: float, hi: float, grade: float
@@ -217,6 +232,7 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         tuple(entry for entry in entries if isinstance(entry, Reference)),
         digest.hexdigest(),
         folders,
+        tuple(entry for entry in entries if isinstance(entry, Price)),
     )
 
 

@@ -17,6 +17,7 @@ from designer.catalogentry import (
     OpAmp,
     PartFamily,
     PartNumber,
+    Price,
     Rating,
     Reference,
     Section,
@@ -28,7 +29,7 @@ from designer.quantity import format_quantity, parse_quantity
 from designer.schema import checked, one_of, parse_toml
 from designer.vendor_model import read_vendor_model
 
-Entry = PartFamily | OpAmp | Diode | Reference
+Entry = PartFamily | OpAmp | Diode | Reference | Price
 
 _MAX_BYTES = 4_000_000
 
@@ -72,6 +73,8 @@ def _from_toml(text: str, file: str) -> Iterable[Entry]:
         yield Diode(**dict(diode))
     for reference in tables.reference:
         yield Reference(**dict(reference))
+    for price in tables.price:
+        yield Price(str(price.price_class), price.euro, price.source, price.assumed)
 
 
 def _from_csv(text: str, file: str) -> Iterable[Entry]:

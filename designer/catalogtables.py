@@ -268,6 +268,14 @@ class ReferenceTable(BaseModel):
     impedance: Annotated[Figure | None, _figure("Ω")] = None
 
 
+class PriceTable(BaseModel):
+    model_config = STRICT
+    price_class: Annotated[int, _price()]
+    euro: Annotated[float, number("", "a number >= 0, euro apiece", lambda value: value >= 0.0)]
+    source: Annotated[str, line("where the figure comes from")]
+    assumed: Annotated[bool, flag()] = False
+
+
 class FileTables(BaseModel):
     model_config = STRICT
     format: Annotated[int, exactly(1, "1, the format that this version reads")]
@@ -277,3 +285,4 @@ class FileTables(BaseModel):
     reference: tuple[ReferenceTable, ...] = Field(
         (), strict=False, description="tables [[reference]]"
     )
+    price: tuple[PriceTable, ...] = Field((), strict=False, description="tables [[price]]")

@@ -22,6 +22,7 @@ from designer.folder import DESIGN, MODEL, Folder
 from designer.jsonout import dumps, synthesis_json
 from designer.measured import MEASURED
 from designer.modelfile import ModelFile, Response
+from designer.partgrades import bought
 from designer.pipeline import Checked, nominal_reduction
 from designer.preconditions import cores, naming
 from designer.provenance import provenance
@@ -40,7 +41,14 @@ def texts(made: Synthesis) -> dict[str, str]:
     return {
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(made),
-        "bom.csv": bill_csv(bill(design.circuit, modelfile.circuit, made.catalog)),
+        "bom.csv": bill_csv(
+            bill(
+                design.circuit,
+                modelfile.circuit,
+                made.catalog,
+                bought(modelfile, design.circuit, made.catalog),
+            )
+        ),
         SETUP: setup_csv(design, made.found, start_recipes(made, cores())),
         "scales.csv": scales_csv(modelfile, design, made.found),
     }

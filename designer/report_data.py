@@ -13,6 +13,7 @@ from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
 from designer.orbit import OrbitStatus
+from designer.partgrades import bought
 from designer.pipeline import Checked
 from designer.report_layers import Layers
 from designer.verdict import Answer, StudyPlan, Yield
@@ -51,7 +52,8 @@ class ReportData:
     @classmethod
     def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
         """The data of a finished run."""
-        lines = bill(result.design.circuit, result.modelfile.circuit, result.catalog)
+        made = result.modelfile, result.design.circuit, result.catalog
+        lines = bill(made[1], made[0].circuit, made[2], bought(*made))
         return cls(
             modelfile=result.modelfile,
             design=result.design,
