@@ -14,6 +14,9 @@ from designer.cure_program import Option, Slot
 from designer.errors import Unreachable
 from designer.partgrades import bought
 
+CHANGED = 0.01
+"""Trouble of one part that is bought at another grade: of two free choices, the smaller change."""
+
 
 @dataclass(frozen=True)
 class PartSlot:
@@ -74,7 +77,7 @@ def _grades(
             continue
         extra = catalog.euro(sold.price) - catalog.euro(base.price)
         if all(extra < o.price for o in options[1:]):
-            options.append(Option(f"{100.0 * grade:g} %", extra))
+            options.append(Option(f"{100.0 * grade:g} %", extra, CHANGED))
             grades.append(grade)
     if len(options) == 1:
         return None
@@ -99,7 +102,7 @@ def _references(made: Synthesis) -> Sequence[PartSlot]:
     options = [Option(now.name, 0.0)]
     for r in same:
         extra = count * (catalog.euro(r.price) - catalog.euro(now.price))
-        options.append(Option(r.name, extra))
+        options.append(Option(r.name, extra, CHANGED))
     models = (now.name, *(r.name for r in same))
     slot = Slot("references", tuple(options))
     return [PartSlot(slot, tuple(r.name for r in circuit.references), models=models)]

@@ -13,9 +13,9 @@ from designer.provenance import sha256
 
 FORMAT = 1
 MANIFEST = "manifest.json"
-StageName = Literal["design", "study", "comparison", "sweep", "map", "basins"]
-STAGES: tuple[StageName, ...] = ("design", "study", "comparison", "sweep", "map", "basins")
-OF_DESIGN: tuple[StageName, ...] = ("study", "comparison")
+StageName = Literal["design", "study", "comparison", "sweep", "map", "basins", "cure"]
+STAGES: tuple[StageName, ...] = ("design", "study", "comparison", "sweep", "map", "basins", "cure")
+OF_DESIGN: tuple[StageName, ...] = ("study", "comparison", "cure")
 """Stages that depend on the design, and on it alone."""
 State = Literal["new", "same", "more", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000
