@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from designer.components import Component, natural
+from designer.components import Component
 from designer.errors import InputError
 from designer.kicad_names import circuit_net
+from designer.natural import natural
 from designer.sexpr import Expression, read
 from designer.views import View
 

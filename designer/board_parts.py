@@ -28,6 +28,7 @@ from designer.design import Design
 from designer.diode_model import THERMAL, diode_model
 from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.modelfile import ModelFile
+from designer.partgrades import bought
 from designer.responses import ModelResponse
 from designer.views import View
 
@@ -80,6 +81,8 @@ def board_choice(
 def board_circuit(made: Synthesis | RunResult) -> tuple[Circuit, BoardChoice]:
     """The circuit of a design with its fittings, and the choices that they were made by."""
     choice = board_choice(made.modelfile, made.design, made.found)
+    grades = bought(made.modelfile, made.design.circuit, made.catalog)
+    choice = replace(choice, grades=grades)
     return fitted(made.design.circuit, choice, made.catalog), choice
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pydantic import BaseModel
@@ -40,7 +41,8 @@ class BoardSpec:
 class BoardChoice:
     """A board for one design: what the model file says, and the figures that it depends on.
 
-    resistor_grade, capacitor_grade : of what is bought, fractions. diode : the protection's, by
+    resistor_grade, capacitor_grade : of what is bought, fractions; grades : of the parts that are
+    bought at another one, by name. diode : the protection's, by
     its name in the catalogue. trim : largest DC [V] that the trim stands for, as if the generator
     had it.
     """
@@ -50,6 +52,7 @@ class BoardChoice:
     capacitor_grade: float = 0.01
     diode: str = "1N4148"
     trim: float = 0.25
+    grades: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, circuit: CircuitSpec, board: BoardSpec | None = None) -> BoardChoice:

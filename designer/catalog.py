@@ -35,6 +35,7 @@ from designer.catalogentry import (
     PartChoice,
     PartFamily,
     PartNumber,
+    Price,
     Rating,
     Reference,
     Section,
@@ -61,6 +62,7 @@ __all__ = [
     "PartChoice",
     "PartFamily",
     "PartNumber",
+    "Price",
     "Rating",
     "Reference",
     "Section",
@@ -95,11 +97,24 @@ class Catalog:
     folders: tuple[Path, ...]
     trimmers: tuple[Trimmer, ...] = ()
     headers: tuple[Header, ...] = ()
+    prices: tuple[Price, ...] = ()
     mounting: Mounting = "mixed"
 
     def mounted(self, mounting: Mounting) -> Catalog:
         """The same catalogue for a board that takes these cases."""
         return replace(self, mounting=mounting)
+
+    def euro(self, price_class: int) -> float:
+        """What a part of this class counts with, in euro apiece.
+
+        Raises
+        ------
+        InputError : no file states it.
+        """
+        for price in self.prices:
+            if price.price_class == price_class:
+                return price.euro
+        raise InputError(None, "price", price_class, "a class with a table [[price]]")
 
     def values(
         self, kind: Kind, series: Sequence[str], lo: float, hi: float, grade: float
@@ -297,6 +312,7 @@ def load_catalog(extra: Path | None = None) -> Catalog:
         folders,
         tuple(entry for entry in entries if isinstance(entry, Trimmer)),
         tuple(entry for entry in entries if isinstance(entry, Header)),
+        tuple(entry for entry in entries if isinstance(entry, Price)),
     )
 
 

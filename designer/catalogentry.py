@@ -74,6 +74,21 @@ class Case:
 
 
 @dataclass(frozen=True)
+class Price:
+    """What a part of a price class counts with where prices are added: euro apiece at a hundred
+    pieces."""
+
+    name: str
+    euro: float
+    source: str
+    assumed: bool
+
+    @property
+    def price_class(self) -> int:
+        return int(self.name)
+
+
+@dataclass(frozen=True)
 class Section:
     """One amplifier of a package, with its pin numbers."""
 

@@ -19,6 +19,7 @@ from designer.catalogentry import (
     OpAmp,
     PartFamily,
     PartNumber,
+    Price,
     Rating,
     Reference,
     Section,
@@ -31,7 +32,7 @@ from designer.quantity import format_quantity, parse_quantity
 from designer.schema import checked, one_of, parse_toml
 from designer.vendor_model import read_vendor_model
 
-Entry = PartFamily | OpAmp | Diode | Reference | Trimmer | Header
+Entry = PartFamily | OpAmp | Diode | Reference | Trimmer | Header | Price
 
 _MAX_BYTES = 4_000_000
 
@@ -80,6 +81,8 @@ def _from_toml(text: str, file: str) -> Iterable[Entry]:
         yield Trimmer(**{**dict(trimmer), "rating": rating, "cases": _cases(trimmer.cases)})
     for header in tables.header:
         yield Header(**{**dict(header), "rating": Rating(**dict(header.rating))})
+    for price in tables.price:
+        yield Price(str(price.price_class), price.euro, price.source, price.assumed)
 
 
 def _from_csv(text: str, file: str) -> Iterable[Entry]:

@@ -369,6 +369,14 @@ class HeaderTable(BaseModel):
     assumed: Annotated[tuple[str, ...], lines("a list of what was not checked")] = ()
 
 
+class PriceTable(BaseModel):
+    model_config = STRICT
+    price_class: Annotated[int, _price()]
+    euro: Annotated[float, number("", "a number >= 0, euro apiece", lambda value: value >= 0.0)]
+    source: Annotated[str, line("where the figure comes from")]
+    assumed: Annotated[bool, flag()] = False
+
+
 class FileTables(BaseModel):
     model_config = STRICT
     format: Annotated[int, exactly(1, "1, the format that this version reads")]
@@ -380,3 +388,4 @@ class FileTables(BaseModel):
     )
     trimmer: tuple[TrimmerTable, ...] = Field((), strict=False, description="tables [[trimmer]]")
     header: tuple[HeaderTable, ...] = Field((), strict=False, description="tables [[header]]")
+    price: tuple[PriceTable, ...] = Field((), strict=False, description="tables [[price]]")

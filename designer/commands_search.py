@@ -29,7 +29,7 @@ from designer.errors import InputError
 from designer.progress import Progress
 
 if TYPE_CHECKING:
-    from designer.cure import CureResult  # type: ignore[import-not-found]
+    from designer.cure import CureResult
     from designer.options import Options
 
 SAMPLES = 4000

@@ -115,9 +115,11 @@ class _Lister:
 
     def one(self, part: Fitting) -> Component:
         if isinstance(part, Resistor):
-            return self.passive(part, "resistor", "Ω", self.choice.resistor_grade, "signal")
+            grade = self.choice.grades.get(part.name, self.choice.resistor_grade)
+            return self.passive(part, "resistor", "Ω", grade, "signal")
         if isinstance(part, Capacitor):
-            return self.passive(part, "capacitor", "F", self.choice.capacitor_grade, "signal")
+            grade = self.choice.grades.get(part.name, self.choice.capacitor_grade)
+            return self.passive(part, "capacitor", "F", grade, "signal")
         if isinstance(part, SupplyCapacitor):
             return self.passive(part, "capacitor", "F", 1.0, "supply", near=part.package)
         if isinstance(part, Diode):

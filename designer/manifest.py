@@ -21,6 +21,7 @@ StageName = Literal[
     "comparison",
     "trade",
     "confirmation",
+    "cure",
     "sweep",
     "map",
     "basins",
@@ -33,6 +34,7 @@ OF_DESIGN: tuple[StageName, ...] = (
     "comparison",
     "trade",
     "confirmation",
+    "cure",
     "rules",
 )
 """Stages that depend on the design, and on it alone."""

@@ -19,7 +19,8 @@ from designer.circuitspec import DeadZone
 from designer.coefficients import CoefficientErrors, coefficient_errors
 from designer.dead_zone_parts import OUTPUT
 from designer.deck import Excitation
-from designer.exact import displacement, images, waveform_error
+from designer.ensemble import displacement
+from designer.exact import images, waveform_error
 from designer.flow import Flow
 from designer.modelfile import ModelFile
 from designer.orbit import Orbit, OrbitStatus, failed
@@ -139,7 +140,7 @@ def follow(one: Built, found: Sequence[ModelResponse]) -> tuple[Followed, ...]:
             orbit = failed(str(error))
         shown = np.zeros(0)
         if orbit.status is OrbitStatus.PERIODIC:
-            shown = displacement(flow.system, flow.drive, orbit) / one.volts[0]
+            shown = displacement(flow, orbit) / one.volts[0]
         kept = orbit.status is OrbitStatus.PERIODIC and r.spec.accepts(orbit.n, orbit.p, orbit.q)
         assert r.expected is not None
         out.append(Followed(r.omega, r.expected, orbit, kept, error_of(r, shown)))
@@ -150,7 +151,7 @@ def error_of(response: ModelResponse, shown: Array) -> float:
     """RMS difference of a displacement (n · POINTS,) in model units from the model's, over its
     peak; the nearest of the model's n periods and mirror images counts."""
     flow = model_flow(response.omega)
-    wanted = images(displacement(flow.system, flow.drive, response.orbit), mirror=True)
+    wanted = images(displacement(flow, response.orbit), mirror=True)
     return waveform_error(shown, wanted)
 
 

@@ -20,7 +20,7 @@ from designer import fixed_step, gate, pipeline
 from designer.api import Synthesis
 from designer.circuit_kernel import POINTS
 from designer.deck import Excitation, SolverSettings
-from designer.exact import displacement
+from designer.ensemble import displacement
 from designer.flow import Flow
 from designer.gate import Subject
 from designer.model import Dimensionless
@@ -217,7 +217,7 @@ def _in_model_units(orbit: Orbit, volts: Array) -> Orbit:
 def _drawn(flow: Flow, orbit: Orbit, volts: float) -> Array:
     if orbit.status is not OrbitStatus.PERIODIC:
         return np.zeros(0)
-    return displacement(flow.system, flow.drive, orbit) / volts
+    return displacement(flow, orbit) / volts
 
 
 def _traced(found: Read, volts: float) -> Array:

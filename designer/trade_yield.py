@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 from designer import exact, pipeline
 from designer.api import Synthesis
-from designer.combined import wilson
 from designer.confirmation import hear
 from designer.hearing import Ask, Hearing, Kind, Why
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
 from designer.preconditions import cores
 from designer.progress import Progress
+from designer.proportion import wilson
 from designer.verdict import Answer, Question, Verdict
 from designer.workers import SpicePool
 

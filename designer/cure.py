@@ -1,0 +1,179 @@
+"""``designer search DIR --yield Y``: the cheapest cure of a design folder, and what is written.
+
+``cure.json`` with everything that was found, the front of yield against price in
+``cure-front.csv``, ``.png`` and ``.svg``, and ``cure-studies.json``, the verdicts of every board
+that was asked, from which interrupted work goes on. With ``out`` the cured design is a design
+folder of its own.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from designer import design_files
+from designer.api import Synthesis
+from designer.cure_branch import KINDS, cured
+from designer.cure_json import cure_json, front_csv
+from designer.cure_search import find_cure
+from designer.cure_study import Book
+from designer.errors import InputError
+from designer.folder import Folder, StageName
+from designer.job import design_inputs, made_from, read_design
+from designer.jsonout import dumps
+from designer.options import Options
+from designer.preconditions import naming, need_responses
+from designer.progress import Progress
+from designer.provenance import provenance
+from designer.schema import one_of
+from designer.selection import SOLVER
+from designer.upgrade import Upgrades
+
+CURE, STUDIES = "cure.json", "cure-studies.json"
+FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
+RULES = 1
+"""Raised whenever the same inputs are to give another answer."""
+
+
+@dataclass(frozen=True)
+class CureResult:
+    """answer : the JSON object. reached : whether every response has the yield that was asked for,
+    within the budget. reused : whether the folder held the answer already."""
+
+    answer: dict[str, Any]
+    reached: bool
+    reused: bool
+
+
+def cure(
+    folder: Path,
+    *,
+    target: float,
+    budget: float | None = None,
+    out: Path | None = None,
+    without: Collection[str] = (),
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> CureResult:
+    """Find the cheapest cure of the design in ``folder``, write it there, and say so.
+
+    target : yield of every wanted response, as built (trimmed where the cure says so): the lower
+    end of its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by
+    the catalogue's price classes. out : folder for the cured design. without : kinds of upgrades
+    that are not wanted. options : seed, jobs, overwrite, resume.
+
+    Raises
+    ------
+    InputError : the target or the budget is none; an unknown kind; the folder is no design folder,
+        or holds a cure of other inputs, and the options do not say what to do.
+    """
+    options = Options() if options is None else options
+    said = Progress() if progress is None else progress
+    options.check()
+    _check(target, budget, without)
+    base = read_design(folder)
+    need_responses(base.modelfile)
+    place = Folder(folder)
+    inputs = {
+        "design": made_from(place),
+        "catalogue": base.catalog.hash,
+        "rules": RULES,
+        "yield": target,
+        "budget": budget,
+        "without": sorted(set(without)),
+        "seed": options.seed,
+    }
+    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
+        "cure": (inputs, [CURE, STUDIES, *FRONT])
+    }
+    todo = place.decide(wanted, overwrite=options.overwrite, resume=options.resume)
+    if not todo:
+        answer = place.json(CURE)
+        if out is not None:
+            _write_design(base, answer, out, options, said)
+        return CureResult(answer, bool(answer["reached"]), True)
+    began = time.perf_counter()
+    known = _studies(place) if place.manifest and STUDIES in place.manifest.files else {}
+    provenance_ = provenance(
+        base.modelfile, base.catalog.hash, seed=options.seed, settings={"highs": SOLVER}
+    )
+    place.begin(wanted, provenance_)
+    guard = place.watch()
+
+    def save(studies: dict[str, Any]) -> None:
+        guard()
+        place.write(STUDIES, dumps(studies, indent=None))
+
+    with naming(base.modelfile):
+        found = find_cure(
+            base,
+            target,
+            budget=budget,
+            trim=base.modelfile.tuning.offset,
+            without=frozenset(without),
+            seed=options.seed,
+            jobs=options.jobs,
+            book=Book(known, save),
+            progress=said,
+        )
+    said.stage("report of the cure")
+    from designer.cure_plots import front_chart  # matplotlib is not needed before this
+    from designer.plots import to_png, to_svg
+
+    answer = cure_json(found, provenance_, time.perf_counter() - began)
+    guard()
+    place.write(CURE, dumps(answer))
+    place.write(FRONT[0], front_csv(found))
+    chart = front_chart(found)
+    picture = io.BytesIO()
+    to_png(chart, picture)
+    place.write(FRONT[1], picture.getvalue())
+    place.write(FRONT[2], to_svg(chart))
+    place.finish("cure")
+    answer = place.json(CURE)
+    if out is not None:
+        _write_design(base, answer, out, options, said)
+    return CureResult(answer, found.reached, False)
+
+
+def _write_design(
+    base: Synthesis, answer: dict[str, Any], out: Path, options: Options, said: Progress
+) -> None:
+    """The cured design as a design folder; nothing where there is no cure."""
+    if not answer["reached"]:
+        said.note("no cure: no design is written")
+        return
+    said.stage("cured design")
+    made = cured(base, Upgrades.of_dict(answer["upgrades"]))
+    folder = Folder(out)
+    wanted = design_inputs(made.modelfile, made.catalog)
+    if not folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
+        return
+    files = design_files.texts(made)
+    folder.begin(wanted, design_files.design_provenance(made))
+    design_files.write(folder, made, files)
+    folder.finish("design")
+
+
+def _check(target: float, budget: float | None, without: Collection[str]) -> None:
+    if not 0.0 < target < 1.0:
+        raise InputError(None, "--yield", target, "a share above 0 and below 1, such as 0.99")
+    if budget is not None and not 0.0 <= budget < float("inf"):
+        raise InputError(None, "--budget", budget, "a price >= 0, in euro")
+    for kind in without:
+        if kind not in KINDS:
+            raise InputError(None, "--without", kind, one_of(kind, KINDS))
+
+
+def _studies(place: Folder) -> dict[str, dict[str, str]]:
+    """Verdicts that earlier work left; a damaged file is no reason to stop."""
+    try:
+        studies = json.loads((place / STUDIES).read_bytes())["studies"]
+        return {str(k): {str(b): str(v) for b, v in row.items()} for k, row in studies.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}

@@ -1,0 +1,347 @@
+"""The linear picture of a branch: how far each response is from being lost, in every way it can be
+shown, and what each upgrade takes off the spread.
+
+A limit of ``designer.margins`` is nominal + Σ slope·ξ; a board is ok while every limit is positive.
+Its variance is the sum of what the parts contribute, so with the quantile z of the form's own
+distribution (of boards that are drawn: sums of uniform and normal numbers have no common one) the
+demand "P(limit > 0) is at least the target" reads: variance ≤ (nominal/z)², linear in the choice of
+grades. z depends a little on the choice, so it is taken again of each choice that is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer import margins
+from designer.boards import Boards
+from designer.cure_branch import PLACE, TRIM, Branch
+from designer.cure_program import Demand, Option, Program, Slot
+from designer.cure_slots import PartSlot, part_slots
+from designer.cure_study import VERDICTS, Book, asked, measure, plan_of
+from designer.margins import Margin
+from designer.responses import ModelResponse
+from designer.spread import Spread, draw_many
+from designer.system import Array
+from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
+from designer.verdict import BLOCK, Answer, Question, StudyPlan, count
+from designer.yield_maps import yield_map
+
+SAMPLES = 250
+"""Boards on which a picture is taken: their verdicts choose the limits."""
+DRAWN = 4000
+"""Boards that a linear form's distribution is taken from."""
+CROSSINGS = 4
+"""Lost boards of each response whose way to the loss is followed."""
+MAP_POINTS, MAP_BOARDS, TRIM_BOARDS = 7, 50, 100
+MOVED, TRIMMED = 1.0, 5.0
+"""Trouble of another setting of the generator, and of trimming each board."""
+STREAM = "cure:"
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way of showing a response.
+
+    response : its number. kind : "as it is", "omega", "b" or "trim". place : another than stated.
+    margin : None for trim, which has been measured instead: rate.
+    """
+
+    response: int
+    kind: str
+    question: Question
+    place: Place | None = None
+    margin: Margin | None = None
+    rate: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """branch, its slots part by part, the ways of each response, and the standard deviation of each
+    quantity by name under option j of its slot, over that as it is: ratios[j]."""
+
+    branch: Branch
+    parts: tuple[PartSlot, ...]
+    ways: tuple[tuple[Way, ...], ...]
+    ratios: tuple[Mapping[str, float], ...]
+    trim: float
+    seed: int
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """Of the program: parts, then one for each response."""
+        trouble = {"as it is": 0.0, "omega": MOVED, "b": MOVED, "trim": TRIMMED}
+        ways = [
+            Slot(
+                f"response {number + 1}",
+                tuple(Option(w.kind, 0.0, trouble[w.kind]) for w in row),
+            )
+            for number, row in enumerate(self.ways)
+        ]
+        return (*(p.slot for p in self.parts), *ways)
+
+    def upgrades(self, pick: Sequence[int]) -> Upgrades:
+        """What a choice of options changes."""
+        grades, reference = {}, None
+        for part, i in zip(self.parts, pick, strict=False):
+            if i and part.grades:
+                grades[part.parts[0]] = part.grades[i]
+            elif i:
+                reference = part.models[i]
+        taken = self.taken(pick)
+        return replace(
+            self.branch.upgrades,
+            reference=reference,
+            grades=grades,
+            places={w.response: w.place for w in taken if w.place is not None},
+            trim=self.trim if any(w.kind == "trim" for w in taken) else None,
+        )
+
+    def taken(self, pick: Sequence[int]) -> tuple[Way, ...]:
+        """The way of each response."""
+        chosen = pick[len(self.parts) :]
+        return tuple(row[i] for row, i in zip(self.ways, chosen, strict=True))
+
+    def boards(self, pick: Sequence[int]) -> Boards:
+        """Boards of this choice, for its linear forms."""
+        made = self.branch.made
+        upgrades = replace(self.upgrades(pick), places={}, opamp=None, dead_zone=None, trim=None)
+        modelfile = upgraded_file(made.modelfile, upgrades)
+        circuit = made.design.circuit
+        if upgrades.reference is not None:
+            circuit = with_parts_kept(made, modelfile).design.circuit
+        spread = Spread.of(modelfile, circuit, made.catalog)
+        return draw_many(circuit, spread, self.seed, range(DRAWN), STREAM)
+
+    def predicted(
+        self,
+        pick: Sequence[int],
+        boards: Boards,
+        shrink: Mapping[tuple[int, int], float] | None = None,
+    ) -> tuple[float, ...]:
+        """Share of these boards on which each response's margin is positive.
+
+        shrink : as ``program`` has it.
+        """
+        known = shrink or {}
+        chosen = pick[len(self.parts) :]
+        out = []
+        for w, way in zip(chosen, self.taken(pick), strict=True):
+            if way.margin is None:
+                out.append(way.rate)
+                continue
+            nearer = 1.0 - known.get((way.response, w), 1.0) ** 0.5
+            away = np.array([nearer * limit.distance for limit in way.margin.limits])
+            fine = (way.margin.each(boards) > away).all(axis=1) if len(away) else np.ones(1)
+            out.append(float(fine.mean()))
+        return tuple(out)
+
+    def quantiles(self, target: float, boards: Boards) -> dict[tuple[int, int, int], float]:
+        """z of each limit: (response, way, limit) → how many standard deviations of its form the
+        nominal value has to be above 0 for the target."""
+        found = {}
+        for r, row in enumerate(self.ways):
+            for w, way in enumerate(row):
+                if way.margin is None or not way.margin.limits:
+                    continue
+                each = way.margin.each(boards)
+                for k, limit in enumerate(way.margin.limits):
+                    form = each[:, k] - limit.distance
+                    found[r, w, k] = _quantile(form, target)
+        return found
+
+    def program(
+        self,
+        z: Mapping[tuple[int, int, int], float],
+        shrink: Mapping[tuple[int, int], float],
+        spoiled: frozenset[tuple[int, int]] = frozenset(),
+    ) -> Program:
+        """The program for these quantiles.
+
+        shrink : by (response, way), a factor on the room of its demands: what was learnt where the
+        picture promised too much. spoiled : ways that are not to be taken.
+        """
+        slots, demands = self.slots, list[Demand]()
+        none = tuple(np.zeros(len(s.options)) for s in slots)
+        for r, row in enumerate(self.ways):
+            for w, way in enumerate(row):
+                when = (len(self.parts) + r, w)
+                if (r, w) in spoiled:
+                    demands.append(Demand(f"response {r + 1}: {way.kind}", -1.0, none, when))
+                    continue
+                if way.margin is None:
+                    continue
+                for k, limit in enumerate(way.margin.limits):
+                    shares, fixed = self._shares(way.margin, k)
+                    room = (limit.distance / z[r, w, k]) ** 2 * shrink.get((r, w), 1.0)
+                    rows = list(none)
+                    rows[: len(shares)] = shares
+                    name = f"response {r + 1}: {limit.what}"
+                    demands.append(Demand(name, room - fixed, tuple(rows), when))
+        return Program(slots, tuple(demands))
+
+    def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
+        """What the options of each part add to a limit's variance, and what no upgrade changes, in
+        the limit's own variances."""
+        limit = margin.limits[number]
+        slot_of = {name: k for k, part in enumerate(self.parts) for name in part.parts}
+        shares = [np.zeros(len(p.slot.options)) for p in self.parts]
+        fixed, total = 0.0, 0.0
+        for q, slope in zip(margin.quantities, limit.slopes, strict=True):
+            base = float(slope / limit.sigma) ** 2
+            total += base
+            slot = slot_of.get(q.part)
+            if slot is None or q.group not in ("values", "reference"):
+                fixed += base
+                continue
+            for j in range(len(shares[slot])):
+                shares[slot][j] += base * self.ratios[j].get(q.name, 1.0) ** 2
+        # The limit's own variance is of drawn boards, on which parts that track vary together: what
+        # that adds or takes stays in proportion.
+        own = 1.0 / total if total > 0.0 else 1.0
+        return [row * own for row in shares], fixed * own
+
+
+def _quantile(form: Array, target: float) -> float:
+    """How many standard deviations the form (N,) falls short of 0 in all but ``target`` of cases;
+    at least a little, so that no demand is without bound."""
+    size = float(form.std())
+    if size == 0.0:
+        return 1e-6
+    return max(-float(np.quantile(form, 1.0 - target)) / size, 1e-6)
+
+
+def picture(
+    branch: Branch,
+    target: float,
+    seed: int,
+    book: Book,
+    *,
+    trim: float,
+    without: frozenset[str] = frozenset(),
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> Picture | None:
+    """The picture of a branch; None where its nominal circuit does not show every response.
+
+    trim : half-width of the band of the DC offset. without : kinds of upgrades that are not wanted.
+    progress : called once a piece of work.
+    """
+    made = branch.made
+    parts = part_slots(made, without)
+    questions = [q for q in asked(made, made.found) if q is not None]
+    if len(questions) < len(made.found):
+        return None
+    rows: list[list[Way]] = []
+    for r, question in enumerate(questions):
+        row = [Way(r, "as it is", question)]
+        rows.append(row)
+        plan = plan_of(made, question, seed)
+        seen = measure(plan, target, book, least=SAMPLES, most=SAMPLES, jobs=jobs)
+        progress()
+        if seen.counts.rate >= target:
+            continue
+        if PLACE not in without:
+            row += _moved(branch, r, made.found[r], plan, jobs, progress)
+        if TRIM not in without and trim > 0.0:
+            few = measure(
+                plan, target, book, trim=trim, least=TRIM_BOARDS, most=TRIM_BOARDS, jobs=jobs
+            )
+            progress()
+            row.append(Way(r, "trim", question, rate=few.counts.rate))
+    ways = _with_margins(branch, rows, seed, book, jobs, progress)
+    return Picture(branch, parts, ways, _ratios(branch, parts, seed), trim, seed)
+
+
+def _moved(
+    branch: Branch,
+    number: int,
+    response: ModelResponse,
+    plan: StudyPlan,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Way]:
+    """Other places of a response in its window, where more boards show it: over ω, over b."""
+    out = []
+    for over in ("omega", "b"):
+        found = yield_map(
+            plan, 0, "b" if over == "b" else "omega", response.b,
+            samples=MAP_BOARDS, points=MAP_POINTS, jobs=jobs,
+        )  # fmt: skip
+        progress()
+        if found.recommended is None or found.recommended[0] == found.used:
+            continue
+        value = float(f"{found.recommended[0]:.4g}")
+        place = Place(value, response.b) if over == "omega" else Place(response.omega, value)
+        base = branch.made
+        moved = with_parts_kept(
+            base, upgraded_file(base.modelfile, Upgrades(places={number: place}))
+        )
+        broken = {c.quantity for c in base.design.checks if not c.holds}
+        if any(not c.holds and c.quantity not in broken for c in moved.design.checks):
+            continue
+        question = asked(moved, [moved.found[number]])[0]
+        if question is not None:
+            out.append(Way(number, over, question, place))
+    return out
+
+
+def _with_margins(
+    branch: Branch,
+    rows: Sequence[Sequence[Way]],
+    seed: int,
+    book: Book,
+    jobs: int,
+    progress: Callable[[], None],
+) -> tuple[tuple[Way, ...], ...]:
+    """The ways with their margins; those that are trimmed have none."""
+    made = branch.made
+    asked_for = [w for row in rows for w in row if w.kind != "trim"]
+    circuit = made.design.circuit
+    spread = Spread.of(made.modelfile, circuit, made.catalog)
+    by = []
+    for w in asked_for:
+        plan = StudyPlan(circuit, spread, seed, SAMPLES, (w.question,))
+        letters = "".join(book.block(plan, block, None, jobs)[0] for block in plan.blocks(BLOCK))
+        by.append([_answer(sample, letter) for sample, letter in enumerate(letters)])
+        progress()
+    boards = draw_many(circuit, spread, seed, range(SAMPLES))
+    found = margins.margins(
+        circuit,
+        [w.question for w in asked_for],
+        boards,
+        by,
+        count=CROSSINGS,
+        jobs=jobs,
+        progress=progress,
+    )
+    known = {
+        id(w): replace(w, margin=m, rate=count(row).rate)
+        for w, m, row in zip(asked_for, found, by, strict=True)
+    }
+    return tuple(tuple(known.get(id(w), w) for w in row) for row in rows)
+
+
+def _answer(sample: int, letter: str) -> Answer:
+    """As much of an answer as margins need."""
+    nan = float("nan")
+    return Answer(sample, 0, VERDICTS[letter], "", "", nan, nan, nan, nan, 0)
+
+
+def _ratios(
+    branch: Branch, parts: Sequence[PartSlot], seed: int
+) -> tuple[Mapping[str, float], ...]:
+    """Under option j of every slot (its last, where it has fewer), the standard deviation of each
+    quantity over that as it is."""
+    most = max((len(p.slot.options) for p in parts), default=1)
+    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    columns: list[dict[str, float]] = []
+    names = [name for p in parts for name in p.parts]
+    for j in range(most):
+        boards = bare.boards([min(j, len(p.slot.options) - 1) for p in parts])
+        known = {**boards.values, **boards.reference}
+        columns.append({name: float(np.std(known[name])) for name in names})
+    base = columns[0]
+    return tuple({n: c[n] / base[n] if base[n] > 0.0 else 1.0 for n in names} for c in columns)

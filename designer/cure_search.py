@@ -1,0 +1,376 @@
+"""The search for the cheapest cure: upgrades that bring every wanted response to the yield that is
+asked for (docs/cure.md).
+
+Rounds of choosing and measuring. Each branch (``cure_branch``) has a linear picture
+(``cure_picture``); the cheapest choice of upgrades that it promises to be enough is found by
+mixed-integer optimisation (``cure_program``) and put to fresh boards on the exact rung. A response
+that falls short has its demand tightened by what was measured, and the next round chooses again.
+Branches are made only as far as they may be cheaper than what is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from designer.api import Synthesis
+from designer.boards import Boards
+from designer.cure_branch import Branch, Refused, applied, branches
+from designer.cure_picture import Picture, Way, picture
+from designer.cure_program import Program, cheapest
+from designer.cure_study import Book, asked, fresh, measure, plan_of
+from designer.cure_trial import Cure, Trial, measured_none
+from designer.preconditions import cores, need_responses
+from designer.progress import Progress
+from designer.upgrade import Upgrades
+
+ROUNDS = 10
+"""Choices that are measured before the search gives up."""
+TRIES = 16
+"""Programs that are solved for one choice: each takes the quantiles of the one before."""
+TIGHTER = 0.95
+"""Of a demand's room: the least by which it is tightened where a promise was not kept."""
+FRONT_TARGETS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
+FRONT_POINTS = 5
+"""Points of the front that are measured beside those of the rounds."""
+FRONT_BOARDS = 500
+LARGEST_STEP = 2.0
+"""The factor by which a measurement brings a loss nearer than the picture has it, at most: one that
+is so wrong says little about by how much."""
+
+
+def find_cure(
+    base: Synthesis,
+    target: float,
+    *,
+    budget: float | None = None,
+    trim: float = 0.0,
+    without: frozenset[str] = frozenset(),
+    seed: int = 1,
+    jobs: int | None = None,
+    book: Book | None = None,
+    progress: Progress | None = None,
+) -> Cure:
+    """Search, in memory.
+
+    target : yield that the whole 95 % interval of every response is to reach. budget : most that
+    upgrades may cost [euro]. trim : half-width of the band of the generator's DC offset. without :
+    kinds of upgrades that are not wanted (``cure_branch.KINDS``). book : verdicts that are known.
+
+    Raises
+    ------
+    InputError : the model file names no response, or a place of a response is no choice.
+    """
+    need_responses(base.modelfile)
+    said = Progress() if progress is None else progress
+    book = Book() if book is None else book
+    threads = cores() if jobs is None else jobs
+    search = _Search(base, target, budget, trim, without, seed, threads, book, said)
+    return search.run()
+
+
+class _Search:
+    def __init__(
+        self,
+        base: Synthesis,
+        target: float,
+        budget: float | None,
+        trim: float,
+        without: frozenset[str],
+        seed: int,
+        jobs: int,
+        book: Book,
+        said: Progress,
+    ) -> None:
+        self.base, self.target, self.budget, self.trim = base, target, budget, trim
+        self.without, self.seed, self.jobs, self.book, self.said = without, seed, jobs, book, said
+        self.waiting = branches(base, without)
+        self.known: list[Branch] = []
+        self.pictures: list[Picture] = []
+        self.refused: list[Refused] = []
+        self.shrink: dict[tuple[int, int, int], float] = {}
+        self.spoiled: set[tuple[int, int, int]] = set()
+        self.fell_short: dict[tuple[int, tuple[int, ...]], list[int]] = {}
+        self.unseen: list[int] = []
+
+    def run(self) -> Cure:
+        before = self.before = self._before()
+        if before.reached:
+            return self._answer(before, [], True, "every response is there already")
+        rounds: list[Trial] = []
+        for number in range(ROUNDS):
+            found = self._choice(self.target)
+            if found is None:
+                why = "no choice of upgrades is enough in the linear picture"
+                return self._answer(before, rounds, False, why)
+            which, pick, predicted = found
+            cost = self._price(which, pick)
+            if self.budget is not None and cost > self.budget + 1e-9:
+                why = f"the cheapest choice that may be enough costs {cost:.2f} euro"
+                return self._answer(before, rounds, False, why)
+            trial = self._trial(which, pick, predicted, 2 + number, f"round {number + 1}")
+            rounds.append(trial)
+            if trial.reached:
+                return self._answer(before, rounds, True, "measured on fresh boards")
+            self._learn(which, pick, trial)
+        return self._answer(before, rounds, False, f"not within {ROUNDS} rounds")
+
+    def _before(self) -> Trial:
+        """The design as it is, on fresh boards."""
+        step = self.said.stage("the design as it is")
+        made, trials = self.base, []
+        for number, question in enumerate(asked(made, made.found)):
+            if question is None:
+                self.unseen.append(number)
+                trials.append(measured_none(self.target))
+                continue
+            plan = plan_of(made, question, fresh(self.seed, 1))
+            trials.append(measure(plan, self.target, self.book, jobs=self.jobs, progress=step))
+        rates = tuple(m.rate for m in trials)
+        return Trial("as it is", Upgrades(), 0.0, rates, tuple(trials), self.target)
+
+    def _choice(self, target: float) -> tuple[int, tuple[int, ...], tuple[float, ...]] | None:
+        """The cheapest choice over all branches: its picture's number, the options, the promise.
+
+        Branches that have no picture yet get one where they may be cheaper."""
+        best: tuple[float, int, tuple[int, ...], tuple[float, ...]] | None = None
+        for which in range(len(self.pictures)):
+            best = self._better(best, which, target)
+        while (made := self._next_branch(None if best is None else best[0])) is not None:
+            self.said.stage(f"margins, {made.name}")
+            step = self.said.stage(f"linear picture, {made.name}")
+            found = picture(
+                made,
+                self.target,
+                fresh(self.seed, 0),
+                self.book,
+                trim=self.trim,
+                without=self.without,
+                jobs=self.jobs,
+                progress=step,
+            )
+            if found is None:
+                why = "the nominal circuit does not show every response"
+                self.refused.append(Refused(made.upgrades, why))
+                continue
+            self.pictures.append(found)
+            if made.upgrades == Upgrades():  # it has been measured
+                self._learn(0, tuple(0 for _ in found.slots), self.before)
+            best = self._better(best, len(self.pictures) - 1, target)
+        return None if best is None else best[1:]
+
+    def _next_branch(self, least: float | None) -> Branch | None:
+        """A branch that has no picture and may be cheaper than ``least``: None where there is none.
+
+        All are made as soon as one is asked for beyond the first: their prices must be known.
+        """
+        if not self.pictures and not self.known and not self.refused:
+            first = next(self.waiting)
+            assert isinstance(first, Branch)
+            return first
+        if least is not None and least <= 0.0:
+            return None
+        for made in self.waiting:
+            self.said.stage("other op-amps and dead zones")
+            if isinstance(made, Refused):
+                self.refused.append(made)
+            else:
+                self.known.append(made)
+        self.known.sort(key=lambda b: b.extra)
+        if self.known and (least is None or self.known[0].extra < least):
+            return self.known.pop(0)
+        return None
+
+    def _better(
+        self,
+        best: tuple[float, int, tuple[int, ...], tuple[float, ...]] | None,
+        which: int,
+        target: float,
+    ) -> tuple[float, int, tuple[int, ...], tuple[float, ...]] | None:
+        found = self._of_picture(which, target)
+        if found is None:
+            return best
+        cost = self._cost(which, found[0])
+        return (cost, which, *found) if best is None or cost < best[0] - 1e-12 else best
+
+    def _of_picture(
+        self, which: int, target: float
+    ) -> tuple[tuple[int, ...], tuple[float, ...]] | None:
+        """The cheapest choice on one branch that its picture promises to be enough."""
+        seen = self.pictures[which]
+        base = tuple(0 for _ in seen.slots)
+        z = seen.quantiles(target, seen.boards(base))
+        shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
+        spoiled = frozenset((r, w) for k, r, w in self.spoiled if k == which)
+        spoiled |= {
+            (r, w)
+            for r, row in enumerate(seen.ways)
+            for w, way in enumerate(row)
+            if way.margin is None and way.rate < target
+        }
+        enough: dict[tuple[int, ...], tuple[float, ...]] = {}
+        tried: set[tuple[int, ...]] = set()
+        for _ in range(TRIES):
+            program = seen.program(z, shrink, spoiled)
+            pick = cheapest(program)
+            if pick is None or (pick in tried and pick in enough):
+                break
+            tried.add(pick)
+            boards = seen.boards(pick)
+            promised = seen.predicted(pick, boards, shrink)
+            short = [r for r, share in enumerate(promised) if share < target]
+            if target >= self.target:
+                short = sorted({*short, *self.fell_short.get((which, pick), [])})
+            if short:
+                for r in short:
+                    key = r, pick[len(seen.parts) + r]
+                    shrink[key] = shrink.get(key, 1.0) * _cut(program, pick, key, len(seen.parts))
+            else:
+                enough[pick] = promised
+            z = seen.quantiles(target, boards)
+        if not enough:
+            return None
+        pick = min(enough, key=lambda p: (self._cost(which, p), p))
+        return pick, enough[pick]
+
+    def _price(self, which: int, pick: Sequence[int]) -> float:
+        seen = self.pictures[which]
+        return seen.branch.extra + Program(seen.slots, ()).price(pick)
+
+    def _cost(self, which: int, pick: Sequence[int]) -> float:
+        seen = self.pictures[which]
+        return seen.branch.extra + Program(seen.slots, ()).cost(pick)
+
+    def _trial(
+        self,
+        which: int,
+        pick: Sequence[int],
+        predicted: tuple[float, ...],
+        number: int,
+        name: str,
+        most: int | None = None,
+    ) -> Trial:
+        """A choice, measured on boards that nobody has seen."""
+        seen = self.pictures[which]
+        cost = self._price(which, pick)
+        step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
+        upgrades = seen.upgrades(pick)
+        made = applied(seen.branch, upgrades)
+        found = []
+        for way, question in zip(seen.taken(pick), asked(made, made.found), strict=True):
+            if question is None:
+                found.append(measured_none(self.target))
+                continue
+            plan = plan_of(made, question, fresh(self.seed, number))
+            trim = upgrades.trim if way.kind == "trim" else None
+            found.append(
+                measure(
+                    plan,
+                    self.target,
+                    self.book,
+                    trim=trim,
+                    jobs=self.jobs,
+                    progress=step,
+                    **({} if most is None else {"least": most, "most": most}),
+                )
+            )
+        return Trial(seen.branch.name, upgrades, cost, predicted, tuple(found), self.target)
+
+    def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
+        """Tighten what was promised and not kept."""
+        seen = self.pictures[which]
+        short = [r for r, m in enumerate(trial.measured) if not m.reached]
+        self.fell_short[which, tuple(pick)] = short
+        boards = seen.boards(pick)
+        for r, (way, m) in enumerate(zip(seen.taken(pick), trial.measured, strict=True)):
+            if m.reached:
+                continue
+            w = pick[len(seen.parts) + r]
+            if way.margin is None or not way.margin.limits:
+                self.spoiled.add((which, r, w))
+                continue
+            # The upper end of what the measurement allows: the cheapest is come upon from below.
+            key, rate = (which, r, w), m.counts.interval[1]
+            self.shrink[key] = min(self.shrink.get(key, 1.0), _shown(way, boards, rate))
+
+    def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
+        limits = tuple(self._limit(r) for r in range(len(self.base.found)))
+        return Cure(
+            self.base,
+            self.target,
+            self.budget,
+            before,
+            tuple(rounds),
+            reached,
+            why,
+            limits,
+            self._front(before, rounds),
+            tuple(self.refused),
+            tuple(self.pictures),
+        )
+
+    def _limit(self, number: int) -> str:
+        """What comes first on the way to losing a response, with nothing upgraded."""
+        if number in self.unseen:
+            return "the nominal circuit does not show it"
+        if not self.pictures:
+            return ""
+        way = self.pictures[0].ways[number][0]
+        if way.margin is None or not way.margin.limits:
+            return "nothing within the spread"
+        limit = way.margin.limits[0]
+        weights = sorted(
+            zip(way.margin.quantities, limit.slopes**2, strict=True), key=lambda x: -float(x[1])
+        )
+        names = ", ".join(q.name for q, _ in weights[:3])
+        return f"{limit.what}, {limit.distance:.2g} standard deviations away, mostly {names}"
+
+    def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
+        """Trials by price, each with a higher worst yield than any cheaper one: those of the rounds
+        and the choices for other targets, as the pictures are known now."""
+        trials = [before, *rounds]
+        seen = {(t.branch, repr(t.upgrades)) for t in trials}
+        found: list[tuple[int, tuple[int, ...], tuple[float, ...]]] = []
+        for target in FRONT_TARGETS if self.pictures else ():
+            options = [(k, got) for k in range(len(self.pictures))
+                       if (got := self._of_picture(k, target)) is not None]  # fmt: skip
+            if not options:
+                break
+            which, (pick, promised) = min(options, key=lambda x: (self._cost(x[0], x[1][0]), x[0]))
+            if (which, pick, promised) not in found:
+                found.append((which, pick, promised))
+        for which, pick, promised in found:
+            picked = self.pictures[which]
+            key = picked.branch.name, repr(picked.upgrades(pick))
+            if key in seen or len(trials) > len(rounds) + FRONT_POINTS:
+                continue
+            seen.add(key)
+            trials.append(self._trial(which, pick, promised, 1, "front", FRONT_BOARDS))
+        trials.sort(key=lambda t: (t.price, -t.worst.rate))
+        front: list[Trial] = []
+        for t in trials:
+            if not front or t.worst.rate > front[-1].worst.rate:
+                front.append(t)
+        return tuple(front)
+
+
+def _cut(program: Program, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
+    """A factor on a way's room under which this choice no longer keeps its demands."""
+    r, w = key
+    own = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]
+    shares = [d.variance(pick) / d.room for d in own]
+    return min(TIGHTER, 0.999 * max(shares, default=1.0))
+
+
+def _shown(way: Way, boards: Boards, rate: float) -> float:
+    """By which factor the room of a way's demands is to shrink for the picture to promise what was
+    measured: the square of the ratio of the distances at which that share of boards is lost; 1
+    where more are ok than was promised."""
+    assert way.margin is not None
+    form = way.margin.of(boards)
+    middle = float(np.median(form))
+    shown = middle - float(np.quantile(form, min(1.0 - rate, 0.5)))
+    if middle <= 0.0 or shown >= middle:
+        return 1.0
+    return max((shown / middle) ** 2, 1.0 / LARGEST_STEP**2)

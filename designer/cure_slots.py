@@ -1,0 +1,108 @@
+"""What can be upgraded part by part: slots of the program, with what each option costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from designer.api import Synthesis
+from designer.catalog import Catalog
+from designer.catalogentry import Kind
+from designer.circuit import Capacitor, Resistor
+from designer.cure_branch import GRADE, REFERENCE
+from designer.cure_program import Option, Slot
+from designer.errors import Unreachable
+from designer.partgrades import bought
+
+CHANGED = 0.01
+"""Trouble of one part that is bought at another grade: of two free choices, the smaller change."""
+
+
+@dataclass(frozen=True)
+class PartSlot:
+    """One part, or all references together.
+
+    slot : its options. parts : those whose value it decides. grades, models : of each option, the
+    first as it is; grades of a part, models of the references.
+    """
+
+    slot: Slot
+    parts: tuple[str, ...]
+    grades: tuple[float, ...] = ()
+    models: tuple[str, ...] = ()
+
+
+def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
+    """Every part of which a better grade can be bought, in the circuit's order; then the
+    references.
+
+    A part whose value was measured, or whose grade is not that of anything sold, stays as it is.
+    """
+    spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
+    own = bought(made.modelfile, circuit, catalog)
+    measured = made.modelfile.measured
+    known = set() if measured is None else set(measured.values)
+    out = []
+    if GRADE not in without:
+        stated = {name for rule in made.modelfile.spread.part for name in rule.names}
+        kinds = {"resistors", "capacitors"} & stated
+        every: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)
+        for part in every:
+            kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
+            if part.name in known or (f"{kind}s" in kinds and part.name not in own):
+                continue
+            if part.name in stated and part.name not in own:
+                continue
+            usual = spec.resistor_grade if kind == "resistor" else spec.capacitor_grade
+            found = _grades(catalog, kind, part, own.get(part.name, usual))
+            if found is not None:
+                out.append(found)
+    if REFERENCE not in without:
+        out += _references(made)
+    return tuple(out)
+
+
+def _grades(
+    catalog: Catalog, kind: Kind, part: Resistor | Capacitor, now: float
+) -> PartSlot | None:
+    """The slot of one part; None where nothing better is sold. A dearer grade that is no better
+    than a cheaper one is left out."""
+    base = catalog.part(kind, part.value, now)
+    better = {f.grade for f in catalog.families if f.kind == kind and f.grade < now * (1.0 - 1e-9)}
+    options, grades = [Option(f"{100.0 * now:g} %", 0.0)], [now]
+    for grade in sorted(better):
+        try:
+            sold = catalog.part(kind, part.value, grade)
+        except Unreachable:
+            continue
+        extra = catalog.euro(sold.price) - catalog.euro(base.price)
+        if all(extra < o.price for o in options[1:]):
+            options.append(Option(f"{100.0 * grade:g} %", extra, CHANGED))
+            grades.append(grade)
+    if len(options) == 1:
+        return None
+    return PartSlot(Slot(part.name, tuple(options)), (part.name,), grades=tuple(grades))
+
+
+def _references(made: Synthesis) -> Sequence[PartSlot]:
+    circuit, catalog = made.design.circuit, made.catalog
+    if not circuit.references:
+        return []
+    now = catalog.reference(circuit.references[0].model)
+    same = [
+        r
+        for r in catalog.references
+        if abs(r.voltage - now.voltage) < 1e-9 * now.voltage
+        and r.grade < now.grade
+        and r.least_current <= now.least_current
+    ]
+    if not same:
+        return []
+    count = len(circuit.references)
+    options = [Option(now.name, 0.0)]
+    for r in same:
+        extra = count * (catalog.euro(r.price) - catalog.euro(now.price))
+        options.append(Option(r.name, extra, CHANGED))
+    models = (now.name, *(r.name for r in same))
+    slot = Slot("references", tuple(options))
+    return [PartSlot(slot, tuple(r.name for r in circuit.references), models=models)]

@@ -1,0 +1,62 @@
+"""What the command line says about a cure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def text(answer: Mapping[str, Any]) -> str:
+    """The answer, yields before and after, rounds and the front, as lines of text.
+
+    answer : the JSON object of ``cure_json``.
+    """
+    percent = f"{100.0 * answer['target']:g} %"
+    lines = []
+    if answer["reached"]:
+        lines.append(f"every response at {percent} or better for {answer['price']:.2f} euro:")
+        lines += [f"  {said}" for said in answer["said"]] or ["  nothing has to change"]
+    else:
+        lines.append(f"{percent} not reached: {answer['why']}")
+        best = "; ".join(answer["said"]) or "the design as it is"
+        lines.append(f"  best measured, {answer['price']:.2f} euro: {best}")
+    lines += ["", "response            before                  after", *_responses(answer)]
+    for number, trial in enumerate(answer["rounds"], start=1):
+        lines += ["", f"round {number}, {trial['price']:.2f} euro: " + _said(trial)]
+        for r, (promised, m) in enumerate(
+            zip(trial["predicted"], trial["measured"], strict=True), start=1
+        ):
+            lines.append(f"  response {r}: promised {promised:.4f}, measured {_yield(m)}")
+    lines += ["", "price     worst response          upgrades"]
+    for trial in answer["front"]:
+        worst = min(trial["measured"], key=lambda m: (_rate(m), m["low"]))
+        lines.append(f"{trial['price']:<9.2f} {_yield(worst):<23} {_said(trial)}")
+    lines += [
+        "",
+        *(f"not built: {'; '.join(r['upgrades'])}: {r['why']}" for r in answer["refused"]),
+    ]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _responses(answer: Mapping[str, Any]) -> list[str]:
+    out = []
+    for r in answer["responses"]:
+        name = f"ω = {r['omega']:g} {r['expected'] or ''}".strip()
+        out.append(f"{name:<19} {_yield(r['before']):<23} {_yield(r['after'])}")
+        if r["limit"]:
+            out.append(f"    {r['limit']}")
+    return out
+
+
+def _said(trial: Mapping[str, Any]) -> str:
+    return "; ".join(trial["said"]) or "as it is"
+
+
+def _rate(m: Mapping[str, Any]) -> float:
+    return 0.0 if m["rate"] is None else float(m["rate"])
+
+
+def _yield(m: Mapping[str, Any]) -> str:
+    if m["rate"] is None:
+        return "not shown"
+    return f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"

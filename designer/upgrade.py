@@ -1,0 +1,180 @@
+"""Upgrades of a design, and the model file and the circuit that have them.
+
+Everything that an upgrade changes stands in the model file afterwards, so the upgraded design is a
+design like any other: parts of a better grade are ``[[spread.part]]``, parts that track
+``[[spread.network]]``, a response at another place of its window has another ``omega`` or ``b``,
+and a DC offset that is trimmed on each board is the band of ``[tuning]``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from designer import conditions, loads, matching, topology
+from designer.api import Synthesis
+from designer.board_parts import board_circuit
+from designer.bom import bill
+from designer.catalog import Catalog
+from designer.circuit import Circuit, nominal_board
+from designer.coefficients import coefficient_errors
+from designer.components import components
+from designer.design import Certificate, Design
+from designer.modelfile import ModelFile, parse_model_file
+from designer.reduction import Reduction
+from designer.responses import ModelResponse, find, peaks
+from designer.toml_text import toml_text
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in its window a response is shown, in the model's units."""
+
+    omega: float
+    b: float
+
+
+@dataclass(frozen=True)
+class Upgrades:
+    """What is changed; None and empty: as it is.
+
+    grades : fractions by part. places : by number of the response. trim : half-width of the band of
+    the generator's DC offset over its amplitude, within which each board is trimmed.
+    """
+
+    opamp: str | None = None
+    dead_zone: str | None = None
+    reference: str | None = None
+    grades: Mapping[str, float] = field(default_factory=dict)
+    places: Mapping[int, Place] = field(default_factory=dict)
+    trim: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; responses are counted from 1."""
+        places = [{"response": i + 1, **asdict(p)} for i, p in sorted(self.places.items())]
+        return {
+            "opamp": self.opamp,
+            "dead_zone": self.dead_zone,
+            "reference": self.reference,
+            "grades": dict(sorted(self.grades.items())),
+            "places": places,
+            "trim": self.trim,
+        }
+
+    @classmethod
+    def of_dict(cls, said: Mapping[str, Any]) -> Upgrades:
+        """What ``as_dict`` gave."""
+        return cls(
+            opamp=said["opamp"],
+            dead_zone=said["dead_zone"],
+            reference=said["reference"],
+            grades=dict(said["grades"]),
+            places={p["response"] - 1: Place(p["omega"], p["b"]) for p in said["places"]},
+            trim=said["trim"],
+        )
+
+
+def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
+    """The model file that says all this; the same object where nothing is changed.
+
+    A stated saturation belongs to the op-amp it was stated for: another one has its own.
+    """
+    if upgrades == Upgrades():
+        return modelfile
+    data = tomllib.loads(modelfile.text)
+    circuit = data.setdefault("circuit", {})
+    if upgrades.opamp is not None:
+        circuit["opamp"] = upgrades.opamp
+        circuit.pop("saturation", None)
+    if upgrades.dead_zone is not None:
+        circuit["dead_zone"] = upgrades.dead_zone
+    if upgrades.reference is not None:
+        circuit["reference"] = upgrades.reference
+    for number, place in upgrades.places.items():
+        response = data["response"][number]
+        response.pop("Omega", None)
+        response |= {"omega": place.omega, "b": place.b}
+    if upgrades.trim is not None:
+        data["tuning"] = {"frequency": 0.0, "amplitude": 0.0, "offset": upgrades.trim}
+    parts = data.setdefault("spread", {}).setdefault("part", [])
+    for grade in sorted(set(upgrades.grades.values())):
+        names = [name for name, own in upgrades.grades.items() if own == grade]
+        parts.append({"names": names, "grade": grade})
+    read = parse_model_file(toml_text(data), modelfile.source)
+    return replace(read, title=modelfile.title, measured=modelfile.measured)
+
+
+def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
+    """The design's parts with the op-amp and the references that this file names."""
+    spec, model = modelfile.circuit, modelfile.model
+    system = model.second_order()
+    opamp = catalog.opamp(spec.opamp)
+    return topology.build(
+        matching.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
+        design.circuit.values,
+        opamp,
+        supply=design.circuit.supply,
+        saturation=spec.saturation or opamp.saturation_at(spec.supply),
+        clearance="A" if model.k0 > 0.0 else None,
+        zone=topology.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+        composites=design.composites,
+    )
+
+
+def with_parts_kept(base: Synthesis, modelfile: ModelFile) -> Synthesis:
+    """The base's parts in a design for another model file, verified afresh.
+
+    The file differs in what ``Upgrades`` changes but for the dead zone. Its design's ``checks`` say
+    whether the side conditions still hold.
+
+    Raises
+    ------
+    InputError : the catalogue does not know a part.
+    """
+    model, catalog = modelfile.model, base.catalog
+    circuit = rebuilt(base.design, modelfile, catalog)
+    found = _found(base, modelfile)
+    held = peaks(model, found)
+    swing = float((base.design.errors.scales.volts * held.states).max()), held.states
+    errors = coefficient_errors(
+        circuit, model.second_order(), swing=None if circuit.stops else swing
+    )
+    design = replace(
+        base.design,
+        circuit=circuit,
+        errors=errors,
+        certificate=Certificate("bound", 0.0, "the parts are those of the design that was cured"),
+        binding={},
+    )
+    kept = modelfile.circuit.kept
+    amplitudes = [design.amplitude(r.b) for r in found] or [design.amplitude()]
+    needed = None
+    if found and kept & {"swing", "load"}:
+        needed = loads.design_loads(design, Reduction(circuit, nominal_board(circuit)), found)
+    checks = conditions.verify(design, kept, catalog.opamp(circuit.opamp), held, amplitudes, needed)
+    stated = {c.quantity: c.limit for c in base.design.checks}
+    numbers = {k: v for k, v in base.design.conditions.items() if k not in stated}
+    design = replace(
+        design, checks=checks, conditions=numbers | {c.quantity: c.limit for c in checks}
+    )
+    return replace(base, modelfile=modelfile, found=found, design=design)
+
+
+def _found(base: Synthesis, modelfile: ModelFile) -> tuple[ModelResponse, ...]:
+    """The model's responses; those that stay where they were are not sought again."""
+    known = dict(zip(base.modelfile.responses, base.found, strict=True))
+    return tuple(
+        known[spec] if spec in known else find(modelfile.model, [spec])[0]
+        for spec in modelfile.responses
+    )
+
+
+def price(made: Synthesis) -> float:
+    """Of everything on its bill of materials, in euro, with the catalogue's price of each class."""
+    circuit, choice = board_circuit(made)
+    lines = bill(components(circuit, made.catalog, choice))
+    return float(np.sum([x.quantity * made.catalog.euro(x.price_class) for x in lines]))
