@@ -10,16 +10,16 @@ from designer.bom_layouts import file_of, layouts
 from designer.components import components
 from designer.modelfile import ModelFile
 
-BILL, NOTES, DRAWING = "bom.csv", "board.md", "schematic.svg"
+BILL, NOTES, DRAWING, PICTURE = "bom.csv", "board.md", "schematic.svg", "schematic.png"
 
 
 def names(modelfile: ModelFile) -> list[str]:
     """The names of these files for a model."""
-    return [BILL, NOTES, DRAWING, *(file_of(name) for name in modelfile.board.bom)]
+    return [BILL, NOTES, DRAWING, PICTURE, *(file_of(name) for name in modelfile.board.bom)]
 
 
 def texts(made: Synthesis) -> dict[str, str]:
-    """Their content by name.
+    """The content of all but the picture, by name.
 
     Raises
     ------
@@ -38,3 +38,11 @@ def texts(made: Synthesis) -> dict[str, str]:
         DRAWING: drawing.svg(circuit, made.modelfile.title),
         **{layout.file: layout.csv(bought) for layout in others},
     }
+
+
+def picture(made: Synthesis) -> bytes:
+    """The drawing once more, as points."""
+    from designer import drawing
+
+    circuit, _ = board_circuit(made)
+    return drawing.png(circuit, made.modelfile.title)

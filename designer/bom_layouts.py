@@ -14,6 +14,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from designer.bom import COLUMNS, Line, csv_text
+from designer.catalog import LAYOUTS
 from designer.errors import InputError
 from designer.schema import (
     STRICT,
@@ -27,7 +28,6 @@ from designer.schema import (
     parse_toml,
 )
 
-FOLDER = "bom-layouts"
 FIELDS = (*COLUMNS, "package", "comment")
 """What a column may show: a field of the bill; the footprint's name; value, grade and number."""
 _MAX_BYTES = 100_000
@@ -93,10 +93,10 @@ def layouts(names: Sequence[str], folders: Sequence[Path]) -> tuple[Layout, ...]
 
 def _layout(name: str, folders: Sequence[Path]) -> Layout:
     for folder in folders:
-        path = folder / FOLDER / f"{name}.toml"
+        path = folder / LAYOUTS / f"{name}.toml"
         if path.is_file():
             return _read(name, path)
-    known = {p.stem for folder in folders for p in (folder / FOLDER).glob("*.toml")}
+    known = {p.stem for folder in folders for p in (folder / LAYOUTS).glob("*.toml")}
     raise InputError(None, "board.bom", name, one_of(name, sorted(known)))
 
 

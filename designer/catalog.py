@@ -72,6 +72,8 @@ __all__ = [
 ENVIRONMENT = "DESIGNER_CATALOGS"
 """Environment variable: folders to search first, separated as in PATH."""
 
+LAYOUTS = "bom-layouts"
+"""Folder of layouts beside the catalogue's files (``designer.bom_layouts``)."""
 _SAME = 1e-9  # relative; values and grades closer than this are the same
 _NamedT = TypeVar("_NamedT", OpAmp, Diode, Reference)
 _CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
@@ -81,8 +83,8 @@ _CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
 class Catalog:
     """Everything that the folders hold; earlier entries come from earlier folders.
 
-    ``hash`` is of the content of all files, wherever they lie. mounting : the cases that a board
-    takes; what is sold in no such case is no choice.
+    ``hash`` is of the content of all files, wherever they lie, layouts of bills among them.
+    mounting : the cases that a board takes; what is sold in no such case is no choice.
     """
 
     families: tuple[PartFamily, ...]
@@ -311,6 +313,10 @@ def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry],
             if key in found:
                 raise InputError(path, "name", entry.name, "names that this folder uses once")
             found[key] = entry
+    for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
+        content = path.read_bytes()
+        digest.update(f"{LAYOUTS}/{path.name} {len(content)}\n".encode())
+        digest.update(content)
     return found
 
 

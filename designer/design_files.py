@@ -46,6 +46,7 @@ def texts(made: Synthesis) -> dict[str, str]:
 def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str, Any]:
     for name, text in files.items():
         folder.write(name, text)
+    folder.write(board_files.PICTURE, board_files.picture(made))
     if made.modelfile.measured is not None:
         folder.write(MEASURED, made.modelfile.measured.content)
     folder.write(

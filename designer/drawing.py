@@ -7,6 +7,7 @@ model file enters through the title only, and is escaped.
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -50,6 +51,7 @@ CLEAR = 0.6
 """Between the lowest feedback's role and the op-amp."""
 OPAMP = 2.17
 """Length of the op-amp's symbol."""
+_TAG, _DIGITS = re.compile(r"<[^>]*>"), re.compile(r"-?\d+\.\d{4,}")
 _LIKE = str.maketrans({"&": "+", "<": "‹", ">": "›", "$": "S"})
 IN2 = 1.25
 """How far its lower input is below the upper one."""
@@ -59,10 +61,11 @@ def svg(circuit: Circuit, title: str = "") -> str:
     """The drawing as SVG text: equal circuits and titles give equal bytes."""
     page = _Page("svg")
     page.draw(circuit, title)
-    return page.drawing.get_imagedata("svg").decode("utf-8")
+    text: str = page.drawing.get_imagedata("svg").decode("utf-8")
+    return _TAG.sub(lambda tag: _DIGITS.sub(lambda n: f"{float(n[0]):.3f}", tag[0]), text)
 
 
-def png(circuit: Circuit, title: str = "", dpi: int = 100) -> bytes:
+def png(circuit: Circuit, title: str = "", dpi: int = 72) -> bytes:
     """The drawing as PNG."""
     from designer.plots import style  # matplotlib is needed for this alone
 
@@ -73,10 +76,12 @@ def png(circuit: Circuit, title: str = "", dpi: int = 100) -> bytes:
 
 
 class _Page:
-    def __init__(self, canvas: Canvas, dpi: int = 100) -> None:
+    def __init__(self, canvas: Canvas, dpi: int = 72) -> None:
         self.canvas = canvas
         self.drawing = schemdraw.Drawing(canvas=canvas, show=False, dpi=dpi)
-        self.drawing.config(font="sans-serif", fontsize=NAME_SIZE, lw=1.0, margin=0.5)
+        self.drawing.config(
+            font="sans-serif", fontsize=NAME_SIZE, lw=1.0, margin=0.5, bgcolor="white"
+        )
 
     def draw(self, circuit: Circuit, title: str) -> None:
         x, y = 0.0, 0.0

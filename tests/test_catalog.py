@@ -189,8 +189,39 @@ def test_every_value_of_every_family_has_its_part_number(catalog: Catalog) -> No
             number = rule.of(value)
             code = number.removeprefix(rule.prefix).removesuffix(rule.suffix)
             assert decode_value(rule.code, code) == value
+            assert rule.value(number) == value
             assert number not in numbers
             numbers.add(number)
+
+
+@pytest.mark.parametrize(
+    ("family", "value", "number"),
+    [
+        # Of distributors' lists and published parts lists; each rule also has its file's example.
+        ("Yageo RC0603FR-07", 22.1e3, "RC0603FR-0722K1L"),
+        ("Yageo RT0603BRD07", 10e3, "RT0603BRD0710KL"),
+        ("Vishay CRCW0603 F", 45.3e3, "CRCW060345K3FKEA"),
+        ("Vishay TNPW0603 B", 40.2e3, "TNPW060340K2BEEA"),
+        ("Vishay TNPW0603 B", 21.5e3, "TNPW060321K5BEEA"),
+        ("Vishay MRS25 F", 18.2, "MRS25000C1829FC100"),
+        ("Yageo MFP-25BRD52", 10e3, "MFP-25BRD52-10K"),
+        ("Yageo MFP-25BRD52", 120.0, "MFP-25BRD52-120R"),
+        ("Murata GRM1885C1H J", 10e-9, "GRM1885C1H103JA01D"),
+        ("Murata GRM31C5C1H J", 100e-9, "GRM31C5C1H104JA01L"),
+        ("KEMET C0603 F 50 V", 1e-9, "C0603C102F5GACTU"),
+        ("KEMET C320 X7R 50 V", 100e-9, "C320C104K5R5TA"),
+        ("Panasonic FC 50 V", 10e-6, "EEU-FC1H100"),
+    ],
+)
+def test_published_numbers_both_ways(
+    catalog: Catalog, family: str, value: float, number: str
+) -> None:
+    (found,) = [each for each in catalog.families if each.name == family]
+    assert found.part_number.of(value) == number
+    assert found.part_number.value(number) == value
+    assert value in found.values
+    with pytest.raises(ValueError, match="not a part number"):
+        found.part_number.value(f"x{number}")
 
 
 @given(data=st.data())

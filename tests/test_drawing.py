@@ -1,0 +1,114 @@
+"""The drawing: every part once, nothing over anything, text of a model file inert."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from itertools import combinations
+
+import pytest
+
+from designer import drawing
+from designer.board_parts import fitted
+from designer.boardspec import BoardChoice
+from designer.circuit import Circuit, Section
+from designer.drawing_cells import Amplifier, Chain, board_cells, circuit_cells
+from designer.fittings import Connector, TestPoint
+from tests.stages import CATALOG
+from tests.test_views import CIRCUITS
+
+HOSTILE = "<script>alert(1)</script> & $x_1$ ]]> \" ' 1.23456789"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def board(name: str) -> Circuit:
+    return fitted(CIRCUITS[name], BoardChoice(), CATALOG)
+
+
+def texts(svg: str) -> list[tuple[str, tuple[float, float, float, float]]]:
+    """Each line of text with its box: left, top, right, bottom, by the width of plain letters."""
+    found = []
+    for text in ET.fromstring(svg).iter(f"{SVG}text"):
+        size, y = float(text.attrib["font-size"]), float(text.attrib["y"])
+        for span in text.iter(f"{SVG}tspan"):
+            y += float(span.attrib["dy"])
+            said = span.text or ""
+            x, wide = float(span.attrib["x"]), 0.55 * size * len(said)
+            left = {"start": x, "middle": x - wide / 2, "end": x - wide}[text.attrib["text-anchor"]]
+            found.append((said, (left, y - 0.75 * size, left + wide, y + 0.2 * size)))
+    return found
+
+
+@pytest.mark.parametrize("name", CIRCUITS)
+def test_every_part_is_drawn_once(name: str) -> None:
+    circuit = board(name)
+    said = " \n ".join(text for text, _ in texts(drawing.svg(circuit)))
+    for part in (*circuit.parts, *circuit.fittings):
+        found = re.findall(rf"(?<![\w·]){part.name}(?![\w])", said)
+        if isinstance(part, Connector):
+            assert found
+        elif isinstance(part, TestPoint | Section):
+            assert len(found) == 1, part.name
+        else:
+            assert len(found) == 1, part.name
+
+
+@pytest.mark.parametrize("name", CIRCUITS)
+def test_no_text_lies_on_another(name: str) -> None:
+    boxes = texts(drawing.svg(board(name), "A title"))
+    for (one, a), (two, b) in combinations(boxes, 2):
+        apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+        assert apart, (one, two)
+
+
+@pytest.mark.parametrize("name", CIRCUITS)
+def test_wires_join_what_the_circuit_joins(name: str) -> None:
+    """The cells hold every part with its own nets, at the sections that those nets are of."""
+    circuit = CIRCUITS[name]
+    by_name = {p.name: p for p in circuit.parts}
+    seen = []
+    for cell in (cell for row in circuit_cells(circuit) for cell in row):
+        if isinstance(cell, Amplifier):
+            seen.append(cell.section.name)
+            held = [*cell.inputs, *cell.feedback, *cell.shunts, *filter(None, [cell.series])]
+            assert all(c.end == cell.section.inverting for c in (*cell.inputs, *cell.feedback))
+        else:
+            held = [row for row in cell.rows if isinstance(row, Chain)]
+        for chain in held:
+            net = chain.start
+            for i, part in enumerate(chain.parts):
+                seen.append(part.name)
+                ends = by_name[part.name].nets
+                assert net in ends
+                first = part.anode if hasattr(part, "anode") else part.nets[0]
+                assert chain.forward(i) == (first == net)
+                net = ends[1] if ends[0] == net else ends[0]
+            assert net == chain.end
+    assert sorted(seen) == sorted(by_name)
+
+
+def test_a_title_is_text_and_nothing_else() -> None:
+    svg = drawing.svg(CIRCUITS["paper"], HOSTILE)
+    plain = drawing.svg(CIRCUITS["paper"], "plain")
+    assert HOSTILE in [said for said, _ in texts(svg)]
+    assert [e.tag for e in ET.fromstring(svg).iter()] == [
+        e.tag for e in ET.fromstring(plain).iter()
+    ]
+    assert "<script" not in svg
+
+
+def test_equal_circuits_give_equal_bytes() -> None:
+    svg = drawing.svg(board("rectifier"), "One")
+    assert svg == drawing.svg(board("rectifier"), "One")
+    assert svg != drawing.svg(board("one-sided rectifier"), "One")
+
+
+def test_a_picture_of_points() -> None:
+    png = drawing.png(CIRCUITS["one-sided rectifier"], HOSTILE, dpi=20)
+    assert png.startswith(b"\x89PNG\r\n")
+    assert len(png) > 5000
+
+
+def test_without_fittings_there_is_no_board() -> None:
+    assert board_cells(CIRCUITS["paper"]) == ()
+    assert not any("board" in said for said, _ in texts(drawing.svg(CIRCUITS["paper"])))
