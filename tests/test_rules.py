@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -25,7 +24,7 @@ from designer.provenance import provenance
 from designer.rule import FAIL, NOT_RUN, PASS, Found, Outcome, Override, judged, not_run
 from designer.rule_list import BY_ID, RULES
 from tests import rule_cases, test_rules_board
-from tests.rule_cases import TEXT, base
+from tests.rule_cases import TEXT
 from tests.stages import CATALOG
 from tests.test_cli import _tree
 
@@ -41,15 +40,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def written(path: Path, text: str) -> Path:
     """A design folder with this model file, and the parts of ``base``."""
     modelfile = parse_model_file(text)
-    synthesis = replace(base().made, modelfile=modelfile)
     folder = Folder(path)
     wanted = design_inputs(modelfile, CATALOG)
     folder.begin({"design": (wanted["design"][0], ["model.toml", "design.json"])}, {})
     said = provenance(modelfile, CATALOG.hash)
     folder.write("model.toml", text)
+    made = base().made
     folder.write(
-        "design.json",
-        dumps(synthesis_json(modelfile, synthesis.design, synthesis.found, said, 0.0)),
+        "design.json", dumps(synthesis_json(modelfile, made.design, made.found, said, 0.0))
     )
     folder.finish("design")
     return path
