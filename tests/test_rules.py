@@ -24,7 +24,7 @@ from designer.provenance import provenance
 from designer.rule import FAIL, NOT_RUN, PASS, Found, Outcome, Override, judged, not_run
 from designer.rule_list import BY_ID, RULES
 from tests import rule_cases, test_rules_board
-from tests.rule_cases import TEXT
+from tests.rule_cases import TEXT, base
 from tests.stages import CATALOG
 from tests.test_cli import _tree
 
