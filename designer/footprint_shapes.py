@@ -1,7 +1,7 @@
 """Pads and outlines of the cases, by rule from dimensions: KiCad's names state most of them.
 
 Millimetres, y downwards, the origin in the middle. Chip parts follow IPC-7351B's nominal density:
-a toe of 0.35 mm (0.2 below 0603), a heel that goes 0.05 mm under the body, no side.
+a toe of 0.35 mm (0.2 below 0603), pads that go 0.05 mm further in than the terminals.
 """
 
 from __future__ import annotations

@@ -186,8 +186,8 @@ def flow(title: str, items: Iterable[Item], notes: Sequence[str] = ()) -> Cell:
     cell = Cell(title)
     _rows(cell, list(items), 0)
     for i, text in enumerate(notes):
-        cell.notes.append(Note(text, (0, cell.height + 2 * i)))
-    cell.height += 2 * len(notes)
+        cell.notes.append(Note(text, (0, cell.height + 2 * i + 2)))
+    cell.height += 2 * len(notes) + 2
     return cell
 
 
