@@ -12,12 +12,13 @@ from pathlib import Path
 
 from designer.components import Component
 from designer.errors import InputError
+from designer.kicad_footprint import FILE_VERSION
 from designer.kicad_names import circuit_net
 from designer.natural import natural
 from designer.sexpr import Expression, read
 from designer.views import View
 
-OLDEST, NEWEST = 20221018, 20241229
+OLDEST, NEWEST = 20221018, FILE_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""
 LARGEST = 50_000_000
 """Bytes of a board file."""

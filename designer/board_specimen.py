@@ -9,11 +9,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 from designer.board_rules import CANARY_WIDTH, CustomRule
+from designer.kicad_footprint import FILE_VERSION
 from designer.kicad_names import identifier
 from designer.sexpr import Atom, Expression, expression, word, write
 
-FILE_VERSION = 20241229
-"""Of a board file of KiCad 9."""
 APART = 40.0
 """Between the examples of two rules [mm]."""
 MARGIN = 0.1

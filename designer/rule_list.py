@@ -88,7 +88,7 @@ RULES: tuple[Rule, ...] = (
         "decoupling",
         "Capacitance from a supply pin's rail to ground, at its package",
         100e-9, "F",
-        "SLOS080V, layout guidelines: 0.1 µF ceramic between each supply pin and ground",
+        "TI, OP07C, SLOS099G 12.1: 0.1 µF ceramic between each supply pin and ground",
         "add a ceramic capacitor at the pin (board.decoupling in the model file)",
         least=True,
     ),
@@ -200,8 +200,9 @@ RULES: tuple[Rule, ...] = (
         "Leakage over the board into the worst summing node, and through diodes that block, as a "
         "constant force at the clearance, over the drive",
         0.01, "",
-        "a rail over 1 GΩ, ten times the 100 MΩ that IPC J-STD-004 asks of flux residues in damp "
-        f"heat; the diodes' largest reverse current; a hundredth is {OWN}",
+        "a rail over 1 GΩ, assumed: ten times the 100 MΩ that IPC J-STD-004 asks of flux residues "
+        "in damp heat (not compared with the standard); the diodes' largest reverse current; a "
+        f"hundredth is {OWN}",
         "clean the board, put a guard ring around the node, take smaller resistors",
     ),
     _rule(
@@ -267,7 +268,7 @@ RULES: tuple[Rule, ...] = (
         "decoupling-distance",
         "From a supply pin to the nearest pad of its decoupling capacitor",
         10, "mm",
-        f"{OWN}; SLOS080V, layout guidelines: as close to the device as possible",
+        f"{OWN}; SLOS099G 12.1 has: as close to the device as possible",
         "move the capacitor to the pin",
         board=True,
     ),

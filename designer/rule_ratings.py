@@ -162,4 +162,6 @@ def gain_bandwidth(circuit: Circuit, opamp: OpAmp, frequency: float) -> Iterator
 
 
 def _at(name: str, peak: Peak) -> str:
-    return f"{name} ({peak.run})" if peak.run else name
+    if not peak.run:
+        return name
+    return f"{name} ({'ω = ' if peak.run[0].isdigit() else ''}{peak.run})"

@@ -66,6 +66,9 @@ def into_folder(
         raise InputError(
             path, "DIR", "no manifest.json", "a design folder, as synthesise and run make it"
         )
+    if report is not None and (report.is_dir() or not report.parent.is_dir()):
+        found_there = "a folder" if report.is_dir() else "no such folder"
+        raise InputError(report, "--junit", found_there, "a file in a folder that exists")
     catalog = load_catalog()
     made = read_design(path, catalog)
     given = None if board is None else read_board(board)
@@ -89,7 +92,9 @@ def into_folder(
     folder.write(NAME, dumps(answer))
     folder.finish("rules")
     if report is not None:
-        whole_file.write(report, junit.report(made.modelfile.title, found.outcomes))
+        text = junit.report(made.modelfile.title, found.outcomes)
+        with whole_file.appearing(report, "--junit") as partial:
+            partial.write_text(text, encoding="utf-8")
     return answer, found.passed
 
 

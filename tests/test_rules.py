@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,12 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from designer import cli, design_files, junit, rules, rules_job, rules_table
+from designer import cli, junit, rules, rules_job, rules_table
 from designer.errors import InputError
 from designer.folder import Folder
 from designer.job import design_inputs
+from designer.jsonout import dumps, synthesis_json
 from designer.modelfile import parse_model_file
 from designer.progress import Progress
+from designer.provenance import provenance
 from designer.rule import FAIL, NOT_RUN, PASS, Found, Outcome, Override, judged, not_run
 from designer.rule_list import BY_ID, RULES
 from tests import rule_cases, test_rules_board
@@ -39,11 +40,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def written(path: Path, text: str) -> Path:
     """A design folder with this model file, and the parts of ``base``."""
     modelfile = parse_model_file(text)
-    synthesis = replace(base().made, modelfile=modelfile)
     folder = Folder(path)
     wanted = design_inputs(modelfile, CATALOG)
     folder.begin({"design": (wanted["design"][0], ["model.toml", "design.json"])}, {})
-    design_files.write(folder, synthesis, {"model.toml": text})
+    said = provenance(modelfile, CATALOG.hash)
+    folder.write("model.toml", text)
+    made = base().made
+    folder.write(
+        "design.json", dumps(synthesis_json(modelfile, made.design, made.found, said, 0.0))
+    )
     folder.finish("design")
     return path
 
@@ -222,6 +227,9 @@ def test_bad_input_writes_nothing(
         refused(words, capfd, "some.kicad_pcb", said)
         assert not out.exists()
     refused(["rules", str(design), "--board", str(tmp_path / "none")], capfd, "--board")
+    lost = tmp_path / "no folder" / "junit.xml"
+    refused(["rules", str(design), "--junit", str(lost)], capfd, "--junit", "no such folder")
+    refused(["rules", str(design), "--junit", str(tmp_path)], capfd, "--junit")
     refused(["rules", str(tmp_path)], capfd, "a design folder")
     refused(["rules", str(tmp_path / "model.toml")], capfd, "a design folder")
     (design / "rules.json").write_text("mine")
