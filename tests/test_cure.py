@@ -277,6 +277,7 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
         ("--budget", {"target": 0.9, "budget": -1.0}),
         ("--without", {"target": 0.9, "without": ("grades",)}),
         ("--jobs", {"target": 0.9, "options": Options(jobs=0)}),
+        ("--out", {"target": 0.9, "out": design}),
     )
     for field, arguments in asked:
         with pytest.raises(InputError) as refused:
