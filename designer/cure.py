@@ -76,6 +76,10 @@ def cure(
     said = Progress() if progress is None else progress
     options.check()
     _check(target, budget, without)
+    if out is not None:
+        if out.resolve() == folder.resolve():
+            raise InputError(None, "--out", str(out), "another folder than the one that is cured")
+        Folder(out)  # refuses a place that is taken before the work, not after it
     base = read_design(folder)
     need_responses(base.modelfile)
     place = Folder(folder)

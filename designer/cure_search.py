@@ -102,8 +102,7 @@ class _Search:
         for number in range(ROUNDS):
             found = self._choice(self.target)
             if found is None:
-                why = "no choice of upgrades is enough in the linear picture"
-                return self._answer(before, rounds, False, why)
+                return self._answer(before, rounds, False, self._out_of_reach())
             which, pick, predicted = found
             cost = self._price(which, pick)
             if self.budget is not None and cost > self.budget + 1e-9:
@@ -309,6 +308,26 @@ class _Search:
             tuple(self.refused),
             tuple(self.pictures),
         )
+
+    def _out_of_reach(self) -> str:
+        """Which responses no choice of upgrades is enough for, as the pictures are known now."""
+        best = np.zeros(len(self.base.found))
+        for which, seen in enumerate(self.pictures):
+            finest = [len(p.slot.options) - 1 for p in seen.parts]
+            boards = seen.boards(finest + [0] * len(seen.ways))
+            shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
+            for r, row in enumerate(seen.ways):
+                for w in range(len(row)):
+                    if (which, r, w) not in self.spoiled:
+                        pick = [*finest, *(w if k == r else 0 for k in range(len(seen.ways)))]
+                        best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
+        short = [
+            f"response {r + 1} ({share:.3f} at most)"
+            for r, share in enumerate(best)
+            if share < self.target
+        ]
+        named = f": {', '.join(short)}" if short else ""
+        return f"no choice of upgrades is enough in the linear picture{named}"
 
     def _limit(self, number: int) -> str:
         """What comes first on the way to losing a response, with nothing upgraded."""

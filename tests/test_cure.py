@@ -174,7 +174,12 @@ def test_where_the_picture_is_wrong_the_loop_tightens(monkeypatch: pytest.Monkey
 def test_out_of_reach_and_over_the_budget_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     far = searched(monkeypatch, known_picture(2.0), truth(2.0))
     assert not far.reached
-    assert far.why == "no choice of upgrades is enough in the linear picture"
+    assert "no choice of upgrades is enough" in far.why
+    seen = known_picture(2.0)
+    finest = (*(1 for _ in seen.parts), 0)
+    (share,) = seen.predicted(finest, seen.boards(finest))
+    assert share < TARGET
+    assert far.why.endswith(f"response 1 ({share:.3f} at most)")
     assert far.limits[0].startswith("x, ")
     assert "R50" in far.limits[0]
     least = by_hand(5.5)
@@ -272,6 +277,7 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
         ("--budget", {"target": 0.9, "budget": -1.0}),
         ("--without", {"target": 0.9, "without": ("grades",)}),
         ("--jobs", {"target": 0.9, "options": Options(jobs=0)}),
+        ("--out", {"target": 0.9, "out": design}),
     )
     for field, arguments in asked:
         with pytest.raises(InputError) as refused:

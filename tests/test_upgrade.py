@@ -158,3 +158,14 @@ def test_where_a_condition_breaks_the_parts_are_chosen_anew(base: Synthesis) -> 
 def test_branches_that_are_not_wanted_are_not_made(base: Synthesis) -> None:
     alone = list(branches(base, frozenset({"op-amp", "dead zone"})))
     assert [b.upgrades for b in alone] == [Upgrades()]
+
+
+def test_a_folder_of_ones_own_replaces_single_prices(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text('format = 1\n[[price]]\nprice_class = 3\neuro = 0.2\nsource = "a quotation"\n')
+    catalog = load_catalog(tmp_path)
+    assert (catalog.euro(3), catalog.euro(4)) == (0.2, CATALOG.euro(4))
+    own.write_text('format = 1\n[[price]]\nprice_class = 9\neuro = 0.2\nsource = "a quotation"\n')
+    with pytest.raises(InputError) as refused:
+        load_catalog(tmp_path)
+    assert refused.value.field == "price[1].price_class"
