@@ -83,7 +83,7 @@ def search(
                 print(cure_table.text(result.answer), file=sys.stderr)
             return 0 if result.reached else 1
         for name, value in (("--yield", wanted), ("--budget", budget), ("--without", without)):
-            if value is not None:
+            if value not in (None, []):
                 expected = "a design folder to cure; a model file gets its highest yield"
                 raise InputError(None, name, value, expected)
         from designer import job, search_job
