@@ -51,6 +51,10 @@ def search(
     budget: Annotated[
         float | None, typer.Option("--budget", metavar="PRICE", help="Of a cure, at most.")
     ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without", metavar="KIND", help="No such upgrade; may be repeated."),
+    ] = None,
     seed: Seed = 1,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
@@ -70,7 +74,7 @@ def search(
         if model.is_dir():
             if samples is not None:
                 raise InputError(None, "--samples", samples, "no such option with a design folder")
-            result = _cured(model, out, wanted, budget, options, progress)
+            result = _cured(model, out, wanted, budget, without or [], options, progress)
             if json:
                 _print_json(result.answer)
             elif not quiet:
@@ -78,8 +82,8 @@ def search(
 
                 print(cure_table.text(result.answer), file=sys.stderr)
             return 0 if result.reached else 1
-        for name, value in (("--yield", wanted), ("--budget", budget)):
-            if value is not None:
+        for name, value in (("--yield", wanted), ("--budget", budget), ("--without", without)):
+            if value not in (None, []):
                 expected = "a design folder to cure; a model file gets its highest yield"
                 raise InputError(None, name, value, expected)
         from designer import job, search_job
@@ -103,6 +107,7 @@ def _cured(
     out: Path | None,
     wanted: float | None,
     budget: float | None,
+    without: list[str],
     options: Options,
     progress: Progress,
 ) -> CureResult:
@@ -110,4 +115,12 @@ def _cured(
 
     if wanted is None:
         raise InputError(None, "--yield", "nothing", "the yield that the cure shall reach")
-    return cure(folder, target=wanted, budget=budget, out=out, options=options, progress=progress)
+    return cure(
+        folder,
+        target=wanted,
+        budget=budget,
+        out=out,
+        without=without,
+        options=options,
+        progress=progress,
+    )

@@ -32,6 +32,7 @@ from designer.search import look, search
 from designer.search_json import confirmation_json, search_json
 from designer.search_memory import Memory
 from designer.search_resolved import resolved
+from designer.spice_batch import program_version
 from designer.study import check, tolerance
 from designer.study_folder import FolderStores
 from designer.study_job import SPICE_TIMEOUT, run_into
@@ -126,7 +127,16 @@ def search_into(
     progress: Progress,
     command: Callable[[Options], str],
 ) -> Outcome:
-    """The verb ``search`` for a model file: design, study of fresh boards, confirmation."""
+    """The verb ``search`` for a model file: design, study of fresh boards, confirmation.
+
+    Raises
+    ------
+    EnvironmentMissing : there is something to confirm and no ngspice; said before any work.
+    """
+    known = Folder(out).manifest
+    stage = None if known is None else known.stages.get("confirmation")
+    if stage is None or not stage.complete:
+        program_version()
     final = searched_into(modelfile, out, options, progress)
     study = run_into(final, out, replace(options, rung="exact"), progress, command)
     confirmed = _confirmed(final, out, options, progress)

@@ -65,7 +65,7 @@ def lever_chart(cases: Sequence[Case]) -> Figure:
     axes.set_yticks(range(len(bars)), [name for name, _, _ in bars], size=8)
     axes.invert_yaxis()
     axes.margins(x=0.12)
-    axes.set_xlabel("smallest distance from losing a response [σ]; negative: lost nominally")
+    axes.set_xlabel("smallest distance from losing a response [σ]; below 0 most boards lose it")
     return figure
 
 

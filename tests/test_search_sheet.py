@@ -1,0 +1,115 @@
+"""The pages of the report on a searched design, from made-up cases."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+
+from designer.modelfile import parse_model_file
+from designer.plots import to_png
+from designer.search_report import at_model_clearance
+from designer.search_sheet import lever_chart, readme, yield_chart
+from designer.verdict import Yield
+from tests.search_cases import asked
+
+
+def counted(ok: int, of: int = 4000) -> dict[str, Any]:
+    y = Yield(ok, of - ok, 0, 0)
+    return {**y.__dict__, "rate": y.rate, "low": y.interval[0], "high": y.interval[1]}
+
+
+def response(expect: str, ok: int, **layers: int) -> dict[str, Any]:
+    row = {"expect": expect, "omega": 1.0, "as built": counted(ok), "blame": "by U1A"}
+    more = {name: counted(n, 400) for name, n in layers.items()}
+    return {**row, "limited_by": "offset: near", **more}
+
+
+def case(name: str, *responses: dict[str, Any], **more: Any) -> dict[str, Any]:
+    bill = {"parts": 60, "packages": 4, "distinct": 12, "price": 7.5, "unsold": []}
+    return {
+        "name": name,
+        "responses": list(responses),
+        "all_on_one": {"as built": counted(3000), **more.pop("all_on_one", {})},
+        "bill": bill,
+        **more,
+    }
+
+
+RANK = {"smallest_distance": 4.0, "smallest_yield": 0.99997, "product": 0.9999}
+NONE = {"smallest_distance": None, "smallest_yield": None, "product": None}
+SEARCH = {
+    "start": {**RANK, "smallest_distance": -1.3},
+    "final": {
+        **RANK,
+        "responses": [
+            {"omega": 1.6, "b": 0.36, "distance": 6.0},
+            {"omega": 0.2112, "b": 0.3, "distance": None},
+        ],
+    },
+    "contributions": [
+        {"lever": "places", "from": "middle", "to": "chosen", "alone": RANK, "without": RANK},
+        {"lever": "dead zone", "from": "saturation", "to": "rectifier", "alone": NONE,
+         "without": RANK},
+    ],
+}  # fmt: skip
+CASES = [
+    case("paper, as printed", response("1-1-1", 2700)),
+    case("paper, corrected", response("1-1-1", 2800), response("1-8-8", 0)),
+    case("rectifier stage", response("1-1-1", 4000), response("1-8-8", 700)),
+    case("searched", response("1-1-1", 4000, reached=400), response("1-8-8", 3999, reached=400),
+         search=SEARCH, all_on_one={"reached": counted(400, 400)}),
+    case("searched, nominal b", response("1-1-1", 4000, tuned=400, reached=400),
+         response("1-8-8", 900, tuned=390, reached=100), search=SEARCH),
+]  # fmt: skip
+
+
+def table(text: str, kind: str) -> dict[str, list[str]]:
+    """The rows of one kind of yield, by circuit."""
+    lines = text.splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith(f"| {kind} |"))
+    rows = {}
+    for line in lines[first + 2 :]:
+        if not line.startswith("|"):
+            break
+        name, *cells = [cell.strip() for cell in line.strip("|").split("|")]
+        rows[name] = cells
+    return rows
+
+
+def test_the_tables_say_which_goal_is_reached() -> None:
+    text = readme(CASES, "make it", "robust.toml")
+    built = table(text, "as built")
+    assert built["searched"][-1] == "reached"
+    assert built["paper, as printed"] == ["67.50 (66.03)", "-", "75.00 (73.63)", "not by 1-1-1"]
+    assert built["searched, nominal b"][-1] == "not by 1-8-8"
+    assert set(table(text, "tuned")) == {"searched, nominal b"}
+    # 390 of 400 have an interval that ends well below the goal.
+    assert table(text, "tuned")["searched, nominal b"][-1] == "not by 1-8-8"
+    assert table(text, "reached")["searched"][:2] == ["100.00 (99.05)", "100.00 (99.05)"]
+    assert "| dead zone | saturation | rectifier | no such design | 4.00 σ |" in text
+    assert "| 1-8-8 | 0.2112 | 0.3 | - | offset: near |" in text
+
+
+@pytest.mark.parametrize("chart", [yield_chart, lever_chart])
+def test_a_chart_is_a_picture(chart: Any) -> None:
+    stream = io.BytesIO()
+    to_png(chart(CASES), stream)
+    assert stream.getvalue().startswith(b"\x89PNG")
+
+
+def test_the_yields_are_drawn_as_they_are() -> None:
+    (axes,) = yield_chart(CASES).axes
+    heights = [[float(bar.get_height()) for bar in bars] for bars in axes.containers
+               if hasattr(bars, "patches")]  # fmt: skip
+    assert heights[0] == [67.5]
+    assert heights[4] == [100.0, 22.5]
+
+
+def test_the_model_s_clearance_is_everybody_s() -> None:
+    file = parse_model_file(asked('omega = "best"\nexpect = "1-2-2"\nb = [0.2, 0.3]'))
+    fixed = parse_model_file(at_model_clearance(file))
+    assert [r.b for r in fixed.responses] == [None]
+    assert [r.expect for r in fixed.responses] == [r.expect for r in file.responses]
+    assert fixed.circuit == file.circuit
