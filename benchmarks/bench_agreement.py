@@ -209,7 +209,7 @@ def report(rows: Sequence[Row], found: Sequence[Difference], seconds: float) -> 
         f"- Machine: {machine()}",
         f"- Took {seconds:.0f} s, at a load of {os.getloadavg()[2]:.1f} in the last 15 minutes.",
         "",
-        f"`examples/paper.toml`, its own spread, seed {SEED}, {max(r.samples for r in rows)}",
+        f"`examples/paper.toml` under its own spread, seed {SEED}: {max(r.samples for r in rows)}",
         "boards as built for each response. Both engines start on the nominal design's orbit;",
         "`agreed` counts boards that they call by the same n-p-q, or both aperiodic. Boards on",
         "which ngspice has no answer stand apart: two step sizes still differ, it failed, or its",
@@ -279,7 +279,7 @@ def plot(rows: Sequence[Row]) -> Figure:
     ax.set_xticks(range(len(rows)), [f"{r.response}\nω = {r.omega:g}" for r in rows], fontsize=8)
     ax.set_ylabel("boards that both engines call the same, %")
     ax.grid(visible=True, axis="y", lw=0.4, alpha=0.6)
-    ax.legend(fontsize=8, frameon=False, loc="lower left")
+    figure.legend(fontsize=8, frameon=False, loc="outside upper center", ncols=3)
     return figure
 
 

@@ -115,8 +115,13 @@ def check(
     found: Sequence[ModelResponse],
     pool: SpicePool | None,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    gates: Sequence[GateResult] | None = None,
 ) -> tuple[Checked, ...]:
-    """Every response on the exact circuit and, with a pool, in ngspice behind the gate."""
+    """Every response on the exact circuit and, with a pool, in ngspice behind the gate.
+
+    gates : what ngspice's gate found of this very design before; it is not asked again then.
+    """
     reduction = nominal_reduction(design)
     system = reduction.system()
     settings = [
@@ -124,17 +129,19 @@ def check(
     ]
     progress("exact circuit")
     orbits = [on_circuit(system, design, r) for r in found]
-    gates: list[GateResult | None] = [None] * len(found)
-    if pool is not None:
+    met: list[GateResult | None] = [None] * len(found)
+    if pool is not None and gates is not None:
+        met = list(gates)
+    elif pool is not None:
         progress("ngspice, numerics gate")
-        gates = list(
+        met = list(
             gate.check(
                 pool,
                 [gate.Subject(reduction, e, o) for e, o in zip(settings, orbits, strict=True)],
             )
         )
     return tuple(
-        Checked(r, o, e, g) for r, o, e, g in zip(found, orbits, settings, gates, strict=True)
+        Checked(r, o, e, g) for r, o, e, g in zip(found, orbits, settings, met, strict=True)
     )
 
 

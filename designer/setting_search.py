@@ -10,7 +10,7 @@ one works:
    the nominal orbit and then from the attractor of the better one (as on the bench, where the
    state carries over);
 4. what a path from the nominal board leads to, which follows the wanted orbit and keeps the setting
-   in the middle of its window (``designer.window_path``); then a second and a third path.
+   in the middle of its window (``designer.window_path``); then three more such paths.
 
 Nothing is random. No board is asked more than ``MOST_TRIES`` times, and no more than
 ``MOST_FOLLOWED`` orbits are followed for it.
@@ -39,8 +39,8 @@ HALVED = 4
 """Pairs of settings halved at once."""
 APART = 0.02
 """Of the half-bands: settings nearer than this are one."""
-PATHS = (0.0, 0.5, -0.5)
-"""Half-bands of DC offset at which the paths set out."""
+PATHS = ((0.0, True), (0.5, True), (-0.5, True), (0.5, False))
+"""Of each path, half-bands of DC offset at which it sets out, and whether it is tied."""
 SPOTS = 3
 """Settings of a path that are asked, at most: those deepest inside the window."""
 MOST_TRIES = (1 + 8 + 2 * HALVED) + len(PATHS) * SPOTS
@@ -139,9 +139,10 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
     def halved(follow: bool) -> Round:
         return lambda case: _halfway(case, bands, follow)
 
-    def path(first: float) -> Round:
+    def path(first: float, tied: bool) -> Round:
         def propose(case: Case) -> list[Asked]:
-            trail = find_window(boards.take([case.board]), case.question, bands, first)
+            board = boards.take([case.board])
+            trail = find_window(board, case.question, bands, first, tied=tied)
             case.followed += trail.followed
             return [(s, case.question.start.start) for s in _deepest(trail, case, bands)]
 
@@ -154,7 +155,7 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
         centred(frame),
         halved(False),
         halved(True),
-        *map(path, PATHS),
+        *(path(first, tied) for first, tied in PATHS),
     ]
 
 

@@ -11,6 +11,7 @@ from designer import combined, layers, pipeline
 from designer.all_on_one import all_on_one
 from designer.blame import Blame
 from designer.combined import Combined
+from designer.gate import GateResult
 from designer.hearing import Hearing
 from designer.layers import Runner
 from designer.orbit import OrbitStatus
@@ -123,15 +124,21 @@ class Study:
 
 
 def check(
-    synthesis: Synthesis, pool: SpicePool | None, progress: Progress | None = None
+    synthesis: Synthesis,
+    pool: SpicePool | None,
+    progress: Progress | None = None,
+    gates: Sequence[GateResult] | None = None,
 ) -> tuple[Checked, ...]:
-    """Every response of a design on the exact circuit and, with a pool, in ngspice."""
+    """Every response of a design on the exact circuit and, with a pool, in ngspice.
+
+    gates : see ``pipeline.check``.
+    """
     said = Progress() if progress is None else progress
 
     def stage(text: str) -> None:
         said.stage(text)
 
-    return pipeline.check(synthesis.design, synthesis.found, pool, stage)
+    return pipeline.check(synthesis.design, synthesis.found, pool, stage, gates=gates)
 
 
 def tolerance(

@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.bands import Bands
+from designer.blame import Blame
 from designer.blocks import BlockStore
 from designer.folder import REPORTS, TOLERANCE, Folder
 from designer.hearing import Hearing
+from designer.kept import KEPT, Kept
 from designer.layers import CHUNK, SEARCH
 from designer.reached import Reached
 from designer.recipe import Recipe
 from designer.study import Stores, Study
-from designer.study_hash import study_hash
+from designer.study_hash import blame_hash, study_hash
 from designer.tuning import MOST_TRIES, Tuned
 from designer.verdict import BLOCK, Answer, StudyPlan
 from designer.yield_maps import OVERS
@@ -65,20 +67,21 @@ def study_files(options: Options, responses: int) -> list[str]:
     names = layers_of(options)
     folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "reached": REACHED}
     places = [f"{place}/" for name, place in folders.items() if name in names]
-    return [TOLERANCE, *REPORTS, *maps, *places]
+    return [TOLERANCE, *REPORTS, KEPT, *maps, *places]
 
 
 class FolderStores(Stores):
     """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
-    is told of blocks that are of another study."""
+    is told of blocks that are of another study. kept : where the blame is."""
 
     def __init__(
         self,
         root: Path,
         guard: Callable[[], None],
         note: Callable[[str], None] = lambda _: None,
+        kept: Kept | None = None,
     ) -> None:
-        self._root, self._guard, self._note = root, guard, note
+        self._root, self._guard, self._note, self._kept = root, guard, note, kept
         self._stores: dict[str, BlockStore[Any]] = {}
 
     def samples(self, plan: StudyPlan) -> BlockStore[Answer]:
@@ -94,6 +97,14 @@ class FolderStores(Stores):
     def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached]:
         more = {"recipes": [r.as_dict() for r in recipes]}
         return self._store(plan, REACHED, Reached, "reached", SEARCH, more)
+
+    def blame(self, plan: StudyPlan) -> Blame | None:
+        return None if self._kept is None else self._kept.get("blame", blame_hash(plan))
+
+    def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
+        if self._kept is not None:
+            self._guard()
+            self._kept.put("blame", blame_hash(plan), replace(found, seconds=0.0))
 
     @property
     def names(self) -> Iterable[str]:

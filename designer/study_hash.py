@@ -13,10 +13,11 @@ from designer.circuit import Part
 from designer.jsonout import plain
 from designer.verdict import StudyPlan, kept
 
-RULES = {"samples": 1, "ngspice": 2, "tuned": 3, "reached": 3}
+RULES = {"samples": 1, "ngspice": 2, "tuned": 3, "reached": 3, "blame": 1, "checks": 1}
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
 the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of
-the layer, so that rows of the old rules are not taken for rows of the new ones."""
+the layer, so that rows of the old rules are not taken for rows of the new ones. So with the blame
+and with the equation check and the gate."""
 
 
 def study_hash(
@@ -47,6 +48,20 @@ def study_hash(
             ],
         }
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode("ascii")).hexdigest()
+
+
+def blame_hash(plan: StudyPlan) -> str:
+    """Hash of everything that decides the blame of a study's answers."""
+    return study_hash(plan, "blame", {"samples": plan.samples})
+
+
+def checks_hash(design: str | None, ngspice: str | None) -> str:
+    """Hash of everything that decides what ngspice says of a design's nominal board.
+
+    design : hash of ``design.json``. ngspice : its version.
+    """
+    said = [__version__, RULES["checks"], design, ngspice]
+    return hashlib.sha256(json.dumps(said).encode("ascii")).hexdigest()
 
 
 def nine_digits(value: Any) -> Any:

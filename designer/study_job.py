@@ -16,19 +16,23 @@ from designer import api, design_files, equation_check, kicad_files, rung_choice
 from designer.api import RunResult, Synthesis
 from designer.catalog import Catalog, load_catalog
 from designer.design_files import load
+from designer.equation_check import EquationCheck
 from designer.folder import DESIGN, MODEL, REPORTS, TOLERANCE, Folder, StageName
 from designer.job import Outcome, design_inputs, made_from
 from designer.jsonout import dumps, run_json
+from designer.kept import KEPT, Kept
 from designer.layers import Here, Runner
 from designer.modelfile import ModelFile
+from designer.ngspice import SimulationFailed
 from designer.options import Options
+from designer.pipeline import Checked
 from designer.preconditions import cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.provenance import provenance
 from designer.selection import SOLVER
 from designer.study import Study, check, tolerance
 from designer.study_folder import FolderStores, layers_of, merged, study_files, write_maps
-from designer.study_hash import RULES
+from designer.study_hash import RULES, checks_hash
 from designer.study_json import study_json
 from designer.workers import SpicePool
 
@@ -146,19 +150,14 @@ def _studied(
 ) -> tuple[RunResult, Iterable[str]]:
     """Checks and study of a design in its folder, and the files of the study's blocks."""
     ready = time.perf_counter()
-    equations = None
-    if help_.pool is not None:
-        progress.stage("ngspice, equation check")
-        equations = equation_check.check(made.design, made.found, help_.pool)
-        if not equations.passed:
-            progress.note(f"the netlist does not compute the model's equation: {equations.worst}")
-    checked = check(made, help_.pool, progress)
+    kept = Kept(folder / KEPT, lambda content: folder.write(KEPT, content))
+    equations, checked = _checks(folder, made, help_.pool, kept, progress)
     if checked[0].gate is not None and checked[0].gate.passed:
         folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
         kicad_files.settle(folder, made, checked[0])
     gated = time.perf_counter()
     guard = folder.watch()
-    stores = FolderStores(folder.path, guard, progress.note)
+    stores = FolderStores(folder.path, guard, progress.note, kept)
     study = tolerance(
         made,
         samples=options.samples,
@@ -195,6 +194,31 @@ def _studied(
         equations,
     )
     return result, stores.names
+
+
+def _checks(
+    folder: Folder, made: Synthesis, pool: SpicePool | None, kept: Kept, progress: Progress
+) -> tuple[EquationCheck | None, tuple[Checked, ...]]:
+    """What ngspice says of the design's equations and of its nominal responses, or said before."""
+    if pool is None:
+        return None, check(made, None, progress)
+    assert folder.manifest is not None
+    key = checks_hash(folder.manifest.files[DESIGN][1], pool.version)
+    equations: EquationCheck | None = kept.get("equations", key)
+    if equations is None:
+        progress.stage("ngspice, equation check")
+        equations = equation_check.check(made.design, made.found, pool)
+        if not any(finding.reason for finding in equations.findings):
+            kept.put("equations", key, equations)
+    if not equations.passed:
+        progress.note(f"the netlist does not compute the model's equation: {equations.worst}")
+    gates = kept.get("gates", key)
+    checked = check(made, pool, progress, gates)
+    met = tuple(c.gate for c in checked)
+    # A run without an answer is asked again the next time.
+    if gates is None and not any(g and isinstance(g.read, SimulationFailed) for g in met):
+        kept.put("gates", key, met)
+    return equations, checked
 
 
 def _study_wanted(

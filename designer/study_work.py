@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 from designer import hearing, layers
 from designer.bands import Bands
-from designer.blame import blame
+from designer.blame import Blame, blame
 from designer.blocks import BlockStore
 from designer.hearing import NOMINAL_SAMPLES, Ask, Hearing
 from designer.layers import Runner
@@ -40,7 +40,7 @@ RUNGS: tuple[RungName, ...] = ("exact", "auto", "ngspice")
 
 
 class Stores:
-    """Where the layers of a study are kept; this one keeps nothing."""
+    """Where the layers of a study are kept, and its blame; this one keeps nothing."""
 
     def samples(self, plan: StudyPlan) -> BlockStore[Answer] | None:
         return None
@@ -53,6 +53,12 @@ class Stores:
 
     def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached] | None:
         return None
+
+    def blame(self, plan: StudyPlan) -> Blame | None:
+        return None
+
+    def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
+        pass
 
 
 @dataclass(frozen=True)
@@ -157,8 +163,11 @@ class Work:
 
     def blamed(self, study: Study) -> Study:
         """With the parts that the losses come from."""
-        step = self.said.stage("blame")
-        found = blame(study.plan, study.answers, jobs=self.jobs, progress=step)
+        found = self.stores.blame(study.plan)
+        if found is None:
+            step = self.said.stage("blame")
+            found = blame(study.plan, study.answers, jobs=self.jobs, progress=step)
+            self.stores.keep_blame(study.plan, found)
         return replace(study, blame=found)
 
     def mapped(self, study: Study, overs: Sequence[Over]) -> Study:

@@ -88,14 +88,18 @@ class _Slopes:
     start: Array
 
 
-def find_window(board: Boards, question: Question, bands: Bands, first: float = 0.0) -> Trail:
+def find_window(
+    board: Boards, question: Question, bands: Bands, first: float = 0.0, *, tied: bool = True
+) -> Trail:
     """Follow the question's orbit to a board (``Boards`` of one).
 
     first : half-bands of DC offset at which the path sets out on the nominal board. Where a window
-    lies on either side of the symmetric setting, it says to which one the path goes.
+    lies on either side of the symmetric setting, it says to which one the path goes. tied : where
+    a step of the board must be shortened, the setting moves less with it; else it may still go as
+    far. Neither leads into every window that the other does.
     """
     path = _Path(board, question, bands)
-    return Trail(tuple(path.walk(first)), path.followed)
+    return Trail(tuple(path.walk(first, tied)), path.followed)
 
 
 class _Path:
@@ -105,7 +109,7 @@ class _Path:
         self.followed = 0
         self._reduced = (np.nan, Ensemble(board, fast=False))
 
-    def walk(self, first: float) -> list[Spot]:
+    def walk(self, first: float, tied: bool) -> list[Spot]:
         nominal = self.question.start
         orbit = self._orbit(0.0, np.zeros(3), nominal.start) if nominal.n else None
         if orbit is None:
@@ -120,7 +124,7 @@ class _Path:
             there = None
             while there is None and ahead >= SHORTEST:
                 # A valley that closes on the way may open again: only at its end it has a say.
-                trust = MOVE * ahead / STRIDE
+                trust = MOVE * (ahead / STRIDE if tied else 1.0)
                 move = self._centre(here, slopes, ahead, trust, without="valley")
                 lenient = ahead == SHORTEST
                 there = self._at(here, slopes, ahead, move, lenient=lenient)

@@ -19,7 +19,17 @@ from typing import Any
 
 import pytest
 
-from designer import cli, confirmation, layers, pipeline, study_json, study_work
+from designer import (
+    cli,
+    confirmation,
+    equation_check,
+    gate,
+    layers,
+    pipeline,
+    study_json,
+    study_work,
+)
+from designer.blame import blame
 from designer.blocks import BlockStore
 from designer.errors import InputError
 from designer.folder import Folder
@@ -409,6 +419,67 @@ def test_layers_are_added_and_stay(
     once = tmp_path / "once" / "exact"
     assert cli.status([*_words(home, once), "--reached", "-q"]) == 0
     assert _files(once) == whole
+
+
+def _refused(*_: Any, **__: Any) -> Any:
+    raise AssertionError("this was known")
+
+
+def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
+    exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "exact"
+    shutil.copytree(exact, out)
+    known = json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"]
+    asked: list[int] = []
+
+    def counted(*args: Any, **options: Any) -> Any:
+        asked.append(len(args[1]))
+        return blame(*args, **options)
+
+    monkeypatch.setattr(study_work, "blame", counted)
+    monkeypatch.setattr(Work, "reached", lambda _, study: study)
+    assert cli.status([*_words(home, out), "--reached", "-q"]) == 0
+    assert asked == []
+    assert json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"] == known
+    # Other samples, another seed: other boards are to blame.
+    assert cli.status([*_words(home, out), "--samples", "14", "--overwrite", "-q"]) == 0
+    assert cli.status([*_words(home, out), "--seed", "2", "--overwrite", "-q"]) == 0
+    assert asked == [14, 12]
+
+
+@pytest.mark.slow
+def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "auto"
+    words = [*_words(home, out)[:-1], "auto", "-q"]
+    words[words.index("--samples") + 1] = "3"
+    assert cli.status(words) == 0
+    whole = _files(out)
+    with monkeypatch.context() as patched:
+        patched.setattr(gate, "check", _refused)
+        patched.setattr(equation_check, "check", _refused)
+        patched.setattr(study_work, "blame", _refused)
+        assert cli.status([*words, "--reached"]) == 0
+    added = _files(out)
+    once = tmp_path / "once" / "auto"
+    assert cli.status([w if w != str(out) else str(once) for w in words] + ["--reached"]) == 0
+    assert _files(once) == added
+    assert added["kept.npz"] == whole["kept.npz"]
+    model = tmp_path / "other.toml"
+    model.write_text(SMALL.replace("zeta = 0.1", "zeta = 0.11"))
+    other = [w if w != str(home / "small.toml") else str(model) for w in words]
+    asked: list[int] = []
+    check = gate.check
+
+    def counted(pool: Any, subjects: Any) -> Any:
+        asked.append(len(subjects))
+        return check(pool, subjects)
+
+    monkeypatch.setattr(gate, "check", counted)
+    assert cli.status([*other, "--overwrite"]) in (0, 1)
+    assert asked == [1]
 
 
 @pytest.mark.parametrize(
