@@ -15,6 +15,7 @@ from designer.errors import InputError
 from designer.kicad_footprint import FILE_VERSION
 from designer.kicad_names import circuit_net
 from designer.natural import natural
+from designer.quantity import parse_quantity
 from designer.sexpr import Expression, read
 from designer.views import View
 
@@ -40,9 +41,10 @@ class Pad:
 
 @dataclass(frozen=True)
 class Footprint:
-    """reference : its designator. courtyard : whether it has one."""
+    """reference : its designator. value : as written. courtyard : whether it has one."""
 
     reference: str
+    value: str
     pads: tuple[Pad, ...]
     courtyard: bool
 
@@ -117,13 +119,13 @@ def read_board(path: Path) -> BoardFile:
 
 
 def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
-    """Whether a board is one of these components on these nets.
+    """Whether a board is one of these components, of their values, on these nets.
 
     Footprints without any net, such as mounting holes, may be there besides.
 
     Raises
     ------
-    InputError : designators or nets differ; says which.
+    InputError : designators, nets or values differ; says which.
     """
     wanted = {c.reference: c for c in components if View.BOARD in c.views}
     there: dict[str, Footprint] = {}
@@ -150,6 +152,24 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
                 differ.append(f"{reference}.{number} on {found}, not on {net or 'no net'}")
     if differ:
         raise InputError(board.path, "nets", _few(differ, "; "), "the nets of this design")
+    other = [
+        f"{reference} is {there[reference].value or 'nothing'}, not {component.value}"
+        for reference, component in wanted.items()
+        if not _same_value(there[reference].value, component)
+    ]
+    if other:
+        raise InputError(board.path, "values", _few(other), "the values of this design")
+
+
+def _same_value(words: str, component: Component) -> bool:
+    """Whether a resistor or a capacitor has its value, however that is written."""
+    unit = {"resistor": "Ω", "capacitor": "F"}.get(component.kind)
+    if unit is None or component.quantity is None:
+        return True
+    try:
+        return math.isclose(parse_quantity(words, unit), component.quantity, rel_tol=1e-6)
+    except ValueError:
+        return False
 
 
 def _few(words: Sequence[str], between: str = ", ") -> str:
@@ -180,18 +200,19 @@ def _footprint(found: Expression) -> Footprint:
     x, y = at.number(0), at.number(1)
     turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
     return Footprint(
-        _reference(found),
+        _field(found, "Reference"),
+        _field(found, "Value"),
         tuple(_pad(pad, (x, y), turn) for pad in found.all("pad")),
         any(layer.text() in COURTYARDS for each in found.children for layer in each.all("layer")),
     )
 
 
-def _reference(found: Expression) -> str:
+def _field(found: Expression, name: str) -> str:
     for each in found.all("property"):
-        if each.text(0) == "Reference":
+        if each.text(0) == name:
             return each.text(1)
     for each in found.all("fp_text"):  # KiCad 7
-        if each.text(0) == "reference":
+        if each.text(0) == name.lower():
             return each.text(1)
     return ""
 

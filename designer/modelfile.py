@@ -132,6 +132,7 @@ class ModelFile:
 
     ``model`` is always filled, from ``mechanical`` where that is what the file gives; ``text`` is
     the file word for word. measured : the list that ``spread.measured`` names; read with the file.
+    rules : other limits of design rules, by their ids.
     """
 
     title: str
@@ -145,7 +146,7 @@ class ModelFile:
     measured: Measured | None = None
     tuning: Bands = field(default_factory=Bands)
     board: BoardSpec = field(default_factory=BoardSpec)
-    rules: Mapping[str, Override] = field(default_factory=dict)
+    rules: Mapping[str, Override] = field(default_factory=dict, hash=False)
     search: SearchSpec = field(default_factory=SearchSpec)
 
     @property

@@ -167,6 +167,30 @@ def test_pins_on_other_nets_are_named(tmp_path: Path) -> None:
     assert "R4.1 on s2, not on v1; R4.2 on v1, not on s2" in str(said)
 
 
+def valued(name: str, words: str) -> str:
+    """The board with another value written at one component."""
+
+    def change(item: Expression) -> Expression:
+        if item.name != "footprint" or reference(item) != name:
+            return item
+        value = next(p for p in item.all("property") if p.text(0) == "Value")
+        return read(write(item).replace(f'"Value" "{value.text(1)}"', f'"Value" "{words}"'))
+
+    return edited(change)
+
+
+def test_other_values_are_named_and_other_spellings_are_not(tmp_path: Path) -> None:
+    """A board drawn before the parts were chosen anew."""
+    ohms = base().circuit.values["R4"]
+    said = refused(valued("R4", "47k"), tmp_path)
+    assert said.field == "values"
+    assert "R4 is 47k, not 36kΩ" in str(said)
+    assert ohms == 36e3
+    assert refused(valued("C903", "10k"), tmp_path).field == "values"
+    for words in ("36k", "36 kΩ", "36000"):
+        check_belongs(board_of(valued("R4", words), tmp_path), base().components)
+
+
 def test_a_mounting_hole_may_be_there_besides(tmp_path: Path) -> None:
     hole = expression(
         "footprint",
