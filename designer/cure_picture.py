@@ -27,7 +27,7 @@ from designer.spread import Spread, draw_many
 from designer.system import Array
 from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
 from designer.verdict import BLOCK, Answer, Question, StudyPlan, count
-from designer.yield_maps import yield_map
+from designer.yield_maps import YieldMap, yield_map
 
 SAMPLES = 250
 """Boards on which a picture is taken: their verdicts choose the limits."""
@@ -271,9 +271,10 @@ def _moved(
             samples=MAP_BOARDS, points=MAP_POINTS, jobs=jobs,
         )  # fmt: skip
         progress()
-        if found.recommended is None or found.recommended[0] == found.used:
+        best = best_place(found)
+        if best is None:
             continue
-        value = float(f"{found.recommended[0]:.4g}")
+        value = float(f"{best:.4g}")
         place = Place(value, response.b) if over == "omega" else Place(response.omega, value)
         base = branch.made
         moved = with_parts_kept(
@@ -286,6 +287,23 @@ def _moved(
         if question is not None:
             out.append(Way(number, over, question, place))
     return out
+
+
+def best_place(found: YieldMap) -> float | None:
+    """The middle of the longest row of settings with the highest yield; None where the setting in
+    use has it.
+
+    Not ``recommended``, which stays where it is unless another setting is proved to be better: a
+    cure is measured before it is believed.
+    """
+    values, rate = np.array(found.axes[0].values), found.rate
+    if rate[found.axes[0].values.index(found.used)] >= rate.max():
+        return None
+    equal = np.flatnonzero(rate == rate.max())
+    rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)
+    longest = max(rows, key=lambda row: float(values[row[-1]] - values[row[0]]))
+    middle = 0.5 * (values[longest[0]] + values[longest[-1]])
+    return float(values[longest[int(np.argmin(np.abs(values[longest] - middle)))]])
 
 
 def _with_margins(

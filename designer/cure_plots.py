@@ -31,8 +31,12 @@ def front_chart(found: Cure) -> Figure:
     top.errorbar(
         prices, rates, bars, fmt="o", ms=5, capsize=3, color=MEASURED, label="measured, 95 %"
     )
-    promised = [100.0 * min(t.predicted) for t in front[1:]]
-    top.plot(prices[1:], promised, "x", ms=6, color=PREDICTED, label="linear picture")
+    chosen = [t for t in front if t is not found.before]
+    promised = [100.0 * min(t.predicted) for t in chosen]
+    if chosen:
+        top.plot(
+            [t.price for t in chosen], promised, "x", ms=6, color=PREDICTED, label="linear picture"
+        )
     asked = f"asked for: {100.0 * found.target:g} %"
     top.axhline(100.0 * found.target, color=INK, lw=0.8, ls="--", label=asked)
     if found.budget is not None:

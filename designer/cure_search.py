@@ -346,8 +346,9 @@ class _Search:
         return f"{limit.what}, {limit.distance:.2g} standard deviations away, mostly {names}"
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
-        """Trials by price, each with a higher worst yield than any cheaper one: those of the rounds
-        and the choices for other targets, as the pictures are known now."""
+        """The design as it is, and trials by price, each with a higher worst yield than any cheaper
+        one: those of the rounds and the choices for other targets, as the pictures are known
+        now."""
         trials = [before, *rounds]
         seen = {(t.branch, repr(t.upgrades)) for t in trials}
         found: list[tuple[int, tuple[int, ...], tuple[float, ...]]] = []
@@ -371,7 +372,7 @@ class _Search:
         for t in trials:
             if not front or t.worst.rate > front[-1].worst.rate:
                 front.append(t)
-        return tuple(front)
+        return tuple(front) if before in front else (before, *front)
 
 
 def _cut(program: Program, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:

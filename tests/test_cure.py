@@ -20,7 +20,7 @@ from designer.catalog import load_catalog
 from designer.cure import CURE, STUDIES, cure
 from designer.cure_branch import Branch
 from designer.cure_json import cure_json
-from designer.cure_picture import Picture, Way
+from designer.cure_picture import Picture, Way, best_place
 from designer.cure_plots import front_chart
 from designer.cure_search import find_cure
 from designer.cure_slots import part_slots
@@ -38,6 +38,7 @@ from designer.quantities import quantities
 from designer.spread import Spread, draw_many
 from designer.upgrade import Upgrades
 from designer.verdict import Question, StudyPlan, Verdict, Yield
+from designer.yield_maps import Axis, YieldMap
 from tests import bench_plans, paper_cases
 
 CATALOG = load_catalog()
@@ -227,6 +228,29 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
 class _Row:
     def __init__(self, verdict: str) -> None:
         self.verdict = Verdict(verdict)
+
+
+@pytest.mark.parametrize(
+    ("rates", "used", "best"),
+    [
+        ([3, 8, 10, 9, 5], 4, 2),
+        ([3, 10, 10, 10, 9], 4, 2),
+        ([10, 9, 10, 10, 4], 4, 2),  # the longer of two rows
+        ([3, 8, 10, 9, 5], 2, None),
+        ([0, 0, 0, 0, 0], 1, None),
+    ],
+)
+def test_the_best_place_is_the_middle_of_the_best_row(
+    rates: list[int], used: int, best: int | None
+) -> None:
+    values = (0.30, 0.31, 0.32, 0.33, 0.34)
+    ok, there = np.array(rates), np.ones(5, dtype=bool)
+    none = np.zeros(5, dtype=np.int64)
+    seen = YieldMap(
+        "omega", 0, (Axis("omega", values),), there, ok, 10 - ok, none, none, 10, 1,
+        values[used], None, (False, False), 0, 0.0,
+    )  # fmt: skip
+    assert best_place(seen) == (None if best is None else values[best])
 
 
 def test_seeds_are_their_own() -> None:
