@@ -2,9 +2,9 @@
 
 Over all wanted responses, in this order: the smallest of their distances from being lost
 (``designer.search_distance``), hence the smallest predicted yield; where two designs agree in it,
-the product of the predicted yields. One lever after the other is moved, from the match design on:
-op-amp and dead zone first, then the places of the responses, then what the synthesis aims at. A
-lever stays where it is unless something is gained.
+as far as the boards of a search can tell, the product of the predicted yields. One lever after the
+other is moved, from the match design on: op-amp and dead zone first, then the places of the
+responses, then what the synthesis aims at. A lever stays where it is unless something is gained.
 
 Nothing of the chain (model, match, circuit, predictions) imports a module of the search.
 """
@@ -37,6 +37,10 @@ from designer.spreadrules import check_names
 
 BOARDS = 128
 """Boards by which designs are compared, at each stretch of the spread."""
+ALIKE = 0.05
+"""Standard deviations: distances that differ by less are equal; so few boards tell no more."""
+GAIN = 1e-3
+"""Of the product of the predicted yields: what is worth moving a lever for."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,13 @@ def look(
         )
 
 
+def better(rank: tuple[float, float], than: tuple[float, float]) -> bool:
+    """Whether a design of this rank (``Candidate.rank``) is to take the place of another."""
+    if abs(rank[0] - than[0]) > ALIKE:
+        return rank[0] > than[0]
+    return rank[1] - than[1] > GAIN
+
+
 class _Hunt:
     """One search. ``steps`` and the counters grow while it runs."""
 
@@ -207,11 +218,11 @@ class _Hunt:
             if made is None:
                 self._note("opamp and dead zone", setting, None, False)
                 continue
-            better = best is None or made.rank > best.rank
-            self._note("opamp and dead zone", setting, made, better)
+            gained = best is None or better(made.rank, best.rank)
+            self._note("opamp and dead zone", setting, made, gained)
             if choice == own:
                 start = made
-            if better:
+            if gained:
                 best = made
         if best is None:
             assert self.short is not None
@@ -238,16 +249,16 @@ class _Hunt:
             chosen.append(self._there(spec, [s.place for s in ranked]))
         setting = "; ".join(f"{r.expected}: ω = {r.omega:.5g}, b = {r.b:.4g}" for r in chosen)
         made = self._candidate(best.choice, tuple(chosen), PLACES)
-        better = made is not None and made.rank > best.rank
-        self._note(PLACES, setting, made, better)
-        return made if made is not None and better else best
+        gained = made is not None and better(made.rank, best.rank)
+        self._note(PLACES, setting, made, gained)
+        return made if made is not None and gained else best
 
     def _try(self, lever: str, choice: Choice, best: Candidate) -> Candidate:
         setting = _shown(choice.get(lever))
         made = self._candidate(choice, best.found, f"{lever} {setting}")
-        better = made is not None and made.rank > best.rank
-        self._note(lever, setting, made, better)
-        return made if made is not None and better else best
+        gained = made is not None and better(made.rank, best.rank)
+        self._note(lever, setting, made, gained)
+        return made if made is not None and gained else best
 
     def _candidate(
         self, choice: Choice, found: tuple[ModelResponse, ...], what: str
