@@ -49,16 +49,27 @@ class Kept:
     def __init__(self, path: Path, write: Callable[[bytes], None]) -> None:
         self._items = _read(path)
         self._write = write
+        self._used: set[str] = set()
 
     def get(self, name: str, key: str) -> Any | None:
         """None where there is none of this name that this key decides."""
         known, value = self._items.get(name, ("", None))
-        return value if known == key else None
+        if known != key:
+            return None
+        self._used.add(name)
+        return value
 
     def put(self, name: str, key: str, value: Any) -> None:
         """Keep it, in the place of any other of this name."""
         self._items[name] = (key, value)
+        self._used.add(name)
         self._write(_bytes(self._items))
+
+    def forget_unused(self) -> None:
+        """Drop what nobody has got or put since: it is of another design or study."""
+        if not self._used.issuperset(self._items):
+            self._items = {name: self._items[name] for name in self._used}
+            self._write(_bytes(self._items))
 
 
 def _bytes(items: Mapping[str, tuple[str, Any]]) -> bytes:

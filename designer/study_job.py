@@ -175,6 +175,7 @@ def _studied(
         progress=progress,
     )
     guard()
+    kept.forget_unused()
     cost = {
         "check_seconds": gated - ready,
         "study_seconds": time.perf_counter() - gated,

@@ -81,6 +81,20 @@ def test_only_its_own_key_opens_an_item(tmp_path: Path) -> None:
     assert same(kept(path).get("blame", "mine"), BLAME)
 
 
+def test_what_nobody_used_is_forgotten(tmp_path: Path) -> None:
+    path = tmp_path / "kept.npz"
+    for name in ("one", "two", "three"):
+        kept(path).put(name, "key", CHECK)
+    later = kept(path)
+    assert same(later.get("one", "key"), CHECK)
+    assert later.get("two", "other") is None
+    later.put("three", "new", CHECK)
+    later.forget_unused()
+    assert same(kept(path).get("one", "key"), CHECK)
+    assert kept(path).get("two", "key") is None
+    assert same(kept(path).get("three", "new"), CHECK)
+
+
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 cut", None])
 def test_a_file_that_cannot_be_read_holds_nothing(content: bytes | None, tmp_path: Path) -> None:
     path = tmp_path / "kept.npz"
