@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
@@ -157,6 +158,7 @@ def test_the_cheapest_cure_is_the_enumerated_one(
     assert to_svg(front_chart(found)).startswith("<svg")
 
 
+@pytest.mark.slow
 def test_where_the_picture_is_wrong_the_loop_tightens(monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes R50 for the worst part, which is R11."""
     found = searched(monkeypatch, known_picture(5.5), truth(5.5, otherwise=True))
@@ -180,7 +182,10 @@ def test_out_of_reach_and_over_the_budget_are_told_apart(monkeypatch: pytest.Mon
     finest = (*(1 for _ in seen.parts), 0)
     (share,) = seen.predicted(finest, seen.boards(finest))
     assert share < TARGET
-    assert far.why.endswith(f"response 1 ({share:.3f} at most)")
+    told = re.fullmatch(r".*: response 1 \((0\.\d+) at most\)", far.why)
+    assert told is not None
+    # What the first study showed may have brought the loss nearer.
+    assert float(told[1]) == pytest.approx(share, abs=0.03)
     assert far.limits[0].startswith("x, ")
     assert "R50" in far.limits[0]
     least = by_hand(5.5)
