@@ -515,9 +515,9 @@ def test_wrong_csv_is_named(tmp_path: Path, old: str, new: str, field: str, expe
 def test_the_examples_of_the_documentation(tmp_path: Path) -> None:
     text = (SHIPPED.parent / "docs" / "catalogue.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```(toml|csv)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    assert [language for language, _ in blocks] == ["toml", "csv"]
-    for language, block in blocks:
-        folder(tmp_path / "mine", block, f"example.{language}")
+    assert [language for language, _ in blocks] == ["toml", "toml", "csv"]
+    for number, (language, block) in enumerate(blocks):
+        folder(tmp_path / "mine", block, f"example-{number}.{language}")
     mine = load_catalog(tmp_path / "mine")
     assert mine.part("capacitor", 22e-9, 0.01).part_number == "drawer-22n"
     drawer, chips = mine.families[1], mine.families[0]

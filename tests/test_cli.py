@@ -516,7 +516,7 @@ def test_bad_options_of_simulate(tmp_path: Path, capfd: pytest.CaptureFixture[st
     _refused(["simulate", model, "--engine", "spectre"], capfd, "--engine")
 
 
-@pytest.mark.parametrize("verb", ["search", "nonsense"])
+@pytest.mark.parametrize("verb", ["serach", "nonsense"])
 def test_unknown_verbs(capfd: pytest.CaptureFixture[str], verb: str) -> None:
     _refused([verb], capfd, verb, "run, synthesise")
 
