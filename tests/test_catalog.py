@@ -517,10 +517,10 @@ def test_the_examples_of_the_documentation(tmp_path: Path) -> None:
     blocks = re.findall(r"^```(toml|csv)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     assert [language for language, _ in blocks] == ["toml", "toml", "csv"]
     for number, (language, block) in enumerate(blocks):
-        folder(tmp_path / "mine", block, f"example-{number}.{language}")
+        folder(tmp_path / "mine", block, f"{number}.{language}")
     mine = load_catalog(tmp_path / "mine")
     assert mine.part("capacitor", 22e-9, 0.01).part_number == "drawer-22n"
-    drawer, chips = mine.families[1], mine.families[0]
+    chips, drawer = mine.families[0], next(f for f in mine.families if f.name.startswith("Bench"))
     assert (drawer.name, chips.name) == ("Bench drawer 1 %", "Yageo RC0805FR-07")
     assert chips.part_number.of(4.99e3) == "RC0805FR-074K99L"
 
