@@ -83,7 +83,9 @@ def readme(cases: Sequence[Case], command: str, model: str) -> str:
         "",
         "## Yields",
         "",
-        "Per cent, with the lower end of the two-sided 95 % interval.",
+        "Per cent, with the lower end of the two-sided 95 % interval; as built of "
+        + ", ".join(f"{_boards(case)} boards ({case['name']})" for case in cases)
+        + ".",
         "",
     ]
     for kind in KINDS:
@@ -156,6 +158,11 @@ def readme(cases: Sequence[Case], command: str, model: str) -> str:
                 )
             out.append("")
     return "\n".join(out).rstrip() + "\n"
+
+
+def _boards(case: Mapping[str, Any]) -> int:
+    counted = case["responses"][0]["as built"]
+    return sum(int(counted[name]) for name in ("ok", "lost", "grazing", "failed"))
 
 
 def _words(lever: Mapping[str, Any]) -> str:
