@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -82,6 +83,19 @@ def _bytes(items: Mapping[str, tuple[str, Any]]) -> bytes:
     return stream.getvalue()
 
 
+_UNREADABLE = (
+    OSError,
+    BadZipFile,
+    zlib.error,
+    NotImplementedError,  # a method of compression that there is not
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    EOFError,
+)
+
+
 def _read(path: Path) -> dict[str, tuple[str, Any]]:
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as held:
@@ -89,7 +103,7 @@ def _read(path: Path) -> dict[str, tuple[str, Any]]:
             if said["format"] != FORMAT:
                 return {}
             return {name: (key, _made(value, held)) for name, (key, value) in said[_SAID].items()}
-    except (OSError, BadZipFile, ValueError, KeyError, TypeError, AttributeError, EOFError):
+    except _UNREADABLE:
         return {}
 
 

@@ -37,6 +37,8 @@ from designer.spreadrules import check_names
 
 BOARDS = 128
 """Boards by which designs are compared, at each stretch of the spread."""
+MISSING = -30.0
+"""Standard deviations, further than any response that is there may stand."""
 ALIKE = 0.05
 """Standard deviations: distances that differ by less are equal; so few boards tell no more."""
 GAIN = 1e-3
@@ -61,8 +63,10 @@ class Candidate:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """The smallest distance; the logarithm of the product of the predicted yields."""
-        return min(self.distances), sum(float(norm.logcdf(d)) for d in self.distances)
+        """The smallest distance; the logarithm of the product of the predicted yields, in which a
+        response that the nominal board does not show counts as one ``MISSING`` away."""
+        logs = [float(norm.logcdf(max(d, MISSING))) for d in self.distances]
+        return min(self.distances), sum(logs)
 
 
 @dataclass(frozen=True)
@@ -158,8 +162,11 @@ def look(
 
 
 def better(rank: tuple[float, float], than: tuple[float, float]) -> bool:
-    """Whether a design of this rank (``Candidate.rank``) is to take the place of another."""
-    if abs(rank[0] - than[0]) > ALIKE:
+    """Whether a design of this rank (``Candidate.rank``) is to take the place of another.
+
+    Where both lack a response, the sum decides, which counts what they lack.
+    """
+    if rank[0] != than[0] and not abs(rank[0] - than[0]) <= ALIKE:
         return rank[0] > than[0]
     return rank[1] - than[1] > GAIN
 

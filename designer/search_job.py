@@ -7,7 +7,7 @@ A found design is written as any other: ``model.toml`` is the model file with ev
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -43,9 +43,11 @@ FILES = [ASKED, SEARCH, CANDIDATES]
 CONFIRMATION = "confirmation.json"
 SAMPLES = 4000
 """Boards of the final study, at least."""
+DIFFERING = 0.05
+"""Share of the confirming boards that may differ, or have no answer."""
 RUNG: Rung = "dynamic"
 """Of ngspice, on which the final figures are confirmed."""
-RULES = 1
+RULES = 2
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 
@@ -148,7 +150,16 @@ def search_into(
     answer["confirmation"] = confirmed
     for row, other in zip(answer["responses"], confirmed["responses"], strict=True):
         row["limited_by"] = other["limited_by"]
-    return replace(study, answer=answer)
+    held = all(confirms(row) for row in confirmed["responses"])
+    return replace(study, answer=answer, satisfied=study.satisfied and held)
+
+
+def confirms(row: Mapping[str, Any]) -> bool:
+    """Whether ngspice bears a response out: its gate passed, and of the boards that it was asked
+    at most the share ``DIFFERING`` differ or have no answer."""
+    passed = row["gate"] is not None and row["gate"]["passed"]
+    asked, agreed = int(row["asked"]), int(row["agreed"])
+    return bool(passed and asked and asked - agreed <= DIFFERING * asked)
 
 
 def _confirmed(

@@ -43,6 +43,8 @@ class Choice:
             base,
             objective="match",
             opamp=self.opamp,
+            # A saturation that is stated belongs to the op-amp that it is stated for.
+            saturation=base.saturation if self.opamp == base.opamp else None,
             dead_zone=self.dead_zone,
             frequency=self.frequency,
         )

@@ -21,7 +21,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer import compare, exact, pipeline
+from designer import __version__, compare, exact, pipeline, search_job, study_hash
 from designer.all_on_one import all_on_one
 from designer.api import Synthesis
 from designer.blame import blame
@@ -75,7 +75,8 @@ def report(
     catalog, file = load_catalog(), read_model_file(model)
     (out / "cases").mkdir(parents=True, exist_ok=True)
     options = Options(seed, jobs, samples, resume=True)
-    settings = [FORMAT, file.sha256, catalog.hash, samples, short, seed]
+    rules = [__version__, search_job.RULES, study_hash.RULES]
+    settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         path = out / "cases" / f"{name.replace(', ', '-').replace(' ', '-')}.json"

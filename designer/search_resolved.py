@@ -37,6 +37,8 @@ def _text(asked: ModelFile, found: Sequence[ModelResponse], choice: Choice) -> s
             table["b"] = response.b
     circuit = data.setdefault("circuit", {})
     circuit |= {"opamp": choice.opamp, "dead_zone": choice.dead_zone}
+    if choice.opamp != asked.circuit.opamp:
+        circuit.pop("saturation", None)  # it was stated for the other op-amp
     order = ["format", "title", "model", "mechanical", "response", "circuit"]
     first = {key: data[key] for key in order if key in data}
     return toml_text({**first, **data})

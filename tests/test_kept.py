@@ -106,6 +106,16 @@ def test_a_file_that_cannot_be_read_holds_nothing(content: bytes | None, tmp_pat
     assert kept(path).get("it", "key") is None
 
 
+def test_no_changed_byte_of_a_file_ends_in_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "kept.npz"
+    kept(path).put("it", "key", BLAME)
+    whole = path.read_bytes()
+    for place in range(0, len(whole), 7):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x41]) + whole[place + 1 :])
+        found = kept(path).get("it", "key")
+        assert found is None or same(found, BLAME)
+
+
 def test_what_would_not_come_back_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="object"):
         kept(tmp_path / "kept.npz").put("it", "key", object())

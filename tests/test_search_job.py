@@ -11,6 +11,7 @@ import pytest
 
 from designer import cli
 from designer.modelfile import parse_model_file
+from designer.search_job import confirms
 from designer.search_levers import Choice
 from designer.search_memory import Memory
 from designer.search_resolved import resolved
@@ -143,3 +144,19 @@ def test_a_match_leaves_no_place_open(tmp_path: Path, capsys: pytest.CaptureFixt
     assert 'circuit.objective = "yield"' in capsys.readouterr().err
     assert run("search", model, "--yield", 0.9, "--out", tmp_path / "out", "-q") == 2
     assert "--yield" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("passed", "asked", "agreed", "held"),
+    [
+        (True, 40, 40, True),
+        (True, 40, 38, True),
+        (True, 40, 37, False),
+        (True, 0, 0, False),
+        (False, 40, 40, False),
+        (None, 40, 40, False),
+    ],
+)
+def test_what_ngspice_bears_out(passed: bool | None, asked: int, agreed: int, held: bool) -> None:
+    gate = None if passed is None else {"passed": passed}
+    assert confirms({"gate": gate, "asked": asked, "agreed": agreed}) is held

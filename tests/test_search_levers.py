@@ -67,6 +67,9 @@ def test_what_is_better() -> None:
     assert better((2.0, -0.1), (2.0 + 0.5 * ALIKE, -0.1 - 2.0 * GAIN))
     assert not better((2.0 + 0.5 * ALIKE, -0.1), (2.0, -0.1))
     assert better((1.0, -0.5), (float("-inf"), float("-inf")))
+    nothing = float("-inf")
+    assert better((nothing, -900.0), (nothing, -1800.0))
+    assert not better((nothing, -1800.0), (nothing, -900.0))
 
 
 def test_what_is_refused_is_refused_before_any_work() -> None:
