@@ -53,7 +53,11 @@ def search(
     ] = None,
     without: Annotated[
         list[str] | None,
-        typer.Option("--without", metavar="KIND", help="No such upgrade; may be repeated."),
+        typer.Option(
+            "--without",
+            metavar="KIND",
+            help="No upgrade of this kind (docs/cure.md names them); may be repeated.",
+        ),
     ] = None,
     seed: Seed = 1,
     jobs: Jobs = None,
@@ -71,6 +75,8 @@ def search(
         count = SAMPLES if samples is None else samples
         options = Options(seed, jobs, count, overwrite, resume)
         options.check()
+        if not model.exists():
+            raise InputError(model, "MODEL|DIR", "nothing", "a model file or a design folder")
         if model.is_dir():
             if samples is not None:
                 raise InputError(None, "--samples", samples, "no such option with a design folder")

@@ -31,7 +31,9 @@ def trade(
     out: Out = None,
     boards: Annotated[
         int,
-        typer.Option("--boards", metavar="N", help="Boards of each response for the yield."),
+        typer.Option(
+            "--boards", metavar="N", help="Boards of each response for the yield; 0: none."
+        ),
     ] = 100,
     seed: Seed = 1,
     jobs: Jobs = None,
