@@ -19,11 +19,12 @@ from designer.boards import Boards
 from designer.cure_branch import Branch, Refused, applied, branches
 from designer.cure_picture import Picture, Way, picture
 from designer.cure_program import Program, cheapest
-from designer.cure_study import Book, asked, fresh, measure, plan_of
+from designer.cure_study import Book, Measured, asked, fresh, measure, measure_together, plan_of
 from designer.cure_trial import Cure, Trial, measured_none
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
 from designer.upgrade import Upgrades
+from designer.verdict import StudyPlan
 
 ROUNDS = 10
 """Choices that are measured before the search gives up."""
@@ -118,16 +119,15 @@ class _Search:
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
         step = self.said.stage("the design as it is")
-        made, trials = self.base, []
+        made, plans = self.base, list[tuple[StudyPlan, float | None] | None]()
         for number, question in enumerate(asked(made, made.found)):
             if question is None:
                 self.unseen.append(number)
-                trials.append(measured_none(self.target))
-                continue
-            plan = plan_of(made, question, fresh(self.seed, 1))
-            trials.append(measure(plan, self.target, self.book, jobs=self.jobs, progress=step))
+            plan = None if question is None else plan_of(made, question, fresh(self.seed, 1))
+            plans.append(None if plan is None else (plan, None))
+        trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         rates = tuple(m.rate for m in trials)
-        return Trial("as it is", Upgrades(), 0.0, rates, tuple(trials), self.target)
+        return Trial("as it is", Upgrades(), 0.0, rates, trials, self.target)
 
     def _choice(self, target: float) -> tuple[int, tuple[int, ...], tuple[float, ...]] | None:
         """The cheapest choice over all branches: its picture's number, the options, the promise.
@@ -248,42 +248,48 @@ class _Search:
         predicted: tuple[float, ...],
         number: int,
         name: str,
-        most: int | None = None,
+        boards: int | None = None,
     ) -> Trial:
-        """A choice, measured on boards that nobody has seen."""
+        """A choice, measured on boards that nobody has seen.
+
+        boards : how many, of each response; None: until it is decided whether all are enough."""
         seen = self.pictures[which]
         cost = self._price(which, pick)
         step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
         upgrades = seen.upgrades(pick)
         made = applied(seen.branch, upgrades)
-        found = []
+        plans = list[tuple[StudyPlan, float | None] | None]()
         for way, question in zip(seen.taken(pick), asked(made, made.found), strict=True):
-            if question is None:
-                found.append(measured_none(self.target))
-                continue
-            plan = plan_of(made, question, fresh(self.seed, number))
+            plan = None if question is None else plan_of(made, question, fresh(self.seed, number))
             trim = upgrades.trim if way.kind == "trim" else None
-            found.append(
-                measure(
-                    plan,
-                    self.target,
-                    self.book,
-                    trim=trim,
-                    jobs=self.jobs,
-                    progress=step,
-                    **({} if most is None else {"least": most, "most": most}),
+            plans.append(None if plan is None else (plan, trim))
+        found: tuple[Measured, ...]
+        if boards is None:
+            found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
+        else:
+            found = tuple(
+                measured_none(self.target)
+                if asked_for is None
+                else measure(
+                    asked_for[0], self.target, self.book,
+                    trim=asked_for[1], least=boards, most=boards, jobs=self.jobs, progress=step,
                 )
-            )
-        return Trial(seen.branch.name, upgrades, cost, predicted, tuple(found), self.target)
+                for asked_for in plans
+            )  # fmt: skip
+        return Trial(seen.branch.name, upgrades, cost, predicted, found, self.target)
 
     def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
-        """Tighten what was promised and not kept."""
+        """Tighten what was promised and not kept.
+
+        Where a response has missed the target, those that are undecided were asked on few boards
+        only: nothing is learnt of them."""
         seen = self.pictures[which]
-        short = [r for r, m in enumerate(trial.measured) if not m.reached]
+        short = [r for r, m in enumerate(trial.measured) if m.missed or not m.counts.samples]
+        short = short or [r for r, m in enumerate(trial.measured) if not m.reached]
         self.fell_short[which, tuple(pick)] = short
         boards = seen.boards(pick)
         for r, (way, m) in enumerate(zip(seen.taken(pick), trial.measured, strict=True)):
-            if m.reached:
+            if r not in short:
                 continue
             w = pick[len(seen.parts) + r]
             if way.margin is None or not way.margin.limits:
