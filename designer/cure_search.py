@@ -21,6 +21,7 @@ from designer.cure_picture import Picture, Way, picture
 from designer.cure_program import Program, cheapest
 from designer.cure_study import Book, Measured, asked, fresh, measure, measure_together, plan_of
 from designer.cure_trial import Cure, Trial, measured_none
+from designer.limiting import limiting
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
 from designer.upgrade import Upgrades
@@ -336,20 +337,11 @@ class _Search:
         return f"no choice of upgrades is enough in the linear picture{named}"
 
     def _limit(self, number: int) -> str:
-        """What comes first on the way to losing a response, with nothing upgraded."""
+        """What limits a response with nothing upgraded, in one line."""
         if number in self.unseen:
             return "the nominal circuit does not show it"
-        if not self.pictures:
-            return ""
-        way = self.pictures[0].ways[number][0]
-        if way.margin is None or not way.margin.limits:
-            return "nothing within the spread"
-        limit = way.margin.limits[0]
-        weights = sorted(
-            zip(way.margin.quantities, limit.slopes**2, strict=True), key=lambda x: -float(x[1])
-        )
-        names = ", ".join(q.name for q, _ in weights[:3])
-        return f"{limit.what}, {limit.distance:.2g} standard deviations away, mostly {names}"
+        margin = self.pictures[0].ways[number][0].margin if self.pictures else None
+        return "" if margin is None else limiting(margin).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
         """The design as it is, and trials by price, each with a higher worst yield than any cheaper

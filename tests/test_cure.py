@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from designer import cure_search, cure_study, exact
+from designer import cure_search, cure_study, exact, rung_choice
 from designer.catalog import load_catalog
 from designer.cure import CURE, STUDIES, cure
 from designer.cure_branch import Branch
@@ -37,6 +37,7 @@ from designer.plots import to_svg
 from designer.progress import Progress
 from designer.quantities import quantities
 from designer.spread import Spread, draw_many
+from designer.study import RungName
 from designer.upgrade import Upgrades
 from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yield_maps import Axis, YieldMap
@@ -187,8 +188,10 @@ def test_out_of_reach_and_over_the_budget_are_told_apart(monkeypatch: pytest.Mon
     assert told is not None
     # What the first study showed may have brought the loss nearer.
     assert float(told[1]) == pytest.approx(share, abs=0.03)
-    assert far.limits[0].startswith("x, ")
-    assert "R50" in far.limits[0]
+    # Squares of the slopes: R50 and R203 have 13 of 19.05, the offset 1.44.
+    assert far.limits[0].startswith("null: x, ")
+    assert "the dead zone's parts 68 %" in far.limits[0]
+    assert "offsets and bias 8 %" in far.limits[0]
     least = by_hand(5.5)
     dear = searched(monkeypatch, known_picture(5.5), truth(5.5), 0.9 * least)
     assert not dear.reached
@@ -379,6 +382,34 @@ class _Stops(Progress):
         if text.startswith("round 1"):
             raise _Stopped
         return super().stage(text, total)
+
+
+class _Notes(Progress):
+    """Keeps the notes, and stops before the first board."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+    def stage(self, text: str, total: int | None = None) -> Any:
+        raise _Stopped
+
+
+@pytest.mark.parametrize(("rung", "told"), [("auto", 0), ("ngspice", 1)])
+def test_a_trade_that_sends_every_board_to_ngspice_is_told(
+    design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rung: RungName, told: int
+) -> None:
+    folder = Path(shutil.copytree(design, tmp_path / "design"))
+    choice = rung_choice.Choice(rung, "rung by trade.json: because")
+    monkeypatch.setattr(rung_choice, "choose", lambda _: choice)
+    said = _Notes()
+    with pytest.raises(_Stopped):
+        cure(folder, target=0.99, progress=said)
+    assert len(said.notes) == told
+    assert all(choice.reason in note for note in said.notes)
 
 
 @pytest.mark.slow
