@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import design_files
+from designer import design_files, rung_choice
 from designer.api import Synthesis
 from designer.cure_branch import KINDS, cured
 from designer.cure_json import cure_json, front_csv
@@ -36,7 +36,7 @@ from designer.upgrade import Upgrades
 
 CURE, STUDIES = "cure.json", "cure-studies.json"
 FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
-RULES = 1
+RULES = 2
 """Raised whenever the same inputs are to give another answer."""
 
 
@@ -101,6 +101,12 @@ def cure(
         if out is not None:
             _write_design(base, answer, out, options, said)
         return CureResult(answer, bool(answer["reached"]), True)
+    rung = rung_choice.choose(place)
+    if rung.rung == "ngspice":
+        said.note(
+            f"{rung.reason}; a cure is decided on the exact circuit all the same: ask ngspice "
+            "about the cured design (tolerance --rung ngspice)"
+        )
     began = time.perf_counter()
     known = _studies(place) if place.manifest and STUDIES in place.manifest.files else {}
     provenance_ = provenance(

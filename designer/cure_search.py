@@ -19,11 +19,13 @@ from designer.boards import Boards
 from designer.cure_branch import Branch, Refused, applied, branches
 from designer.cure_picture import Picture, Way, picture
 from designer.cure_program import Program, cheapest
-from designer.cure_study import Book, asked, fresh, measure, plan_of
+from designer.cure_study import Book, Measured, asked, fresh, measure, measure_together, plan_of
 from designer.cure_trial import Cure, Trial, measured_none
+from designer.limiting import limiting
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
 from designer.upgrade import Upgrades
+from designer.verdict import StudyPlan
 
 ROUNDS = 10
 """Choices that are measured before the search gives up."""
@@ -118,16 +120,15 @@ class _Search:
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
         step = self.said.stage("the design as it is")
-        made, trials = self.base, []
+        made, plans = self.base, list[tuple[StudyPlan, float | None] | None]()
         for number, question in enumerate(asked(made, made.found)):
             if question is None:
                 self.unseen.append(number)
-                trials.append(measured_none(self.target))
-                continue
-            plan = plan_of(made, question, fresh(self.seed, 1))
-            trials.append(measure(plan, self.target, self.book, jobs=self.jobs, progress=step))
+            plan = None if question is None else plan_of(made, question, fresh(self.seed, 1))
+            plans.append(None if plan is None else (plan, None))
+        trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         rates = tuple(m.rate for m in trials)
-        return Trial("as it is", Upgrades(), 0.0, rates, tuple(trials), self.target)
+        return Trial("as it is", Upgrades(), 0.0, rates, trials, self.target)
 
     def _choice(self, target: float) -> tuple[int, tuple[int, ...], tuple[float, ...]] | None:
         """The cheapest choice over all branches: its picture's number, the options, the promise.
@@ -248,42 +249,48 @@ class _Search:
         predicted: tuple[float, ...],
         number: int,
         name: str,
-        most: int | None = None,
+        boards: int | None = None,
     ) -> Trial:
-        """A choice, measured on boards that nobody has seen."""
+        """A choice, measured on boards that nobody has seen.
+
+        boards : how many, of each response; None: until it is decided whether all are enough."""
         seen = self.pictures[which]
         cost = self._price(which, pick)
         step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
         upgrades = seen.upgrades(pick)
         made = applied(seen.branch, upgrades)
-        found = []
+        plans = list[tuple[StudyPlan, float | None] | None]()
         for way, question in zip(seen.taken(pick), asked(made, made.found), strict=True):
-            if question is None:
-                found.append(measured_none(self.target))
-                continue
-            plan = plan_of(made, question, fresh(self.seed, number))
+            plan = None if question is None else plan_of(made, question, fresh(self.seed, number))
             trim = upgrades.trim if way.kind == "trim" else None
-            found.append(
-                measure(
-                    plan,
-                    self.target,
-                    self.book,
-                    trim=trim,
-                    jobs=self.jobs,
-                    progress=step,
-                    **({} if most is None else {"least": most, "most": most}),
+            plans.append(None if plan is None else (plan, trim))
+        found: tuple[Measured, ...]
+        if boards is None:
+            found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
+        else:
+            found = tuple(
+                measured_none(self.target)
+                if asked_for is None
+                else measure(
+                    asked_for[0], self.target, self.book,
+                    trim=asked_for[1], least=boards, most=boards, jobs=self.jobs, progress=step,
                 )
-            )
-        return Trial(seen.branch.name, upgrades, cost, predicted, tuple(found), self.target)
+                for asked_for in plans
+            )  # fmt: skip
+        return Trial(seen.branch.name, upgrades, cost, predicted, found, self.target)
 
     def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
-        """Tighten what was promised and not kept."""
+        """Tighten what was promised and not kept.
+
+        Where a response has missed the target, those that are undecided were asked on few boards
+        only: nothing is learnt of them."""
         seen = self.pictures[which]
-        short = [r for r, m in enumerate(trial.measured) if not m.reached]
+        short = [r for r, m in enumerate(trial.measured) if m.missed or not m.counts.samples]
+        short = short or [r for r, m in enumerate(trial.measured) if not m.reached]
         self.fell_short[which, tuple(pick)] = short
         boards = seen.boards(pick)
         for r, (way, m) in enumerate(zip(seen.taken(pick), trial.measured, strict=True)):
-            if m.reached:
+            if r not in short:
                 continue
             w = pick[len(seen.parts) + r]
             if way.margin is None or not way.margin.limits:
@@ -330,20 +337,11 @@ class _Search:
         return f"no choice of upgrades is enough in the linear picture{named}"
 
     def _limit(self, number: int) -> str:
-        """What comes first on the way to losing a response, with nothing upgraded."""
+        """What limits a response with nothing upgraded, in one line."""
         if number in self.unseen:
             return "the nominal circuit does not show it"
-        if not self.pictures:
-            return ""
-        way = self.pictures[0].ways[number][0]
-        if way.margin is None or not way.margin.limits:
-            return "nothing within the spread"
-        limit = way.margin.limits[0]
-        weights = sorted(
-            zip(way.margin.quantities, limit.slopes**2, strict=True), key=lambda x: -float(x[1])
-        )
-        names = ", ".join(q.name for q, _ in weights[:3])
-        return f"{limit.what}, {limit.distance:.2g} standard deviations away, mostly {names}"
+        margin = self.pictures[0].ways[number][0].margin if self.pictures else None
+        return "" if margin is None else limiting(margin).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
         """The design as it is, and trials by price, each with a higher worst yield than any cheaper

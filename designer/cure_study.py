@@ -16,11 +16,14 @@ from designer.orbit import OrbitStatus
 from designer.responses import ModelResponse
 from designer.spread import Spread
 from designer.study_hash import study_hash
-from designer.tuning import MOST_TRIES, tuned_block
+from designer.tuning import benched_block
 from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 
 MOST = 8000
 """Boards of a study at which it gives up."""
+FIRST, LOST = 50, 20
+"""Boards after which a study may end because the target is missed, and the lost boards by which
+it then knows their share well enough (to a quarter of it): lost boards are the dear ones."""
 TAG = 0xC04E
 """Sets the boards of a cure apart from those of a study with the same seed."""
 VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
@@ -75,15 +78,15 @@ class Book:
         bands = None if trim is None else Bands(0.0, 0.0, trim)
         layer, more = "samples", dict[str, Any]()
         if bands is not None:
-            layer, more = "tuned", {"bands": bands.as_dict(), "tries": MOST_TRIES}
+            layer, more = "tuned", {"bands": bands.as_dict()}
         study, place = study_hash(plan, layer, more), str(indices.start)
         letters = self._known.get(study, {}).get(place, "")
-        if len(letters) == len(indices):
-            return letters, False
+        if len(letters) >= len(indices):
+            return letters[: len(indices)], False
         answers = exact.block(plan, indices, jobs)
         verdicts = [a.verdict for a in answers]
         if bands is not None:
-            verdicts = [t.bench_verdict for t in tuned_block(plan, indices, answers, bands, jobs)]
+            verdicts = benched_block(plan, indices, answers, bands, jobs)
         letters = "".join(_LETTERS[v] for v in verdicts)
         self._known.setdefault(study, {})[place] = letters
         self._save({"format": 1, "studies": self._known})
@@ -108,9 +111,14 @@ class Measured:
         return self.counts.interval[0] >= self.target
 
     @property
+    def missed(self) -> bool:
+        """The whole interval is below the target."""
+        return self.counts.interval[1] < self.target
+
+    @property
     def decided(self) -> bool:
         """Whether more boards would not change the answer."""
-        return self.reached or self.counts.interval[1] < self.target
+        return self.reached or self.missed
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -136,19 +144,57 @@ def measure(
     trim: float | None = None,
     least: int = 2 * BLOCK,
     most: int = MOST,
+    first: int | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> Measured:
     """The yield of a plan of one question on ``least`` boards, and on more until it is decided.
 
-    most : boards at which it gives up. progress : called once a block.
+    most : boards at which it gives up. first : boards after which, and after each block from there,
+    it ends where the target is missed and ``LOST`` boards are lost; None: never before ``least``.
+    progress : called once a block.
     """
-    letters, found = "", Measured(Yield(0, 0, 0, 0), target)
+    letters, found, most = "", Measured(Yield(0, 0, 0, 0), target), max(least, most)
     while len(letters) < least or (len(letters) < most and not found.decided):
-        stop = min(len(letters) + BLOCK, max(least, most))
-        letters += book.block(
-            replace(plan, samples=max(least, most)), range(len(letters), stop), trim, jobs
-        )[0]
+        lost = found.counts.lost + found.counts.grazing
+        if first is not None and found.missed and lost >= LOST:
+            break
+        stop = (len(letters) // BLOCK + 1) * BLOCK
+        if not letters and first is not None:
+            stop = first
+        indices = range(len(letters), min(stop, most))
+        letters += book.block(replace(plan, samples=most), indices, trim, jobs)[0]
         found = Measured(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
         progress()
     return found
+
+
+def measure_together(
+    plans: Sequence[tuple[StudyPlan, float | None] | None],
+    target: float,
+    book: Book,
+    *,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[Measured, ...]:
+    """The yields of several responses that all have to reach the target.
+
+    One block of boards each. Once a response has missed the target the choice is out, whatever
+    becomes of the others: only those that miss it are asked on more boards, for their share.
+
+    plans : each with the band within which its boards are trimmed, None: as built; None where there
+    is no response to ask for, which misses.
+    """
+    found = [Measured(Yield(0, 0, 0, 0), target) for _ in plans]
+    for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):
+        for k, asked_for in enumerate(plans):
+            out = None in plans or any(m.missed for m in found)
+            if most > BLOCK and out and not found[k].missed:
+                continue
+            if asked_for is not None:
+                plan, trim = asked_for
+                found[k] = measure(
+                    plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
+                    progress=progress,
+                )  # fmt: skip
+    return tuple(found)

@@ -26,7 +26,7 @@ from designer.spread import draw_many
 from designer.threads import parallel
 from designer.verdict import Answer, StudyPlan, Verdict, judge, kept
 
-__all__ = ["MOST_TRIES", "Bands", "Tuned", "tuned_block"]
+__all__ = ["MOST_TRIES", "Bands", "Tuned", "benched_block", "tuned_block"]
 
 DIGITS = 6
 """Decimals of the centring DC offset over the amplitude."""
@@ -140,6 +140,25 @@ def tuned_block(
         )
         progress()
     return rows
+
+
+def benched_block(
+    plan: StudyPlan,
+    indices: range,
+    answers: Sequence[Answer],
+    bands: Bands,
+    jobs: int,
+) -> list[Verdict]:
+    """The bench verdicts of ``tuned_block``, without the dear search for what else exists.
+
+    Raises
+    ------
+    KeyError : the answer as built of a board is missing.
+    """
+    known = {(a.sample, a.question): a for a in answers}
+    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
+    asked = [known[i, number] for i in indices for number in range(len(plan.questions))]
+    return [row[1] for row in _on_bench(plan, indices, ensemble, asked, bands, jobs)]
 
 
 def _outcome(answer: Answer, case: Case | None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from designer import cure_search, cure_study, exact
+from designer import cure_search, cure_study, exact, rung_choice
 from designer.catalog import load_catalog
 from designer.cure import CURE, STUDIES, cure
 from designer.cure_branch import Branch
@@ -25,7 +25,7 @@ from designer.cure_picture import Picture, Way, best_place
 from designer.cure_plots import front_chart
 from designer.cure_search import find_cure
 from designer.cure_slots import part_slots
-from designer.cure_study import Book, Measured, measure
+from designer.cure_study import Book, Measured, measure, measure_together
 from designer.cure_table import text
 from designer.cure_trial import Cure
 from designer.errors import InputError
@@ -37,8 +37,9 @@ from designer.plots import to_svg
 from designer.progress import Progress
 from designer.quantities import quantities
 from designer.spread import Spread, draw_many
+from designer.study import RungName
 from designer.upgrade import Upgrades
-from designer.verdict import Question, StudyPlan, Verdict, Yield
+from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yield_maps import Axis, YieldMap
 from tests import bench_plans, paper_cases
 
@@ -135,6 +136,7 @@ def searched(
     """The search with this picture, where ``real`` is what studies measure."""
     monkeypatch.setattr(cure_search, "picture", lambda *_, **__: picture)
     monkeypatch.setattr(cure_search, "measure", real)
+    monkeypatch.setattr(cure_study, "measure", real)  # as measure_together calls it
     monkeypatch.setattr(cure_search, "asked", lambda *_: [bench_plans.question(1)])
     monkeypatch.setattr(cure_search, "branches", lambda *_: iter([branch()]))
     return find_cure(one_response(), TARGET, budget=budget, seed=1, jobs=1)
@@ -186,8 +188,10 @@ def test_out_of_reach_and_over_the_budget_are_told_apart(monkeypatch: pytest.Mon
     assert told is not None
     # What the first study showed may have brought the loss nearer.
     assert float(told[1]) == pytest.approx(share, abs=0.03)
-    assert far.limits[0].startswith("x, ")
-    assert "R50" in far.limits[0]
+    # Squares of the slopes: R50 and R203 have 13 of 19.05, the offset 1.44.
+    assert far.limits[0].startswith("null: x, ")
+    assert "the dead zone's parts 68 %" in far.limits[0]
+    assert "offsets and bias 8 %" in far.limits[0]
     least = by_hand(5.5)
     dear = searched(monkeypatch, known_picture(5.5), truth(5.5), 0.9 * least)
     assert not dear.reached
@@ -228,6 +232,58 @@ def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> N
     again = measure(plan, 0.9, Book(json.loads(json.dumps(kept))["studies"]))
     assert again == measure(plan, 0.9, book)
     assert sorted(set(blocks)) == sorted(blocks)
+
+
+def coins(monkeypatch: pytest.MonkeyPatch, asked: list[tuple[int, range]]) -> None:
+    """Boards of which a known share is ok: 0.3 of seed 1, 0.96 of seed 4, 0.999 of any other."""
+
+    def block(plan: StudyPlan, indices: range, jobs: int) -> list[Any]:
+        asked.append((plan.seed, indices))
+        share = {1: 0.3, 4: 0.96}.get(plan.seed, 0.999)
+        fine = np.random.default_rng(plan.seed).random(8000) < share
+        return [_Row("ok" if fine[i] else "lost") for i in indices]
+
+    monkeypatch.setattr(exact, "block", block)
+
+
+def test_one_response_that_is_out_ends_the_studies_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of which most boards are lost is asked on few, one of which few are lost on two blocks,
+    and the others on no second one; where none is out every interval lies above the target in the
+    end."""
+    asked: list[tuple[int, range]] = []
+    coins(monkeypatch, asked)
+    plans = [(replace(bench_plans.plan(1, samples=8000), seed=s), None) for s in (2, 1, 4, 3)]
+    fine, out, close, last = measure_together(plans, 0.99, Book())
+    assert out.missed
+    assert out.counts.samples == cure_study.FIRST
+    assert close.missed
+    assert close.counts.samples == 2 * BLOCK
+    for other in (fine, last):
+        assert not other.missed
+        assert other.counts.samples == BLOCK
+    known = len(asked)
+    both = measure_together([plans[0], plans[3]], 0.99, Book())
+    assert len(asked) > known
+    assert all(m.reached and m.counts.samples >= 2 * BLOCK for m in both)
+    nothing, waits = measure_together([None, plans[0]], 0.99, Book())
+    assert nothing.counts.samples == 0
+    assert waits.counts.samples == BLOCK
+
+
+def test_the_boards_of_a_study_are_those_of_a_longer_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study that may end early asks the boards that one without has, once each; what a longer
+    block knows is not asked again."""
+    asked: list[tuple[int, range]] = []
+    coins(monkeypatch, asked)
+    plan = replace(bench_plans.plan(1, samples=8000), seed=2)
+    early = measure(plan, 0.99, Book(), first=cure_study.FIRST)
+    boards = [i for _, indices in asked for i in indices]
+    assert boards == list(range(early.counts.samples))
+    book = Book()
+    assert measure(plan, 0.99, book, most=early.counts.samples) == early
+    known = len(asked)
+    book.block(plan, range(cure_study.FIRST), None, 1)
+    assert len(asked) == known
 
 
 class _Row:
@@ -326,6 +382,34 @@ class _Stops(Progress):
         if text.startswith("round 1"):
             raise _Stopped
         return super().stage(text, total)
+
+
+class _Notes(Progress):
+    """Keeps the notes, and stops before the first board."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+    def stage(self, text: str, total: int | None = None) -> Any:
+        raise _Stopped
+
+
+@pytest.mark.parametrize(("rung", "told"), [("auto", 0), ("ngspice", 1)])
+def test_a_trade_that_sends_every_board_to_ngspice_is_told(
+    design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rung: RungName, told: int
+) -> None:
+    folder = Path(shutil.copytree(design, tmp_path / "design"))
+    choice = rung_choice.Choice(rung, "rung by trade.json: because")
+    monkeypatch.setattr(rung_choice, "choose", lambda _: choice)
+    said = _Notes()
+    with pytest.raises(_Stopped):
+        cure(folder, target=0.99, progress=said)
+    assert len(said.notes) == told
+    assert all(choice.reason in note for note in said.notes)
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from designer.reduction import FloatingCircuit, Reduction
 from designer.setting_search import MOST_FOLLOWED, Case, Try, seek
 from designer.spread import Spread, draw
 from designer.study_json import tuned_json
-from designer.tuning import MOST_TRIES, Tuned, tuned_block
+from designer.tuning import MOST_TRIES, Tuned, benched_block, tuned_block
 from designer.verdict import Answer, Question, Verdict, judge
 from tests.bench_plans import answers, ensemble, period_counts, plan, question, shifted
 from tests.paper_cases import subject
@@ -85,6 +85,14 @@ def test_tuning_helps_and_takes_nothing_away(rough: tuple[list[Answer], list[Tun
     assert all(t for t, b in zip(tuned, works, strict=True) if b)
     assert sum(tuned) > sum(works)
     assert {r.tries == 0 for r, b in zip(rows, works, strict=True) if b} == {True}
+
+
+def test_the_bench_alone_comes_to_the_same(rough: tuple[list[Answer], list[Tuned]]) -> None:
+    """Without the search for what else exists, on fewer boards at once."""
+    built, rows = rough
+    alone = benched_block(plan(3, 6, spread=ROUGH), range(2, 6), built, Bands(), 1)
+    assert alone == [r.bench_verdict for r in rows if 2 <= r.sample < 6]
+    assert len(set(alone)) > 1
 
 
 def test_every_setting_found_lies_in_the_bands_and_works(
