@@ -26,6 +26,7 @@ from designer.circuit import (
 from designer.dead_zone_parts import OUTPUT
 from designer.design import Design
 from designer.diode_model import THERMAL, diode_model
+from designer.errors import Unreachable
 from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.modelfile import ModelFile
 from designer.partgrades import bought
@@ -41,6 +42,8 @@ TRIMMER = 10e3
 """The trimmer's resistance [Ω]: it lies between the rails and loads them with some milliamperes."""
 LEAST_SERIES = 10e3
 """Least resistance [Ω] after the wiper, so that the trimmer's own does not count."""
+MOST_SERIES = 10e6
+"""Most resistance [Ω] after the wiper: beyond it a board's own leakage counts."""
 GENERATOR_MOST = 10.0
 """Most [V peak] that a usual function generator gives without a load."""
 
@@ -51,7 +54,8 @@ def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
     Raises
     ------
     InputError : an op-amp, a diode or a connector that the catalogue does not have.
-    Unreachable : no resistor for the trim can be bought.
+    Unreachable : no resistor for a trim that is to be fitted can be bought. Footprints that stay
+        empty are left out then.
     """
     bare = replace(circuit, fittings=())
     spec = choice.spec
@@ -195,13 +199,22 @@ def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iter
 
 
 def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Fitting]:
-    """A trimmer between the rails, and a resistor from its wiper into the driven summing node."""
+    """A trimmer between the rails, and a resistor from its wiper into the driven summing node.
+
+    Where the resistor that is wanted lies outside what is used, the nearest end of that range is
+    taken: ``trim_reach`` says how far it goes.
+    """
     views = View.FITTED if choice.spec.dc_trim == "fitted" else View.BOARD
     node = next(iter(driven_nodes(circuit)), None)
     if node is None:
         return
     wanted = circuit.supply * drive_resistance(circuit, node) / choice.trim
-    sold = catalog.values("resistor", ["E24"], LEAST_SERIES, 10e6, choice.resistor_grade)
+    try:
+        sold = catalog.values("resistor", ["E24"], LEAST_SERIES, MOST_SERIES, choice.resistor_grade)
+    except Unreachable:
+        if views & View.BOM:
+            raise
+        return  # footprints that nobody could fill
     value = float(max((v for v in sold if v <= wanted), default=sold[0]))
     role = "DC trim"
     yield Trimmer("RV901", NEGATIVE, "trim", POSITIVE, TRIMMER, role, views)

@@ -230,7 +230,7 @@ def catalog(
     quiet: Quiet = False,
     log: Log = None,
 ) -> int:
-    """What can be bought: part families, op-amps, diodes, references."""
+    """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
     with _session(verbose, quiet, log):
         from designer.catalog import load_catalog
 
@@ -256,6 +256,8 @@ def catalog(
                 "families": [entry.name for entry in held.families],
                 "diodes": [entry.name for entry in held.diodes],
                 "references": [entry.name for entry in held.references],
+                "trimmers": [entry.name for entry in held.trimmers],
+                "headers": [entry.name for entry in held.headers],
                 "hash": held.hash,
             }
         )

@@ -240,6 +240,8 @@ def catalog(held: Catalog) -> None:
     for what, names in (
         ("Diodes", [entry.name for entry in held.diodes]),
         ("References", [entry.name for entry in held.references]),
+        ("Trimmers", [entry.name for entry in held.trimmers]),
+        ("Headers", [entry.name for entry in held.headers]),
     ):
         _line(console, f"{what}: {', '.join(names) or 'none'}")
 

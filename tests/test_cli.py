@@ -379,12 +379,16 @@ def test_catalog(capfd: pytest.CaptureFixture[str]) -> None:
     said = capfd.readouterr()
     answer = _strict(said.out)
     assert "TL074C" in answer["opamps"]
-    assert set(answer) == {"format", "opamps", "families", "diodes", "references", "hash"}
+    kinds = {"opamps", "families", "diodes", "references", "trimmers", "headers"}
+    assert set(answer) == {"format", "hash"} | kinds
+    assert "Bourns 3296W 10 kΩ" in answer["trimmers"]
+    assert all(answer[kind] for kind in kinds)
     assert said.err == ""
     assert cli.status(["catalog"]) == 0
     said = capfd.readouterr()
     assert said.out == ""
-    assert "TL074C" in said.err
+    for name in ("TL074C", *answer["trimmers"], *answer["headers"]):
+        assert name in said.err
 
 
 def test_new_writes_a_valid_file_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
