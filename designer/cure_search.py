@@ -27,6 +27,10 @@ from designer.progress import Progress
 from designer.upgrade import Upgrades
 from designer.verdict import StudyPlan
 
+FRONT = 100
+"""Number of the boards of the front; no round comes so far."""
+CONFIRMING = 4000
+"""Boards of each response by which a choice is confirmed."""
 ROUNDS = 10
 """Choices that are measured before the search gives up."""
 TRIES = 16
@@ -110,7 +114,12 @@ class _Search:
             if self.budget is not None and cost > self.budget + 1e-9:
                 why = f"the cheapest choice that may be enough costs {cost:.2f} euro"
                 return self._answer(before, rounds, False, why)
-            trial = self._trial(which, pick, predicted, 2 + number, f"round {number + 1}")
+            name = f"round {number + 1}"
+            trial = self._trial(which, pick, predicted, 2 + number, name)
+            if trial.reached:
+                # It was looked at until it was enough: what counts are other boards, asked once.
+                again = 2 + ROUNDS + number
+                trial = self._trial(which, pick, predicted, again, f"{name}, once more", CONFIRMING)
             rounds.append(trial)
             if trial.reached:
                 return self._answer(before, rounds, True, "measured on fresh boards")
@@ -364,7 +373,7 @@ class _Search:
             if key in seen or len(trials) > len(rounds) + FRONT_POINTS:
                 continue
             seen.add(key)
-            trials.append(self._trial(which, pick, promised, 1, "front", FRONT_BOARDS))
+            trials.append(self._trial(which, pick, promised, FRONT, "front", FRONT_BOARDS))
         trials.sort(key=lambda t: (t.price, -t.worst.rate))
         front: list[Trial] = []
         for t in trials:
