@@ -3,6 +3,7 @@ whole one."""
 
 from __future__ import annotations
 
+import csv
 import itertools
 import json
 import re
@@ -443,7 +444,7 @@ def test_a_design_is_cured_and_its_cure_is_a_design(design: Path, tmp_path: Path
     yields = run_into(modelfile, out, options, Progress(), lambda _: "").answer["responses"]
     # Another seed, so another draw of the same yield.
     assert yields[0]["yield"]["high"] > 0.99
-    bill = (out / "bom.csv").read_text(encoding="utf-8")
-    better = [row for row in bill.splitlines() if row.endswith(",0.001")]
-    named = {name for row in better for name in row.split(",")[1].split()}
+    with (out / "bom.csv").open(encoding="utf-8", newline="") as bill:
+        better = [row for row in csv.DictReader(bill) if row["grade"] == "0.001"]
+    named = {name for row in better for name in row["designators"].split()}
     assert named == set(answer["upgrades"]["grades"])
