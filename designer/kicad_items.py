@@ -78,6 +78,8 @@ def shape(component: Component) -> Shape:
     if kind == "test point":
         return symbols.test_point()
     pins = [(pin.number, pin.name, pin.electrical) for pin in component.pins]
+    if kind == "trimmer":  # between the rails: the higher one above, where its symbol points
+        pins.sort(key=lambda pin: ("high", "wiper", "low").index(pin[1]))
     letters = component.reference.rstrip("0123456789")
     name = f"Header_{len(pins)}" if kind == "connector" else _named(letters, component)
     # Power symbols at neighbouring pins need room between them.

@@ -311,7 +311,7 @@ def _size(item: Item) -> tuple[int, int]:
     if item.shape.prefix == "U":
         return 12, 18
     if item.shape.prefix == "#FLG":
-        return 12, 10
+        return 12, 12
     if len(pins) == 2 and not item.shape.numbers:
         return 25, PITCH + (2 if item.shape.prefix == "V" else 0)
     return 25, max(p.y for p in pins) - min(p.y for p in pins) + 8
