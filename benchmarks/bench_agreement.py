@@ -35,7 +35,7 @@ from designer.workers import SpicePool
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "agreement"
 MODEL = ROOT / "examples" / "paper.toml"
-SAMPLES, SEED = 200, 2026
+SAMPLES, SEED = 100, 2026
 GOAL = 0.99
 FINER = 8.0
 """How much finer the last step is than the one that passed the gate; a study halves it once."""
