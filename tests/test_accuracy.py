@@ -136,6 +136,7 @@ def check_grid(problems: list[Problem]) -> int:
     return compared
 
 
+@pytest.mark.slow
 def test_small_grid() -> None:
     """Every third; the large grid has all of the edges."""
     assert check_grid(grid(36, 1)[::3]) >= 8

@@ -183,6 +183,7 @@ def test_pitchfork_is_the_half_period_multiplier_minus_one() -> None:
     assert signs[0] * signs[1] < 0.0
 
 
+@pytest.mark.slow
 def test_twins_meet_at_the_pitchfork() -> None:
     found = first_cascade()
     p = point(found, Kind.PITCHFORK, 1.4605)
@@ -194,6 +195,7 @@ def test_twins_meet_at_the_pitchfork() -> None:
     assert abs(fit(0.0) - p.value) < 1e-6
 
 
+@pytest.mark.slow
 def test_no_branch_falls_back_onto_its_parent() -> None:
     over = family.of_model(PAPER, 0.335, "omega")
     orbit = settle(over.flow(0.335), np.zeros(4))

@@ -267,6 +267,7 @@ def test_without_a_folder_nothing_is_written(
     assert answer["cost"]["comparison_seconds"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_folder_holds_it_and_is_reused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path, out = model(tmp_path, BASE.format(k0=0.94)), tmp_path / "design"
     plain, _ = printed(["synthesise", path, "--out", out, "--json"], capfd)

@@ -148,6 +148,7 @@ def test_without_any_that_may_be_one_nothing_changes() -> None:
     assert design(()).circuit == design(False).circuit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "matched",
     [

@@ -331,6 +331,7 @@ def test_how_far_a_rectifier_may_drive_its_output() -> None:
         assert check.holds is (fv < abs(reach["U3A" if diode == "D202" else "U3B"][1]))
 
 
+@pytest.mark.slow
 def test_a_rectifier_on_high_rails_is_scaled_down(monkeypatch: pytest.MonkeyPatch) -> None:
     """On ± 18 V the swing alone would let fv pass what two 5 V references allow."""
     path = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"

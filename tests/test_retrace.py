@@ -58,6 +58,7 @@ def test_a_loop_is_followed_once_round() -> None:
     assert max(steps) < 0.1
 
 
+@pytest.mark.slow
 def test_a_loop_is_the_same_from_another_of_its_orbits() -> None:
     assert facts(locate(loop(1.55))) == facts(locate(loop(1.505)))
 
@@ -128,6 +129,7 @@ def test_no_fold_stands_where_branches_meet() -> None:
     assert sum(p.kind is Kind.FOLD for p in found.on(number)) == turns
 
 
+@pytest.mark.slow
 def test_a_branch_goes_on_where_it_turns_sharply_beside_a_grazing() -> None:
     """1-8-7 begins in a fold 1e-9 from a first touch. Further on it is what the flow settles to."""
     over = family.of_model(PAPER, 0.25, "omega")

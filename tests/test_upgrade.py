@@ -144,6 +144,7 @@ def test_another_opamp_on_the_same_parts_has_its_own_limits(base: Synthesis) -> 
     assert broken == ["generator_peak_v"]  # 4.95 V were asked of it before
 
 
+@pytest.mark.slow
 def test_where_a_condition_breaks_the_parts_are_chosen_anew(base: Synthesis) -> None:
     branch = branch_of(base, Upgrades(opamp="TL074H", grades={"R50": 0.001}))
     assert isinstance(branch, Branch)
