@@ -68,16 +68,16 @@ def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelRespons
                 None,
                 f"response[{number}].omega",
                 "best",
-                "a number; the verb search chooses one, and so does what makes a design if "
-                'circuit.objective is "yield"',
+                "a number; the verb search chooses one, and so does what makes a design with "
+                'circuit.objective = "yield"',
             )
         if isinstance(spec.b, tuple):
             raise InputError(
                 None,
                 f"response[{number}].b",
                 list(spec.b),
-                "a number; the verb search chooses one, and so does what makes a design if "
-                'circuit.objective is "yield"',
+                "a number; the verb search chooses one, and so does what makes a design with "
+                'circuit.objective = "yield"',
             )
         check_omega(f"response[{number}].omega", spec.omega)
         b = model.b if spec.b is None else spec.b
