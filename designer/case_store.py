@@ -63,13 +63,28 @@ class CaseStore:
         return {k: v for k, v in known.items() if k != "key"}
 
     def _read(self, path: Path) -> dict[str, Any] | None:
-        try:
-            known = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError) as error:
-            raise InputError(path, "--resume", str(error), "a piece of this report") from None
-        if not isinstance(known, dict) or known.get("key") != self._key:
+        known = read_piece(path, "--resume")
+        if known is not None and known.get("key") != self._key:
             found = "a piece of other settings"
             raise InputError(path, "--resume", found, "the same settings")
         return known
+
+
+def read_piece(
+    path: Path, option: str, what: str = "a piece of this report"
+) -> dict[str, Any] | None:
+    """A piece as it stands on the disk; None where there is none.
+
+    Raises
+    ------
+    InputError : it cannot be read, or is no piece; in the name of ``option``.
+    """
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise InputError(path, option, str(error), what) from None
+    if not isinstance(known, dict):
+        raise InputError(path, option, type(known).__name__, what)
+    return known

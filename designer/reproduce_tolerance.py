@@ -20,6 +20,7 @@ from typing import Any
 from designer import exact
 from designer.bands import Bands
 from designer.blame import blame
+from designer.case_store import read_piece
 from designer.catalog import load_catalog
 from designer.errors import InputError
 from designer.preconditions import at_least, cores
@@ -230,13 +231,8 @@ def _key(case: Case, short: int, catalog_hash: str) -> str:
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
     """A finished case; None where there is none."""
-    try:
-        known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:
-        raise InputError(str(path), "--resume", str(error), "a case of this report") from None
-    if known.get("key") != key:
+    known = read_piece(path, "--resume", "a case of this report")
+    if known is not None and known.get("key") != key:
         raise InputError(str(path), "--resume", "a case of other settings", "the same settings")
     return known
 

@@ -25,6 +25,7 @@ from designer import __version__, compare, exact, pipeline, search_job, study_ha
 from designer.all_on_one import all_on_one
 from designer.api import Synthesis
 from designer.blame import blame
+from designer.case_store import read_piece
 from designer.catalog import Catalog, load_catalog
 from designer.circuitspec import CircuitSpec
 from designer.design_files import load
@@ -80,10 +81,9 @@ def report(
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         path = out / "cases" / f"{name.replace(', ', '-').replace(' ', '-')}.json"
-        if path.exists():
-            known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-            if known["settings"] == settings:
-                return known
+        known = read_piece(path, "--out")
+        if known is not None and known.get("settings") == settings:
+            return known
         made: dict[str, Any] = plain({"settings": settings, "name": name, **make()})
         write(path, _json(made))
         return made
