@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import schemdraw
 import schemdraw.elements as elm
@@ -67,12 +67,18 @@ def svg(circuit: Circuit, title: str = "") -> str:
 
 def png(circuit: Circuit, title: str = "", dpi: int = 72) -> bytes:
     """The drawing as PNG."""
-    from designer.plots import style  # matplotlib is needed for this alone
+    from matplotlib import pyplot  # matplotlib is needed for this alone
+    from schemdraw.backends import mpl
+
+    from designer.plots import style
 
     with style():
         page = _Page("matplotlib", dpi)
         page.draw(circuit, title)
-        return page.drawing.get_imagedata("png")
+        picture = page.drawing.get_imagedata("png")
+    # schemdraw takes its figure from pyplot, which keeps every figure until it is closed.
+    pyplot.close(cast(mpl.Figure, page.drawing.fig).fig)
+    return picture
 
 
 class _Page:

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 from itertools import combinations
 
 import pytest
+from matplotlib import pyplot
 
 from designer import drawing
 from designer.board_parts import fitted
@@ -107,6 +108,12 @@ def test_a_picture_of_points() -> None:
     png = drawing.png(CIRCUITS["one-sided rectifier"], HOSTILE, dpi=20)
     assert png.startswith(b"\x89PNG\r\n")
     assert len(png) > 5000
+
+
+def test_a_picture_leaves_no_figure_behind() -> None:
+    before = pyplot.get_fignums()
+    drawing.png(CIRCUITS["one-sided rectifier"], dpi=20)
+    assert pyplot.get_fignums() == before
 
 
 def test_without_fittings_there_is_no_board() -> None:
