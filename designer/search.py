@@ -4,7 +4,8 @@ Over all wanted responses, in this order: the smallest of their distances from b
 (``designer.search_distance``), hence the smallest predicted yield; where two designs agree in it,
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the
-responses, then what the synthesis aims at. A lever stays where it is unless something is gained.
+responses, the other op-amps and dead zones at those, then what the synthesis aims at. A lever stays
+where it is unless something is gained.
 
 Nothing of the chain (model, match, circuit, predictions) imports a module of the search.
 """
@@ -28,7 +29,7 @@ from designer.preconditions import naming, need_responses
 from designer.progress import Progress
 from designer.responses import ModelResponse
 from designer.search_distance import Stretched
-from designer.search_levers import LEVERS, PLACES, Choice, topologies, variants
+from designer.search_levers import LEVERS, PLACES, TOPOLOGY, Choice, topologies, variants
 from designer.search_memory import Memory
 from designer.search_places import MANY, Scored, places, room_of, score
 from designer.search_windows import Place, Stretch, open_in, stretches
@@ -60,6 +61,11 @@ class Candidate:
     @property
     def distances(self) -> tuple[float, ...]:
         return tuple(s.distance for s in self.scored)
+
+    @property
+    def shown_at(self) -> tuple[Response, ...]:
+        """Each response with its place."""
+        return tuple(r.spec for r in self.found)
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -198,9 +204,15 @@ class _Hunt:
         start, best = self._topology(middle)
         if any(open_in(spec) for spec in self.modelfile.responses):
             best = self._placed(best)
+            for choice in topologies(self.modelfile, self.catalog):
+                other = best.choice.with_lever("opamp", choice.opamp)
+                other = other.with_lever("dead zone", choice.dead_zone)
+                if other != best.choice:
+                    setting = f"{other.opamp}, {other.dead_zone}"
+                    best = self._try(TOPOLOGY, setting, other, best)
         for lever in LEVERS[2:]:
             for choice in variants(best.choice, lever):
-                best = self._try(lever, choice, best)
+                best = self._try(lever, _shown(choice.get(lever)), choice, best)
         contributions = self._contributions(start, best)
         return Searched(
             self._made(best),
@@ -223,10 +235,10 @@ class _Hunt:
             setting = f"{choice.opamp}, {choice.dead_zone}"
             made = self._candidate(choice, middle, setting)
             if made is None:
-                self._note("opamp and dead zone", setting, None, False)
+                self._note(TOPOLOGY, setting, None, False)
                 continue
             gained = best is None or better(made.rank, best.rank)
-            self._note("opamp and dead zone", setting, made, gained)
+            self._note(TOPOLOGY, setting, made, gained)
             if choice == own:
                 start = made
             if gained:
@@ -260,8 +272,7 @@ class _Hunt:
         self._note(PLACES, setting, made, gained)
         return made if made is not None and gained else best
 
-    def _try(self, lever: str, choice: Choice, best: Candidate) -> Candidate:
-        setting = _shown(choice.get(lever))
+    def _try(self, lever: str, setting: str, choice: Choice, best: Candidate) -> Candidate:
         made = self._candidate(choice, best.found, f"{lever} {setting}")
         gained = made is not None and better(made.rank, best.rank)
         self._note(lever, setting, made, gained)
@@ -305,7 +316,7 @@ class _Hunt:
         if start is None:
             return ()
         out = []
-        if final.found != start.found:
+        if final.shown_at != start.shown_at:
             out.append(
                 Contribution(
                     PLACES,

@@ -47,7 +47,7 @@ DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
 RUNG: Rung = "dynamic"
 """Of ngspice, on which the final figures are confirmed."""
-RULES = 2
+RULES = 3
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 

@@ -12,7 +12,7 @@ from designer.errors import InputError
 from designer.limits import NO_AIMS, Aims
 from designer.modelfile import ModelFile
 
-PLACES = "places"
+PLACES, TOPOLOGY = "places", "opamp and dead zone"
 LEVERS = ("opamp", "dead zone", "amplitude", "state scales", "noise gain", "time scale")
 """In the order in which they are tried."""
 SWINGS = (0.85, 0.7, 0.5)

@@ -25,21 +25,22 @@ from designer import __version__, compare, exact, pipeline, search_job, study_ha
 from designer.all_on_one import all_on_one
 from designer.api import Synthesis
 from designer.blame import blame
-from designer.case_store import read_piece
+from designer.case_store import CaseStore
 from designer.catalog import Catalog, load_catalog
 from designer.circuitspec import CircuitSpec
 from designer.design_files import load
 from designer.errors import DesignerError
 from designer.folder import Folder
-from designer.jsonout import plain
+from designer.jsonout import dumps, plain
 from designer.limiting import limitings
 from designer.modelfile import ModelFile, parse_model_file, read_model_file
 from designer.options import Options
 from designer.preconditions import cores
 from designer.progress import Progress, progress_for
 from designer.provenance import provenance
-from designer.search_job import search_into, searched_into
-from designer.study import tolerance
+from designer.search_job import search_into
+from designer.study import Study, tolerance
+from designer.study_folder import FolderStores
 from designer.tolerance_cases import TITLES, cases, model_file
 from designer.toml_text import toml_text
 from designer.verdict import StudyPlan, Yield, count
@@ -47,8 +48,11 @@ from designer.whole_file import write
 
 FORMAT = 1
 MODEL = Path("examples/robust.toml")
-SAMPLES, SHORT, SEED = 4000, 400, 71
-"""Boards as built; boards that are tuned and powered up; of the boards that count."""
+SAMPLES, SHORT, SEED = 4000, 500, 71
+"""Boards as built; boards that are tuned and powered up, at first; of the boards that count."""
+TARGET, MORE = 0.99, 4
+"""Yield that tuned and reached boards are to have; where the interval of a response has this
+inside, so many times the boards are asked, once."""
 OTHERS, BLAMED = 500, 250
 """Boards at most of the paper's circuits, where most settle slowly; boards behind a blame."""
 FREE, NOMINAL = "searched", "searched, nominal b"
@@ -74,35 +78,26 @@ def report(
     said = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     catalog, file = load_catalog(), read_model_file(model)
-    (out / "cases").mkdir(parents=True, exist_ok=True)
     options = Options(seed, jobs, samples, resume=True)
     rules = [__version__, search_job.RULES, study_hash.RULES]
     settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
+    store = CaseStore(out, dumps(settings, indent=None), FILES, resume=True)
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        path = out / "cases" / f"{name.replace(', ', '-').replace(' ', '-')}.json"
-        known = read_piece(path, "--out")
-        if known is not None and known.get("settings") == settings:
-            return known
-        made: dict[str, Any] = plain({"settings": settings, "name": name, **make()})
-        write(path, _json(made))
-        return made
+        slug = name.replace(", ", "-").replace(" ", "-")
+        return store.piece(slug, lambda: plain({"name": name, **make()}))
 
-    def command(asked: Options) -> str:
-        return asked.command("search", model, out / "free")
-
-    def free() -> dict[str, Any]:
-        outcome = search_into(file, out / "free", options, said, command)
-        made = _made(out / "free", catalog)
-        row = _searched(made, out / "free", options, short, said, tuned=False)
+    def searched(name: str, asked: ModelFile, *, tuned: bool) -> dict[str, Any]:
+        place = out / name
+        outcome = search_into(
+            asked, place, options, said, lambda o: o.command("search", model, place)
+        )
+        row = _searched(_made(place, catalog), place, options, short, said, tuned=tuned)
         return {**row, "confirmation": outcome.answer["confirmation"]}
 
     def nominal() -> dict[str, Any]:
-        text = at_model_clearance(file)
-        fixed = parse_model_file(text, out / "nominal.toml")
-        searched_into(fixed, out / "nominal", options, said)
-        made = _made(out / "nominal", catalog)
-        return _searched(made, out / "nominal", options, short, said, tuned=True)
+        fixed = parse_model_file(at_model_clearance(file), out / "nominal.toml")
+        return searched("nominal", fixed, tuned=True)
 
     found = []
     for other in cases(catalog, samples=min(samples, OTHERS), seed=seed):
@@ -111,6 +106,7 @@ def report(
             title = TITLES[other.circuit]
             make = partial(_as_built, other.plan, spec, catalog, jobs, said)
             found.append(case(title, make))
+    free = partial(searched, "free", file, tuned=False)
     found += [case(FREE, free), case(NOMINAL, nominal)]
     numbers = {"samples": samples, "short": short}
     source = provenance(file, catalog.hash, seed=seed, settings=numbers)
@@ -144,18 +140,22 @@ def _searched(
         made.modelfile, made.design, asked, made.catalog, samples=options.samples, seed=options.seed
     )
     row = _as_built(plan, made.modelfile.circuit, made.catalog, jobs, said)
-    study = tolerance(
-        made,
-        samples=short,
-        rung="exact",
-        tuned=tuned,
-        reached=True,
-        blamed=False,
-        seed=options.seed,
-        jobs=jobs,
-        checked=checked,
-        progress=said,
-    )
+    for boards in (short, MORE * short):
+        study = tolerance(
+            made,
+            samples=boards,
+            rung="exact",
+            tuned=tuned,
+            reached=True,
+            blamed=False,
+            seed=options.seed,
+            jobs=jobs,
+            checked=checked,
+            stores=FolderStores(place / "powered-up", lambda: None),
+            progress=said,
+        )
+        if _decided(study, len(checked), tuned=tuned):
+            break
     for i in range(len(checked)):
         layers = {"reached": study.reached_of(i)} | ({"tuned": study.tuned_of(i)} if tuned else {})
         row["responses"][i] |= {name: _counted(count(rows)) for name, rows in layers.items()}
@@ -167,6 +167,15 @@ def _searched(
     search = json.loads((place / "search.json").read_text(encoding="utf-8"))
     kept = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
     return {**row, "search": {key: search[key] for key in kept}}
+
+
+def _decided(study: Study, responses: int, *, tuned: bool) -> bool:
+    """Whether the intervals of tuned and reached yields have the target outside, all of them."""
+    counted = [count(study.reached_of(i)) for i in range(responses)]
+    if tuned:
+        counted += [count(study.tuned_of(i)) for i in range(responses)]
+        counted += [study.all_tuned] if study.all_tuned is not None else []
+    return not any(low <= TARGET <= high for low, high in (c.interval for c in counted))
 
 
 def _as_built(

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 
 from designer import responses, search_levers, synthesis
 from designer.errors import InputError, Unreachable
-from designer.modelfile import ModelFile
+from designer.modelfile import ModelFile, Response
 from designer.progress import Progress
 from designer.search import ALIKE, BOARDS, GAIN, Candidate, better, look, search
 from designer.search_distance import Stretched
 from designer.search_levers import LEVERS, Choice, topologies, variants
-from designer.search_places import score
-from designer.search_windows import Place
+from designer.search_places import Scored, score
+from designer.search_windows import Place, Stretch
 from designer.spread import Spread
 from tests.search_cases import catalog, file
 
@@ -102,6 +103,43 @@ def test_the_search_finds_the_best_of_every_combination(monkeypatch: pytest.Monk
     assert worth.alone is not None
     assert found.start is not None
     assert worth.alone > found.start.rank
+
+
+def test_places_that_stay_where_they_were_are_worth_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The best place is found to be the middle of the window, where the search began."""
+
+    def middle(
+        bench: Stretched, spec: Response, seen: Sequence[Stretch], *_: object, **__: object
+    ) -> tuple[list[Scored], int]:
+        return score(bench, spec, [seen[0].at((0.5,))[0]], 16), 1
+
+    monkeypatch.setattr("designer.search.places", middle)
+    monkeypatch.setattr("designer.search.LEVERS", ("opamp", "dead zone"))
+    found = search(file('omega = "best"\nexpect = "1-2-2"'), catalog())
+    assert found.start is not None
+    assert found.final.shown_at == found.start.shown_at
+    assert found.contributions == ()
+
+
+@pytest.mark.slow
+def test_a_dead_zone_gets_its_chance_at_the_places_that_were_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The one that lost in the middle of the window is tried again at the place."""
+    monkeypatch.setattr("designer.search.LEVERS", ("opamp", "dead zone"))
+    wanted = file(
+        'omega = "best"\nexpect = "1-2-2"', zone="saturation", zones='"saturation", "rectifier"'
+    )
+    found = search(wanted, catalog())
+    tried = [s.setting for s in found.steps if s.lever == "opamp and dead zone"]
+    assert tried == ["TL074C, saturation", "TL074C, rectifier", "TL074C, saturation"]
+    every = [
+        _enumerated(replace(wanted, responses=found.final.shown_at), c)
+        for c in topologies(wanted, catalog())
+    ]
+    assert not any(better(c.rank, found.final.rank) for c in every)
 
 
 def _enumerated(modelfile: ModelFile, choice: Choice) -> Candidate:
