@@ -54,14 +54,23 @@ SEARCH = {
          "without": RANK},
     ],
 }  # fmt: skip
+CONFIRMED = {
+    "rung": "dynamic",
+    "responses": [
+        {"gate": {"passed": True}, "asked": 40, "agreed": 39},
+        {"gate": {"passed": False}, "asked": 0, "agreed": 0},
+    ],
+}
 CASES = [
     case("paper, as printed", response("1-1-1", 2700)),
     case("paper, corrected", response("1-1-1", 2800), response("1-8-8", 0)),
     case("rectifier stage", response("1-1-1", 4000), response("1-8-8", 700)),
     case("searched", response("1-1-1", 4000, reached=400), response("1-8-8", 3999, reached=400),
-         search=SEARCH, all_on_one={"reached": counted(400, 400)}),
+         search=SEARCH, confirmation=CONFIRMED,
+         all_on_one={"as built": counted(4000), "reached": counted(400, 400)}),
     case("searched, nominal b", response("1-1-1", 4000, tuned=400, reached=400),
-         response("1-8-8", 900, tuned=390, reached=100), search=SEARCH),
+         response("1-8-8", 900, tuned=390, reached=100), search=SEARCH,
+         all_on_one={"as built": counted(4000), "tuned": counted(396, 400)}),
 ]  # fmt: skip
 
 
@@ -81,13 +90,23 @@ def table(text: str, kind: str) -> dict[str, list[str]]:
 def test_the_tables_say_which_goal_is_reached() -> None:
     text = readme(CASES, "make it", "robust.toml")
     built = table(text, "as built")
-    assert built["searched"][-1] == "reached"
-    assert built["paper, as printed"] == ["67.50 (66.03)", "-", "75.00 (73.63)", "not by 1-1-1"]
-    assert built["searched, nominal b"][-1] == "not by 1-8-8"
-    assert set(table(text, "tuned")) == {"searched, nominal b"}
-    # 390 of 400 have an interval that ends well below the goal.
-    assert table(text, "tuned")["searched, nominal b"][-1] == "not by 1-8-8"
-    assert table(text, "reached")["searched"][:2] == ["100.00 (99.05)", "100.00 (99.05)"]
+    assert built["searched"] == [
+        "4000", "100.00 (99.90 to 100.00)", "99.98 (99.86 to 100.00)",
+        "100.00 (99.90 to 100.00)", "reached",
+    ]  # fmt: skip
+    assert built["paper, as printed"][1:] == [
+        "67.50 (66.03 to 68.93)", "-", "75.00 (73.63 to 76.32)",
+        "missed by 1-1-1, 1-8-8, all on one",
+    ]  # fmt: skip
+    assert built["searched, nominal b"][-1] == "missed by 1-8-8"
+    tuned = table(text, "tuned")
+    assert set(tuned) == {"searched, nominal b"}
+    # Of 400 boards 396 are 99 %; 390 have an interval that ends below.
+    assert tuned["searched, nominal b"][0] == "400"
+    assert tuned["searched, nominal b"][-1] == "missed by 1-8-8; undecided for all on one"
+    assert table(text, "reached")["searched"][1] == "100.00 (99.05 to 100.00)"
+    assert "| 1-8-8 | not passed | 0 | 0 |" in text
+    assert "| 1-1-1 | passed | 40 | 39 |" in text
     assert "| dead zone | saturation | rectifier | no such design | 4.00 σ |" in text
     assert "| 1-8-8 | 0.2112 | 0.3 | - | offset: near |" in text
 
