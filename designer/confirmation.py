@@ -95,7 +95,7 @@ def hear(
             subject = replace(subject, start=question.start.start, discard=int(way))
             refinements = NOMINAL_REFINEMENTS
         elif rung != "ideal":
-            subject = replace(subject, discard=_way_to_rung(subject.orbit))
+            subject = replace(subject, discard=way_to_rung(subject.orbit))
         subject = replace(subject, rung=rung)
         expected = subject.orbit.response
         queries[k] = Query(subject, question.settings, expected, refinements)
@@ -139,7 +139,7 @@ def _runs(samples: Sequence[int]) -> list[range]:
     return runs
 
 
-def _way_to_rung(orbit: Orbit) -> int:
+def way_to_rung(orbit: Orbit) -> int:
     """Drive periods from the exact circuit's orbit to that of another rung: n·5/(1 - ρ)."""
     if orbit.n == 0:
         return UNKNOWN_PERIODS

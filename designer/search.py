@@ -5,7 +5,8 @@ Over all wanted responses, in this order: the smallest of their distances from b
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the
 responses, the other op-amps and dead zones at those, then what the synthesis aims at. A lever stays
-where it is unless something is gained.
+where it is unless something is gained. At the end ngspice is asked whether it bears the design out,
+and where it does not, slower ones.
 
 Nothing of the chain (model, match, circuit, predictions) imports a module of the search.
 """
@@ -13,7 +14,7 @@ Nothing of the chain (model, match, circuit, predictions) imports a module of th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from scipy.stats import norm
 
@@ -28,95 +29,26 @@ from designer.partnames import parts_of
 from designer.preconditions import naming, need_responses
 from designer.progress import Progress
 from designer.responses import ModelResponse
+from designer.search_candidate import (
+    Candidate,
+    Contribution,
+    Listened,
+    Searched,
+    Step,
+    better,
+)
 from designer.search_distance import Stretched
-from designer.search_levers import LEVERS, PLACES, TOPOLOGY, Choice, topologies, variants
+from designer.search_heard import BOARDS as HEARD
+from designer.search_heard import RUNG, Heard, Listen
+from designer.search_levers import LEVERS, PLACES, TOPOLOGY, Choice, slower, topologies, variants
 from designer.search_memory import Memory
-from designer.search_places import MANY, Scored, places, room_of, score
+from designer.search_places import MANY, places, room_of, score
 from designer.search_windows import Place, Stretch, open_in, stretches
 from designer.spread import Spread
 from designer.spreadrules import check_names
 
 BOARDS = 128
 """Boards by which designs are compared, at each stretch of the spread."""
-MISSING = -30.0
-"""Standard deviations, further than any response that is there may stand."""
-ALIKE = 0.05
-"""Standard deviations: distances that differ by less are equal; so few boards tell no more."""
-GAIN = 1e-3
-"""Of the product of the predicted yields: what is worth moving a lever for."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A design with its responses at their places, and what boards of it showed.
-
-    scored : by response. tried : places that were asked on its boards.
-    """
-
-    choice: Choice
-    design: Design
-    found: tuple[ModelResponse, ...]
-    scored: tuple[Scored, ...]
-
-    @property
-    def distances(self) -> tuple[float, ...]:
-        return tuple(s.distance for s in self.scored)
-
-    @property
-    def shown_at(self) -> tuple[Response, ...]:
-        """Each response with its place."""
-        return tuple(r.spec for r in self.found)
-
-    @property
-    def rank(self) -> tuple[float, float]:
-        """The smallest distance; the logarithm of the product of the predicted yields, in which a
-        response that the nominal board does not show counts as one ``MISSING`` away."""
-        logs = [float(norm.logcdf(max(d, MISSING))) for d in self.distances]
-        return min(self.distances), sum(logs)
-
-
-@dataclass(frozen=True)
-class Step:
-    """A lever that was tried. setting : where it was put. rank : of the design then; None where
-    there is none, for the reason given. kept : whether it stayed there."""
-
-    lever: str
-    setting: str
-    rank: tuple[float, float] | None
-    kept: bool
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Contribution:
-    """What a lever is worth. alone : rank of the match design with this lever moved; without : of
-    the final design with it moved back; None where there is no such design."""
-
-    lever: str
-    start: str
-    final: str
-    alone: tuple[float, float] | None
-    without: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
-class Searched:
-    """What a search found.
-
-    made : the design with its resolved model file. start : the match design with every response
-    in the middle of its widest stretch. final : what was found, as it was predicted.
-    candidates : designs; places : that were asked. asked : answers of boards to questions.
-    """
-
-    made: Synthesis
-    start: Candidate | None
-    final: Candidate
-    steps: tuple[Step, ...]
-    contributions: tuple[Contribution, ...]
-    windows: tuple[tuple[Stretch, ...], ...]
-    candidates: int
-    places: int
-    seed: int
 
 
 def search(
@@ -127,12 +59,14 @@ def search(
     jobs: int = 1,
     memory: Memory | None = None,
     windows: Sequence[tuple[Stretch, ...]] | None = None,
+    listen: Listen | None = None,
     progress: Progress | None = None,
 ) -> Searched:
     """Seek the design and the places of the highest predicted yield.
 
     seed : of the boards of the search, which no study draws. memory : of an earlier, interrupted
-    search of the same. windows : of ``look``, if they are known.
+    search of the same. windows : of ``look``, if they are known. listen : asks ngspice whether it
+    bears a design out (``search_heard.Listener``); the exact circuit alone decides if None.
 
     Raises
     ------
@@ -144,7 +78,14 @@ def search(
     with naming(modelfile):
         seen = look(modelfile, catalog, jobs, said) if windows is None else tuple(windows)
         hunt = _Hunt(
-            modelfile, catalog, seen, seed, jobs, Memory() if memory is None else memory, said
+            modelfile,
+            catalog,
+            seen,
+            seed,
+            jobs,
+            Memory() if memory is None else memory,
+            listen,
+            said,
         )
         return hunt.run()
 
@@ -167,16 +108,6 @@ def look(
         )
 
 
-def better(rank: tuple[float, float], than: tuple[float, float]) -> bool:
-    """Whether a design of this rank (``Candidate.rank``) is to take the place of another.
-
-    Where both lack a response, the sum decides, which counts what they lack.
-    """
-    if rank[0] != than[0] and not abs(rank[0] - than[0]) <= ALIKE:
-        return rank[0] > than[0]
-    return rank[1] - than[1] > GAIN
-
-
 class _Hunt:
     """One search. ``steps`` and the counters grow while it runs."""
 
@@ -188,10 +119,12 @@ class _Hunt:
         seed: int,
         jobs: int,
         memory: Memory,
+        listen: Listen | None,
         said: Progress,
     ) -> None:
         self.modelfile, self.catalog, self.seen = modelfile, catalog, seen
         self.seed, self.jobs, self.memory, self.said = seed, jobs, memory, said
+        self.listen, self.heard = listen, list[Listened]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
@@ -213,6 +146,7 @@ class _Hunt:
         for lever in LEVERS[2:]:
             for choice in variants(best.choice, lever):
                 best = self._try(lever, _shown(choice.get(lever)), choice, best)
+        best = self._borne_out(best)
         contributions = self._contributions(start, best)
         return Searched(
             self._made(best),
@@ -220,6 +154,7 @@ class _Hunt:
             best,
             tuple(self.steps),
             contributions,
+            tuple(self.heard),
             self.seen,
             self.candidates,
             self.places,
@@ -278,6 +213,43 @@ class _Hunt:
         self._note(lever, setting, made, gained)
         return made if made is not None and gained else best
 
+    def _borne_out(self, best: Candidate) -> Candidate:
+        """The design, or the same with a slower time scale where ngspice loses boards of it."""
+        if self.listen is None:
+            return best
+        tried: list[tuple[Candidate, float, tuple[Heard, ...]]] = []
+        frequency = best.design.errors.scales.frequency(1.0)
+        for choice in (best.choice, *slower(best.choice, frequency)):
+            made: Candidate | None = best
+            if choice != best.choice:
+                made = self._candidate(choice, best.found, f"time scale {_shown(choice.frequency)}")
+            if made is None:
+                self._note("time scale", _shown(choice.frequency), None, False)
+                continue
+            at = made.design.errors.scales.frequency(1.0)
+            step = self.said.stage(f"ngspice, rung {RUNG}, {at:.4g} Hz at ω = 1", len(made.found))
+            bench = self._bench(made.choice, made.found, made.design, HEARD)
+            heard = self.listen(bench, [s.stand for s in made.scored], step)
+            tried.append((made, at, heard))
+            if all(h.borne_out for h in heard):
+                break
+        kept = max(
+            tried, key=lambda t: (all(h.borne_out for h in t[2]), min(h.share for h in t[2]))
+        )[0]
+        for made, at, heard in tried:
+            self.heard.append(Listened(at, heard, made is kept))
+            said = ", ".join(f"{h.ngspice}/{h.exact}" for h in heard)
+            self.said.note(f"  {at:.4g} Hz: boards that ngspice keeps, by response: {said}")
+            if made is not best:
+                self._note("time scale", _shown(made.choice.frequency), made, made is kept)
+        return kept
+
+    def _bench(
+        self, choice: Choice, found: Sequence[ModelResponse], design: Design, boards: int
+    ) -> Stretched:
+        spread = Spread.of(self._resolved(choice, found), design.circuit, self.catalog)
+        return Stretched(design, spread, self.seed, boards, jobs=self.jobs, memory=self.memory)
+
     def _candidate(
         self, choice: Choice, found: tuple[ModelResponse, ...], what: str
     ) -> Candidate | None:
@@ -299,11 +271,10 @@ class _Hunt:
                     f"a limit that a design keeps: the least error is {error:.3g}; a wider "
                     "choice (circuit.resistors, circuit.capacitors, circuit.composites) has less",
                 )
-            spread = Spread.of(self._resolved(choice, found), design.circuit, self.catalog)
         except Unreachable as error:
             self.short = error
             return None
-        bench = Stretched(design, spread, self.seed, BOARDS, jobs=self.jobs, memory=self.memory)
+        bench = self._bench(choice, found, design, BOARDS)
         scored = tuple(
             score(bench, r.spec, [Place(r.omega, r.b, r.orbit.start)], BOARDS, progress=step)[0]
             for r in found

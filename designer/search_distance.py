@@ -23,6 +23,7 @@ from scipy.stats import norm
 from designer.deck import Excitation
 from designer.design import Design
 from designer.ensemble import Ensemble
+from designer.gate import Subject
 from designer.jsonout import plain
 from designer.modelfile import Response
 from designer.orbit import Orbit, OrbitStatus
@@ -111,7 +112,7 @@ class Stretched:
         """Each place on the nominal board; None where that does not show the response there."""
         if not wanted:
             return []
-        drives = [self.drive(place) for _, place in wanted]
+        drives = [self.excitation(place).drive for _, place in wanted]
         starts = np.array([p.start * self.design.volts(p.b) for _, p in wanted])
         found = self._boards.quick([0] * len(wanted), drives, starts, jobs=self.jobs)
         out: list[Stand | None] = []
@@ -128,7 +129,7 @@ class Stretched:
         progress: Callable[[], None] = lambda: None,
     ) -> list[Counts]:
         """What these boards show at each place. stretches : some of ``LADDER``."""
-        said = [self._said(stand, boards, stretches) for stand in stands]
+        said = [self.said(stand, boards, stretches) for stand in stands]
 
         def make(new: list[int]) -> list[tuple[int, ...]]:
             return self._made([stands[k] for k in new], boards, stretches, progress)
@@ -155,7 +156,7 @@ class Stretched:
         ok = np.array(fine).reshape(len(rungs), len(boards), len(stands)).sum(axis=1)
         return [tuple(int(v) for v in ok[:, k]) for k in range(len(stands))]
 
-    def _said(self, stand: Stand, boards: range, stretches: Sequence[float]) -> object:
+    def said(self, stand: Stand, boards: range, stretches: Sequence[float]) -> object:
         """Everything that decides an answer, as plain data."""
         drive, spec = stand.drive, stand.spec
         setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
@@ -163,10 +164,26 @@ class Stretched:
         asked = [boards.start, boards.stop, list(stretches)]
         return [self._whose, nine_digits(setting), wanted, asked]
 
-    def drive(self, place: Place) -> Drive:
+    def excitation(self, place: Place) -> Excitation:
         """The generator's setting for a place."""
         frequency = self.design.errors.scales.frequency(place.omega)
-        return Excitation(frequency, self.design.amplitude(place.b)).drive
+        return Excitation(frequency, self.design.amplitude(place.b))
+
+    def nominal(self, stand: Stand) -> Subject:
+        """The nominal board at a place, for ngspice."""
+        return Subject(self._boards.reduction(0), self.excitation(stand.place), stand.orbit)
+
+    def subjects(self, stand: Stand, boards: range, stretch: float) -> list[Subject]:
+        """Those of these boards that show the response at this stretch, for ngspice."""
+        rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
+        starts = np.tile(stand.orbit.start, (len(rows), 1))
+        found = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
+        excitation = self.excitation(stand.place)
+        return [
+            Subject(self._boards.reduction(row), excitation, orbit)
+            for row, orbit in zip(rows, found, strict=True)
+            if orbit is not None and _shows(orbit, stand)
+        ]
 
 
 def _shows(orbit: Orbit | None, stand: Stand) -> bool:

@@ -23,12 +23,12 @@ from designer.job import Outcome, design_inputs, model_file
 from designer.jsonout import dumps, run_json
 from designer.limiting import limitings
 from designer.modelfile import ModelFile
-from designer.opamp_model import Rung
 from designer.options import Options
 from designer.preconditions import cores, naming, require_ngspice
 from designer.progress import Progress
 from designer.provenance import provenance
 from designer.search import look, search
+from designer.search_heard import RUNG, Listener
 from designer.search_json import confirmation_json, search_json
 from designer.search_memory import Memory
 from designer.search_resolved import resolved
@@ -45,9 +45,7 @@ SAMPLES = 4000
 """Boards of the final study, at least."""
 DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
-RUNG: Rung = "dynamic"
-"""Of ngspice, on which the final figures are confirmed."""
-RULES = 3
+RULES = 4
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 
@@ -71,6 +69,7 @@ def searched_into(
     ------
     InputError, Unreachable : see ``search.search``; nothing was written by then, but for what a
         design could not be made of.
+    EnvironmentMissing : no ngspice; said before any work.
     """
     options.check()
     catalog, folder = load_catalog(), Folder(out)
@@ -90,6 +89,7 @@ def searched_into(
             "one that no search made",
             "another folder, or --overwrite to replace what manifest.json lists",
         )
+    program_version()
     began = time.perf_counter()
     jobs = cores() if options.jobs is None else options.jobs
     windows = look(modelfile, catalog, jobs, progress)
@@ -99,15 +99,17 @@ def searched_into(
     folder.begin({"search": (inputs, FILES)}, source)
     folder.write(ASKED, modelfile.text)
     memory = Memory(folder / CANDIDATES, inputs["model"])
-    found = search(
-        modelfile,
-        catalog,
-        seed=options.seed,
-        jobs=jobs,
-        memory=memory,
-        windows=windows,
-        progress=progress,
-    )
+    with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
+        found = search(
+            modelfile,
+            catalog,
+            seed=options.seed,
+            jobs=jobs,
+            memory=memory,
+            windows=windows,
+            listen=Listener(pool, memory),
+            progress=progress,
+        )
     final = resolved(modelfile, found.made, found.final.choice, out / MODEL)
     made = replace(found.made, modelfile=final, seconds=time.perf_counter() - began)
     progress.stage("start recipes, files of the design")

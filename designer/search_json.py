@@ -9,8 +9,10 @@ from typing import Any
 from scipy.stats import norm
 
 from designer.hearing import Hearing
-from designer.search import BOARDS, Candidate, Contribution, Searched
+from designer.search import BOARDS
+from designer.search_candidate import Candidate, Contribution, Searched
 from designer.search_distance import LADDER, STREAM
+from designer.search_heard import RUNG, STRETCH
 from designer.search_levers import Choice
 from designer.verdict import Answer, Verdict
 
@@ -42,6 +44,21 @@ def search_json(found: Searched) -> dict[str, Any]:
             for s in found.steps
         ],
         "contributions": [_contribution(c) for c in found.contributions],
+        "ngspice": {
+            "rung": RUNG,
+            "stretch": STRETCH,
+            "designs": [
+                {
+                    "frequency_hz": row.frequency,
+                    "kept": row.kept,
+                    "responses": [
+                        {"exact": h.exact, "ngspice": h.ngspice, "borne_out": h.borne_out}
+                        for h in row.heard
+                    ],
+                }
+                for row in found.heard
+            ],
+        },
         "windows": [
             [{"b": s.b, "from": s.low, "to": s.high, "steps": len(s.places)} for s in row]
             for row in found.windows

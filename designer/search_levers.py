@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -105,3 +106,12 @@ def variants(choice: Choice, lever: str) -> Iterator[Choice]:
     for value in options[lever]:
         if value != choice.get(lever):
             yield choice.with_lever(lever, value)
+
+
+def slower(choice: Choice, frequency: float) -> Iterator[Choice]:
+    """The same at half of a frequency for ω = 1 [Hz], a quarter, and so on inside its band."""
+    low, _ = choice.frequency
+    high = frequency / 2.0
+    while high > low * math.sqrt(2.0):
+        yield replace(choice, frequency=(high / math.sqrt(2.0), high))
+        high /= 2.0

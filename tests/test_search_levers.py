@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
@@ -11,9 +12,11 @@ from designer import responses, search_levers, synthesis
 from designer.errors import InputError, Unreachable
 from designer.modelfile import ModelFile, Response
 from designer.progress import Progress
-from designer.search import ALIKE, BOARDS, GAIN, Candidate, better, look, search
-from designer.search_distance import Stretched
-from designer.search_levers import LEVERS, Choice, topologies, variants
+from designer.search import BOARDS, look, search
+from designer.search_candidate import ALIKE, GAIN, Candidate, Listened, better
+from designer.search_distance import Stand, Stretched
+from designer.search_heard import Heard
+from designer.search_levers import LEVERS, Choice, slower, topologies, variants
 from designer.search_places import Scored, score
 from designer.search_windows import Place, Stretch
 from designer.spread import Spread
@@ -152,3 +155,45 @@ def _enumerated(modelfile: ModelFile, choice: Choice) -> Candidate:
     places = [Place(r.omega, r.b, r.orbit.start) for r in found]
     scored = tuple(score(bench, r.spec, [p], BOARDS)[0] for r, p in zip(found, places, strict=True))
     return Candidate(choice, design, found, scored)
+
+
+def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """ngspice is played by a rule: below a frequency it keeps every board, above it half."""
+    monkeypatch.setattr("designer.search.LEVERS", ("opamp", "dead zone"))
+    wanted = file(PLACE)
+
+    def asked(limit: float) -> list[Listened]:
+        def listen(
+            bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
+        ) -> tuple[Heard, ...]:
+            fast = bench.design.errors.scales.frequency(1.0) > limit
+            assert all(s is not None for s in stands)
+            return (Heard(16, 8 if fast else 15),) * len(stands)
+
+        found = search(wanted, catalog(), listen=listen)
+        (kept,) = [h for h in found.heard if h.kept]
+        assert found.made.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
+        return list(found.heard)
+
+    free = asked(1e9)
+    assert len(free) == 1
+    (own,) = (h.frequency for h in free)
+    slower = asked(0.4 * own)
+    assert [h.kept for h in slower] == [False] * (len(slower) - 1) + [True]
+    assert slower[-1].frequency <= 0.4 * own < slower[-2].frequency
+    # Where no time scale is slow enough, the first of the best stands.
+    never = asked(0.0)
+    assert [h.kept for h in never] == [True] + [False] * (len(never) - 1)
+    assert len(never) > len(slower) - 1
+
+
+def test_slower_bands_stay_inside_the_band() -> None:
+    own = Choice.of(BOTH.circuit)
+    low, high = own.frequency
+    found = list(slower(own, high))
+    for before, after in itertools.pairwise((high, *(c.frequency[1] for c in found))):
+        assert after == before / 2.0
+    assert all(low < c.frequency[0] < c.frequency[1] for c in found)
+    assert list(slower(own, low)) == []
