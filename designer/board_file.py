@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from designer.board_outline import Outline, circle, read_outline
 from designer.components import Component
 from designer.errors import InputError
 from designer.kicad_footprint import FILE_VERSION
@@ -32,11 +33,15 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Pad:
-    """net : the circuit's name of it, "" where none is connected. at : on the board [mm]."""
+    """net : the circuit's name of it, "" where none is connected. at : on the board [mm].
+
+    corners : of the copper, or of the rectangle around it, in order [mm]; a circle's are many.
+    """
 
     number: str
     net: str
     at: Point
+    corners: tuple[Point, ...]
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,10 @@ class Track:
 
 @dataclass(frozen=True)
 class BoardFile:
-    """path : where it was read. text : as it stands there. vias, zones : the net of each."""
+    """path : where it was read. text : as it stands there. vias, zones : the net of each.
+
+    outline : the board's edge.
+    """
 
     path: Path
     text: str
@@ -73,6 +81,7 @@ class BoardFile:
     tracks: tuple[Track, ...]
     vias: tuple[str, ...]
     zones: tuple[str, ...]
+    outline: Outline
 
     def pads(self, reference: str) -> tuple[Pad, ...]:
         """Pads of one component."""
@@ -115,6 +124,7 @@ def read_board(path: Path) -> BoardFile:
         ),
         vias=tuple(_net(each, names) for each in board.all("via")),
         zones=tuple(_net(each, names) for each in board.all("zone")),
+        outline=read_outline(board),
     )
 
 
@@ -220,15 +230,31 @@ def _field(found: Expression, name: str) -> str:
 def _pad(found: Expression, origin: Point, turn: float) -> Pad:
     """Angles are counter-clockwise as seen, with y downwards."""
     at = found.get("at")
-    x, y = at.number(0), at.number(1)
+    centre = _turned((at.number(0), at.number(1)), origin, turn)
     net = found.find("net")
     return Pad(
         found.text(0),
         circuit_net(net.text(1)) if net is not None and not _unconnected(net.text(1)) else "",
-        (
-            origin[0] + x * math.cos(turn) + y * math.sin(turn),
-            origin[1] - x * math.sin(turn) + y * math.cos(turn),
-        ),
+        centre,
+        _corners(found, centre, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
+    )
+
+
+def _corners(found: Expression, centre: Point, turn: float) -> tuple[Point, ...]:
+    """turn : the pad's angle on the board, which the file states with the footprint's in it."""
+    size = found.get("size")
+    half = size.number(0) / 2.0, size.number(1) / 2.0
+    if "circle" in found.atoms[1:]:
+        return tuple(circle(centre, half[0], 16))
+    signs = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+    return tuple(_turned((x * half[0], y * half[1]), centre, turn) for x, y in signs)
+
+
+def _turned(at: Point, origin: Point, turn: float) -> Point:
+    x, y = at
+    return (
+        origin[0] + x * math.cos(turn) + y * math.sin(turn),
+        origin[1] - x * math.sin(turn) + y * math.cos(turn),
     )
 
 

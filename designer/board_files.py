@@ -7,7 +7,7 @@ from designer.api import Synthesis
 from designer.board_parts import board_circuit
 from designer.bom import bill, bill_csv
 from designer.bom_layouts import file_of, layouts
-from designer.components import components
+from designer.components import components, pin_numbers
 from designer.modelfile import ModelFile
 
 BILL, NOTES, DRAWING, PICTURE = "bom.csv", "board.md", "schematic.svg", "schematic.png"
@@ -35,7 +35,7 @@ def texts(made: Synthesis) -> dict[str, str]:
     return {
         BILL: bill_csv(bought),
         NOTES: board_notes.markdown(made, circuit, choice, found),
-        DRAWING: drawing.svg(circuit, made.modelfile.title),
+        DRAWING: drawing.svg(circuit, made.modelfile.title, pin_numbers(found)),
         **{layout.file: layout.csv(bought) for layout in others},
     }
 
@@ -44,5 +44,6 @@ def picture(made: Synthesis) -> bytes:
     """The drawing once more, as points."""
     from designer import drawing
 
-    circuit, _ = board_circuit(made)
-    return drawing.png(circuit, made.modelfile.title)
+    circuit, choice = board_circuit(made)
+    numbers = pin_numbers(components(circuit, made.catalog, choice))
+    return drawing.png(circuit, made.modelfile.title, numbers=numbers)

@@ -22,30 +22,43 @@ class CaseStore:
 
     Parameters
     ----------
-    out : the report's folder, which is made. key : of all that decides the pieces. files : names
-    of the report's own files. resume : go on with the pieces that are there.
+    out : the report's folder, which is made. files : names of the report's own files. resume : go
+    on with the pieces that are there.
 
     Raises
     ------
     InputError : pieces are there already and ``resume`` is not given; a file stands where one of
-        the report's goes, and no piece that it could be made of; the folder cannot be made.
+        the report's goes, and nothing that it could be made of; the folder cannot be made.
     """
 
-    def __init__(self, out: Path, key: str, files: Iterable[str], *, resume: bool) -> None:
-        self._folder, self._key = out / FOLDER, key
+    def __init__(self, out: Path, files: Iterable[str], *, resume: bool) -> None:
+        self._out, self._folder, self._files = out, out / FOLDER, tuple(files)
+        self._keys: str | Mapping[str, str] = {}
         begun = self._folder.is_dir() and any(self._folder.iterdir())
         if begun and not resume:
             raise InputError(self._folder, "--out", "results", "an empty folder, or --resume")
-        if not (begun and any(self._read(p) for p in sorted(self._folder.glob("*.json")))):
-            for name in files:
-                if (out / name).exists():
-                    found = "a file that the report would replace, and no piece of it to go on with"
-                    raise InputError(out / name, "--out", found, "a folder without it")
+        if not begun:
+            self._check_free()
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             said = error.strerror or str(error)
             raise InputError(self._folder, "--out", said, "a place that can be written") from None
+
+    def expect(self, keys: str | Mapping[str, str]) -> None:
+        """Before the first piece: keys : of all that decides the pieces, one for all of them, or
+        one for each by its name; others in the folder are then left alone.
+
+        Raises
+        ------
+        InputError : a piece that is there was made with other settings; or none is there, and a
+            file stands where one of the report's goes.
+        """
+        self._keys = keys
+        there = sorted(self._folder.glob("*.json"))
+        mine = [p for p in there if isinstance(keys, str) or p.stem in keys]
+        if not [p for p in mine if self._read(p)]:
+            self._check_free()
 
     def piece(self, name: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
         """A piece as it was kept, or made now and kept.
@@ -57,14 +70,23 @@ class CaseStore:
         path = self._folder / f"{name}.json"
         known = self._read(path)
         if known is None:
-            known = {"key": self._key, **make()}
+            known = {"key": self._key(name), **make()}
             text = json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False)
             write(path, text + "\n")
         return {k: v for k, v in known.items() if k != "key"}
 
+    def _key(self, name: str) -> str:
+        return self._keys if isinstance(self._keys, str) else self._keys[name]
+
+    def _check_free(self) -> None:
+        for name in self._files:
+            if (self._out / name).exists():
+                found = "a file that the report would replace, and no piece of it to go on with"
+                raise InputError(self._out / name, "--out", found, "a folder without it")
+
     def _read(self, path: Path) -> dict[str, Any] | None:
         known = read_piece(path, "--resume")
-        if known is not None and known.get("key") != self._key:
+        if known is not None and known.get("key") != self._key(path.stem):
             found = "a piece of other settings"
             raise InputError(path, "--resume", found, "the same settings")
         return known

@@ -68,6 +68,10 @@ class Component:
         return {pin.number: pin.net for pin in self.pins}
 
 
+Numbers = Mapping[str, Mapping[str, str]]
+"""Pad numbers by name of the pin, by name of the section; ``U1P`` has the supply pins of U1."""
+
+
 def components(circuit: Circuit, catalog: Catalog, choice: BoardChoice) -> tuple[Component, ...]:
     """Everything of the board and the bill, in the order of the circuit; op-amps as packages, in
     the place of their first section.
@@ -90,6 +94,26 @@ def components(circuit: Circuit, catalog: Catalog, choice: BoardChoice) -> tuple
         else:
             out.append(lister.one(part))
     return tuple(out)
+
+
+def designator(name: str) -> str:
+    """A part's name on the board, the sheet and the bill.
+
+    KiCad wants a number at the end and calls a sheet with another designator not annotated, so the
+    halves of a composite, R50A and R50B, are R50A1 and R50B1 there. Any other name ends in a number
+    already and has one letter group, so no two meet.
+    """
+    return name if name[-1:].isdigit() else f"{name}1"
+
+
+def pin_numbers(found: Iterable[Component]) -> Numbers:
+    """Those of the op-amps among a board's components."""
+    out: dict[str, dict[str, str]] = {}
+    for component in found:
+        if component.kind == "op-amp":
+            for pin in component.pins:
+                out.setdefault(f"{component.reference}{pin.unit}", {})[pin.name] = pin.number
+    return out
 
 
 def joined(found: Iterable[Component]) -> dict[str, tuple[tuple[str, str], ...]]:
@@ -239,7 +263,7 @@ class _Lister:
         near: str = "",
     ) -> Component:
         return Component(
-            reference=part.name,
+            reference=designator(part.name),
             kind=kind,
             value=value,
             quantity=quantity,

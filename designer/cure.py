@@ -80,7 +80,7 @@ def cure(
         if out.resolve() == folder.resolve():
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
         Folder(out)  # refuses a place that is taken before the work, not after it
-    base = read_design(folder)
+    base = read_design(folder, progress=said)
     need_responses(base.modelfile)
     place = Folder(folder)
     inputs = {

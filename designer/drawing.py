@@ -15,6 +15,7 @@ import schemdraw
 import schemdraw.elements as elm
 
 from designer.circuit import GROUND, Capacitor, Circuit, Diode, Reference, Resistor
+from designer.components import Numbers, designator
 from designer.drawing_cells import (
     Amplifier,
     Cell,
@@ -57,15 +58,18 @@ IN2 = 1.25
 """How far its lower input is below the upper one."""
 
 
-def svg(circuit: Circuit, title: str = "") -> str:
-    """The drawing as SVG text: equal circuits and titles give equal bytes."""
-    page = _Page("svg")
+def svg(circuit: Circuit, title: str = "", numbers: Numbers | None = None) -> str:
+    """The drawing as SVG text: equal circuits, titles and numbers give equal bytes.
+
+    numbers : of the op-amps' pins, shown where they are given.
+    """
+    page = _Page("svg", numbers=numbers)
     page.draw(circuit, title)
     text: str = page.drawing.get_imagedata("svg").decode("utf-8")
     return _TAG.sub(lambda tag: _DIGITS.sub(lambda n: f"{float(n[0]):.3f}", tag[0]), text)
 
 
-def png(circuit: Circuit, title: str = "", dpi: int = 72) -> bytes:
+def png(circuit: Circuit, title: str = "", dpi: int = 72, numbers: Numbers | None = None) -> bytes:
     """The drawing as PNG."""
     from matplotlib import pyplot  # matplotlib is needed for this alone
     from schemdraw.backends import mpl
@@ -73,7 +77,7 @@ def png(circuit: Circuit, title: str = "", dpi: int = 72) -> bytes:
     from designer.plots import style
 
     with style():
-        page = _Page("matplotlib", dpi)
+        page = _Page("matplotlib", dpi, numbers)
         page.draw(circuit, title)
         picture = page.drawing.get_imagedata("png")
     # schemdraw takes its figure from pyplot, which keeps every figure until it is closed.
@@ -82,8 +86,9 @@ def png(circuit: Circuit, title: str = "", dpi: int = 72) -> bytes:
 
 
 class _Page:
-    def __init__(self, canvas: Canvas, dpi: int = 72) -> None:
+    def __init__(self, canvas: Canvas, dpi: int = 72, numbers: Numbers | None = None) -> None:
         self.canvas = canvas
+        self.numbers: Numbers = {} if numbers is None else numbers
         self.drawing = schemdraw.Drawing(canvas=canvas, show=False, dpi=dpi)
         self.drawing.config(
             font="sans-serif", fontsize=NAME_SIZE, lw=1.0, margin=0.5, bgcolor="white"
@@ -99,7 +104,7 @@ class _Page:
         )
         self.text(x, y, limits, TITLE_SIZE, FAINT)
         y -= 1.6
-        for row in (*circuit_cells(circuit), board_cells(circuit)):
+        for row in (*circuit_cells(circuit), board_cells(circuit, self.numbers)):
             tall = 0.0
             x = 0.0
             for cell in row:
@@ -140,6 +145,11 @@ class _Page:
         self.drawing += elm.Ground().theta(0).at((node + 0.6, top - IN2)).scale(0.7)
         out = top - IN2 / 2.0
         self.line(node + 1.0 + OPAMP, out, tip, out)
+        pads = self.numbers.get(section.name, {})
+        before, behind = node + 0.85, node + 1.05 + OPAMP
+        self.text(before, top, pads.get("-", ""), ROLE_SIZE, FAINT, "right")
+        self.text(before, top - IN2, pads.get("+", ""), ROLE_SIZE, FAINT, "right")
+        self.text(behind, out, pads.get("OUT", ""), ROLE_SIZE, FAINT)
         over: dict[str, list[float]] = {}
         for i, chain in enumerate(cell.feedback):
             height = y - (i + 0.5) * ROW
@@ -244,6 +254,8 @@ class _Page:
         color: str = "black",
         align: Align = "left",
     ) -> None:
+        if not said:
+            return
         self.drawing += (
             elm.Label()
             .theta(0)
@@ -282,7 +294,7 @@ def _net(net: str) -> str:
 
 def _named(part: TwoPin) -> str:
     if isinstance(part, Resistor):
-        return f"{part.name} {format_quantity(part.value, 'Ω')}"
+        return f"{designator(part.name)} {format_quantity(part.value, 'Ω')}"
     if isinstance(part, Capacitor | SupplyCapacitor):
         return f"{part.name} {format_quantity(part.value, 'F')}"
     return f"{part.name} {part.model.name if isinstance(part, Diode) else part.model}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from designer.circuit import (
     GROUND,
@@ -24,6 +25,7 @@ from designer.circuit import (
 )
 from designer.dead_zone_parts import OUTPUT
 from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.pins import SUPPLY_UNIT
 from designer.quantity import format_quantity
 from designer.stage_names import section_stages
 from designer.views import View
@@ -171,8 +173,13 @@ def _groups(left: Sequence[Chain]) -> Iterator[tuple[str, list[Chain]]]:
     yield from groups.items()
 
 
-def board_cells(circuit: Circuit) -> tuple[Cell, ...]:
-    """What the board has beside the circuit: outputs, generator and trim, supply, decoupling."""
+def board_cells(
+    circuit: Circuit, numbers: Mapping[str, Mapping[str, str]] = MappingProxyType({})
+) -> tuple[Cell, ...]:
+    """What the board has beside the circuit: outputs, generator and trim, supply, decoupling.
+
+    numbers : pads by name of the pin, by unit of a package (``drawing.Numbers``).
+    """
     fittings = circuit.fittings
     if not fittings:
         return ()
@@ -193,6 +200,11 @@ def board_cells(circuit: Circuit) -> tuple[Cell, ...]:
     tied = [p.name for p in fittings if isinstance(p, Section)]
     supply = [f"{_said(n)}: {', '.join(pads[n])}" for n in (POSITIVE, GROUND, NEGATIVE)]
     supply.insert(0, f"{circuit.generator.net}: {', '.join(pads[circuit.generator.net])}")
+    for package in circuit.packages:
+        pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})
+        if pads_of:
+            said_of = ", ".join(f"{_said(pin)} {pad}" for pin, pad in pads_of.items())
+            supply.append(f"{package}: {said_of}")
     if tied:
         supply.append(f"spare, followers of ground: {', '.join(tied)}")
     cells = [

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from designer import job, kicad_files
+from designer import __version__, job, kicad_files
 from designer.catalog import load_catalog
 from designer.design_files import load
-from designer.folder import Folder
+from designer.folder import DESIGN, Folder
 from designer.modelfile import ModelFile
 from designer.options import Options
 from designer.progress import Progress
@@ -25,15 +25,27 @@ def export_into(
     ------
     InputError : a footprint that is not known here, or files that somebody has changed.
     """
-    outcome = job.synthesise_into(modelfile, out, options, progress)
-    folder, catalog = Folder(out), load_catalog()
+    options.check()
+    catalog, folder = load_catalog(), Folder(out)
+    design = job.standing_inputs(folder, modelfile, catalog, progress)
+    reused = not folder.decide(design, overwrite=options.overwrite, resume=options.resume)
+    if not reused:
+        job.synthesise_into(modelfile, out, options, progress)
+        folder = Folder(out)
     made = load(folder, modelfile, catalog)
     files = kicad_files.texts(made)
-    inputs = job.made_from(folder)
+    inputs = {**job.made_from(folder), "catalogue": catalog.hash, "version": __version__}
+    if folder.state(kicad_files.STAGE, inputs) == "other" and not options.overwrite:
+        # The project is of its time, as the design is: it may hold a board that somebody routed.
+        assert folder.manifest is not None
+        inputs = folder.manifest.stages[kicad_files.STAGE].inputs
+        listed = folder.manifest.files.items()
+        files = {name: "" for name, (stage, _) in listed if stage == kicad_files.STAGE}
+        progress.note("so does its KiCad project: --overwrite makes it anew, with what is here")
     stage = kicad_files.wanted(inputs, files)
     todo = folder.decide(stage, overwrite=options.overwrite, resume=options.resume)
     if todo:
         progress.stage("KiCad project")
         kicad_files.write(folder, made, inputs, files)
-    answer = {"format": 1, "files": sorted(files), "provenance": outcome.answer["provenance"]}
-    return answer, outcome.reused and not todo
+    said = folder.json(DESIGN)["provenance"]
+    return {"format": 1, "files": sorted(files), "provenance": said}, reused and not todo

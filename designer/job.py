@@ -168,7 +168,7 @@ def simulate_answer(
     if path.is_dir():
         modelfile, _ = source(path, path)
         if engine != "model":
-            made = load(Folder(path), modelfile, catalog)
+            made = read_design(path, catalog, progress)
     else:
         modelfile = model_file(path)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
@@ -193,10 +193,15 @@ def simulate_answer(
     return plain(answer), all(s.found for s in simulated)
 
 
-def read_design(path: Path, catalog: Catalog | None = None) -> Synthesis:
-    """The design in a design folder."""
+def read_design(
+    path: Path, catalog: Catalog | None = None, progress: Progress | None = None
+) -> Synthesis:
+    """The design in a design folder; ``progress`` is told of another catalogue or version."""
     modelfile, _ = source(path, path)
-    return load(Folder(path), modelfile, load_catalog() if catalog is None else catalog)
+    folder, catalog = Folder(path), load_catalog() if catalog is None else catalog
+    if progress is not None:
+        standing_inputs(folder, modelfile, catalog, progress)
+    return load(folder, modelfile, catalog)
 
 
 def made_from(folder: Folder) -> dict[str, Any]:
@@ -218,6 +223,35 @@ def design_inputs(
         inputs["measured"] = modelfile.measured.sha256
         files.append(MEASURED)
     return {"design": (inputs, files)}
+
+
+def standing_inputs(
+    folder: Folder, modelfile: ModelFile, catalog: Catalog, progress: Progress
+) -> dict[StageName, tuple[dict[str, Any], list[str]]]:
+    """As ``design_inputs``, but the design that stands in the folder is not asked for anew.
+
+    A folder may come from elsewhere: where the model file is its own, its parts stand, whatever
+    catalogue or version it was made with, and ``progress`` is told of these.
+    """
+    wanted = design_inputs(modelfile, catalog)
+    here, files = wanted["design"]
+    origin = made_from(folder)
+    if (
+        modelfile.source == folder / MODEL
+        and folder.state("design", here) == "other"
+        and all(origin.get(key) == here.get(key) for key in ("model", "measured"))
+    ):
+        progress.note(
+            f"this design was made with catalogue {_shown(origin, 'catalogue')} and version "
+            f"{_shown(origin, 'version')}; here are catalogue {_shown(here, 'catalogue')} and "
+            f"version {_shown(here, 'version')}: its parts stand as they are"
+        )
+        wanted["design"] = (origin, files)
+    return wanted
+
+
+def _shown(inputs: Mapping[str, Any], key: str) -> str:
+    return str(inputs.get(key, "not known"))[:12]
 
 
 def _all_found(answer: Mapping[str, Any]) -> bool:

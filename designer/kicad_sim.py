@@ -58,17 +58,15 @@ def fields(component: Component, circuit: Circuit, library: str) -> Fields:
         return (
             ("Sim.Device", letter.upper()),
             ("Sim.Pins", "1=+ 2=-"),
-            ("Sim.Params", f"{letter}={_n(circuit.values[component.reference])}"),
+            ("Sim.Params", f"{letter}={_n(circuit.values[component.parts[0]])}"),
         )
     if component.kind == "op-amp":
         pins = " ".join(f"{pin.number}={pin.number}" for pin in component.pins)
         return _model("SUBCKT", library, component.reference.lower(), pins)
     by_names = f"{numbers['cathode']}={{}} {numbers['anode']}={{}}"
     if component.kind == "diode":
-        return _model(
-            "D", library, _diodes(circuit)[component.reference], by_names.format("K", "A")
-        )
-    name = _references(circuit)[component.reference]
+        return _model("D", library, _diodes(circuit)[component.parts[0]], by_names.format("K", "A"))
+    name = _references(circuit)[component.parts[0]]
     return _model("SUBCKT", library, name, by_names.format("cathode", "anode"))
 
 

@@ -16,10 +16,8 @@ This module is imported by every worker process: it imports numpy and the standa
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -376,35 +374,3 @@ def _accepted(
             raise SimulationFailed(f"node {name!r} has values that are not finite", log)
         found[name] = values
     return axis, found
-
-
-# ---------------------------------------------------------------------------------------------
-# What ngspice may see of the world
-
-
-def clean_environment(home: str) -> dict[str, str | None]:
-    """Changes to the environment that keep settings lying about from ngspice (None: remove)."""
-    changes: dict[str, str | None] = {
-        name: None for name in os.environ if name.startswith(("SPICE", "NGSPICE"))
-    }
-    return {**changes, "HOME": home, "LC_ALL": "C"}
-
-
-@contextlib.contextmanager
-def changed_environment(changes: Mapping[str, str | None]) -> Iterator[None]:
-    """Change environment variables (None: remove) and put them back afterwards."""
-    before = {name: os.environ.get(name) for name in changes}
-    set_environment(changes)
-    try:
-        yield
-    finally:
-        set_environment(before)
-
-
-def set_environment(values: Mapping[str, str | None]) -> None:
-    """Set environment variables (None: remove)."""
-    for name, value in values.items():
-        if value is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = value

@@ -11,7 +11,7 @@ from designer.all_on_one import all_on_one
 from designer.board_parts import board_circuit
 from designer.bom import bill
 from designer.circuit import Circuit
-from designer.components import components
+from designer.components import Numbers, components, pin_numbers
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
@@ -35,7 +35,7 @@ class ReportData:
     command : the command line that makes these results again. equations : the equation check.
     heard : what ngspice said about boards of the study. layers : what else the study has.
     starts : how to start each response, from ``setup.csv``; empty where there is none. board : the
-    circuit with its fittings, to be drawn; None for no drawing.
+    circuit with its fittings, to be drawn; None for no drawing. pins : of its op-amps.
     """
 
     modelfile: ModelFile
@@ -52,12 +52,13 @@ class ReportData:
     layers: Layers = field(default_factory=Layers)
     starts: tuple[str, ...] = ()
     board: Circuit | None = None
+    pins: Numbers = field(default_factory=dict)
 
     @classmethod
     def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
         """The data of a finished run."""
         circuit, choice = board_circuit(result)
-        lines = bill(components(circuit, result.catalog, choice))
+        found = components(circuit, result.catalog, choice)
         return cls(
             modelfile=result.modelfile,
             design=result.design,
@@ -65,13 +66,14 @@ class ReportData:
             yields=result.yields,
             answers=result.answers,
             plan=result.plan,
-            bom=[line.cells() for line in lines],
+            bom=[line.cells() for line in bill(found)],
             provenance=result.provenance,
             command=command,
             equations=result.equations,
             heard=result.study.heard,
             starts=tuple(starts),
             board=circuit,
+            pins=pin_numbers(found),
             layers=Layers(
                 tuned=result.study.tuned,
                 reached=result.study.reached,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from designer import report_design, report_tolerance
 from designer import report_tables as tables
-from designer import report_tolerance
 from designer import report_words as words
 from designer.design import Design
 from designer.plots import EXACT
@@ -28,26 +28,26 @@ def facts(data: ReportData) -> dict[str, Any]:
         "title": data.modelfile.title,
         "summary": _summary(data),
         "tiles": _tiles(data),
-        "model_table": tables.model_table(data),
-        "mechanical_table": tables.mechanical_table(data),
+        "model_table": report_design.model_table(data),
+        "mechanical_table": report_design.mechanical_table(data),
         "response_table": tables.response_table(data),
         "settings_table": tables.settings_table(data),
         "problems": [w for c in data.checked for w in [words.problem(c)] if w],
         "yield_table": tables.yield_table(data),
         "ngspice_table": tables.ngspice_table(data),
         "study_note": _study_note(data),
-        "bom_table": tables.bom_table(data),
-        "part_table": tables.part_table(data),
-        "opamp_table": tables.opamp_table(data),
+        "bom_table": report_design.bom_table(data),
+        "part_table": report_design.part_table(data),
+        "opamp_table": report_design.opamp_table(data),
         "parts_note": _parts_note(data),
-        "error_table": tables.error_table(design),
+        "error_table": report_design.error_table(design),
         "error_note": _error_note(design),
         "equation_table": tables.equation_table(data),
         "equation_note": _equation_note(data),
         "certificate": _certificate(design),
-        "scale_table": tables.scale_table(data),
+        "scale_table": report_design.scale_table(data),
         "scale_note": _scale_note(data),
-        "condition_table": tables.condition_table(design),
+        "condition_table": report_design.condition_table(design),
         "provenance_table": tables.provenance_table(data),
         "command": data.command,
         "glossary": _GLOSSARY,

@@ -172,7 +172,7 @@ def _schematic(data: ReportData) -> Picture | None:
     if data.board is None:
         return None
     return Picture(
-        _svg_uri(drawing.svg(data.board)),
+        _svg_uri(drawing.svg(data.board, numbers=data.pins)),
         "Schematic: one stage a cell, nets joined by their names.",
         "Drawn from the circuit's parts; the same as schematic.svg.",
     )

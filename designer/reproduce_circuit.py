@@ -68,7 +68,8 @@ def reproduce(
     key = hashlib.sha256(
         json.dumps([FORMAT, __version__, asdict(extent), catalog.hash]).encode("ascii")
     ).hexdigest()
-    store = CaseStore(out, key, names(extent), resume=resume)
+    store = CaseStore(out, names(extent), resume=resume)
+    store.expect(key)
     said.stage("responses of the model")
     bench = Bench.of(catalog, extent, jobs, said)
     found: dict[str, dict[str, Any]] = {}

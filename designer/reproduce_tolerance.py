@@ -14,15 +14,15 @@ import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from designer import exact
 from designer.bands import Bands
 from designer.blame import blame
-from designer.case_store import read_piece
+from designer.case_store import CaseStore
 from designer.catalog import load_catalog
-from designer.errors import InputError
 from designer.preconditions import at_least, cores
 from designer.progress import Progress
 from designer.provenance import provenance
@@ -38,7 +38,6 @@ FORMAT = 1
 SAMPLES, SEED = 250, 20260
 SHORT = 25
 """Boards that are tuned and powered up, at most: a board costs some hundred settings."""
-FOLDER = "cases"
 FILES = ("tolerance.json", "tolerance.parquet", "yields.png", "README.md")
 """What is made of the cases."""
 KINDS = ("as built", "tuned", "tuned on the bench", "reached")
@@ -95,34 +94,19 @@ def reproduce(
     jobs = cores() if jobs is None else jobs
     for name, value, least in (("--samples", samples, 1), ("--seed", seed, 0), ("--jobs", jobs, 1)):
         at_least(name, value, least)
-    folder = out / FOLDER
-    begun = folder.is_dir() and any(folder.iterdir())
-    if begun and not resume:
-        raise InputError(str(folder), "--out", "results", "an empty folder, or --resume")
-    if not begun:
-        _free(out)
-    _made(folder)
+    store = CaseStore(out, FILES, resume=resume)
     catalog = load_catalog()
     said.stage("nominal circuits")
-    asked = [
-        case
+    asked = {
+        case.name: case
         for case in cases(catalog, samples=samples, seed=seed)
         if only is None or case.name in only
-    ]
-    keys = {case.name: _key(case, short, catalog.hash) for case in asked}
-    there = {
-        name: _read(folder / f"{name}.json", key) if resume else None for name, key in keys.items()
     }
-    if not any(there.values()):
-        _free(out)
-    found = []
-    for case in asked:
-        known = there[case.name]
-        if known is None:
-            made = _case(case, min(short, samples), jobs, said)
-            known = {"format": FORMAT, "key": keys[case.name], **made}
-            write(folder / f"{case.name}.json", _json(known))
-        found.append(known)
+    store.expect({name: _key(case, short, catalog.hash) for name, case in asked.items()})
+    found = [
+        store.piece(name, partial(_case, case, min(short, samples), jobs, said))
+        for name, case in asked.items()
+    ]
     rows = tuple(Row(**row) for known in found for row in known["rows"])
     settings = {"samples": samples, "short": min(short, samples), "bands": Bands().as_dict()}
     source = provenance(model_file(), catalog.hash, seed=seed, settings=settings)
@@ -151,6 +135,7 @@ def _case(case: Case, short: int, jobs: int, said: Progress) -> dict[str, Any]:
     }
     rows = [_row(case, p, kind, judged) for kind, judged in kinds.items() for p in OMEGA]
     out: dict[str, Any] = {
+        "format": FORMAT,
         "circuit": case.circuit,
         "case": case.name,
         "missing": {f"1-{p}-{p}": instead for p, instead in case.missing.items()},
@@ -229,36 +214,6 @@ def _key(case: Case, short: int, catalog_hash: str) -> str:
     return hashlib.sha256(said.encode("ascii")).hexdigest()
 
 
-def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """A finished case; None where there is none."""
-    known = read_piece(path, "--resume", "a case of this report")
-    if known is not None and known.get("key") != key:
-        raise InputError(str(path), "--resume", "a case of other settings", "the same settings")
-    return known
-
-
 def _json(value: Mapping[str, Any]) -> bytes:
     text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
     return f"{text}\n".encode()
-
-
-def _free(out: Path) -> None:
-    """Nothing stands where the report's own files go.
-
-    Raises
-    ------
-    InputError : one of them, whoever made it, would be written over.
-    """
-    for name in FILES:
-        if (out / name).exists():
-            found = "a file that the report would replace, and no case of it to go on with"
-            raise InputError(str(out / name), "--out", found, "a folder without it")
-
-
-def _made(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            str(folder), "--out", error.strerror or str(error), "a place that can be written"
-        ) from None

@@ -7,10 +7,13 @@ not run: never a pass.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
 
 from designer.board_drc import CheckFailed, DesignRuleCheck, Violation, check
 from designer.board_file import BoardFile
+from designer.board_outline import LAYER
 from designer.board_rules import CustomRule
 from designer.circuit import NEGATIVE, POSITIVE
 from designer.components import Component
@@ -30,10 +33,9 @@ from designer.rule import (
 from designer.rule_list import RULES
 
 NO_BOARD = "no board was given (--board FILE)"
-READ = "decoupling-distance"
-"""Rule that KiCad cannot say: it is read from the file."""
 MOST = 5
 """Names in a message."""
+_READ = "read from the board file"
 COPPER = frozenset({"clearance"})
 """Rules that say nothing of a board without tracks."""
 
@@ -72,8 +74,8 @@ def on_board(
     for rule in _wanted():
         override = overrides.get(rule.id)
         try:
-            if rule.id == READ:
-                out.append(judged(rule, decoupling_distance(board, components), override))
+            if rule.id in READ:
+                out.append(judged(rule, READ[rule.id](board, components), override))
             elif isinstance(told, str):
                 out.append(_idle(rule, rules, overrides, told))
             else:
@@ -103,7 +105,27 @@ def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> It
                 raise NotRun(f"{package.reference} has no decoupling capacitor on {pad.net}")
             distance, reference = min(near)
             where = f"{package.reference}.{pad.number}"
-            yield Found(distance, where, more=f"to {reference}; read from the board file")
+            yield Found(distance, where, more=f"to {reference}; {_READ}")
+
+
+def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """From each pad of the design's components to the board's edge [mm]."""
+    if not len(board.outline.sides):
+        raise NotRun(f"the board has no edge: nothing on {LAYER}")
+    if (at := board.outline.open_at) is not None:
+        raise NotRun(f"the edge on {LAYER} is not closed at ({at[0]:.2f} mm, {at[1]:.2f} mm)")
+    for component in components:
+        for pad in board.pads(component.reference):
+            room = board.outline.room(np.array(pad.corners))
+            where = f"{component.reference}.{pad.number}"
+            yield Found(room, where, more=_READ)
+
+
+READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] = {
+    "decoupling-distance": decoupling_distance,
+    "board-outline": board_outline,
+}
+"""Rules that KiCad cannot say: they are read from the file."""
 
 
 def _by_kicad(

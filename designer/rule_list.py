@@ -241,6 +241,15 @@ RULES: tuple[Rule, ...] = (
         least=True, board=True,
     ),
     _rule(
+        "board-outline",
+        "From a component's pad to the edge of the board; below 0 by how far a pad is outside",
+        0.5, "mm",
+        "the distance from copper to an edge that KiCad asks for unless told otherwise; its own "
+        "check says nothing of what lies outside altogether",
+        "move the component onto the board, or the edge outwards",
+        least=True, board=True,
+    ),
+    _rule(
         "component-spacing",
         "Courtyards of two components",
         0.25, "mm",

@@ -125,7 +125,7 @@ class Subject:
     def dielectrics(self) -> dict[str, str]:
         """What each capacitor is made of, in words."""
         found = (c for c in self.components if c.kind == "capacitor" and c.bought is not None)
-        return {c.reference: c.bought.dielectric for c in found if c.bought is not None}
+        return {c.parts[0]: c.bought.dielectric for c in found if c.bought is not None}
 
     def _rated(self, kind: str, unit: str) -> dict[str, float]:
         out = {}
@@ -134,5 +134,5 @@ class Subject:
                 continue
             for words in component.bought.rating.split(", "):
                 if words.endswith(unit):
-                    out[component.reference] = parse_quantity(words, unit)
+                    out[component.parts[0]] = parse_quantity(words, unit)
         return out

@@ -70,7 +70,7 @@ def into_folder(
         found_there = "a folder" if report.is_dir() else "no such folder"
         raise InputError(report, "--junit", found_there, "a file in a folder that exists")
     catalog = load_catalog()
-    made = read_design(path, catalog)
+    made = read_design(path, catalog, progress)
     given = None if board is None else read_board(board)
     progress.stage("rules")
     found = checked(made, given)

@@ -19,7 +19,7 @@ from designer.errors import InputError
 from designer.folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder, StageName
 from designer.gate import Subject
 from designer.hearing import OWN_SAMPLES, Kind, ask_random
-from designer.job import Outcome, design_inputs, model_file
+from designer.job import Outcome, design_inputs, made_from, model_file
 from designer.jsonout import dumps, run_json
 from designer.limiting import limitings
 from designer.modelfile import ModelFile
@@ -170,7 +170,7 @@ def _confirmed(
     """What ngspice says of boards of the study, and what limits each response."""
     folder, catalog = Folder(out), load_catalog()
     inputs = {
-        **design_inputs(modelfile, catalog)["design"][0],
+        **made_from(folder),
         "seed": options.seed,
         "samples": options.samples,
         "rung": RUNG,

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from designer.environment import clean_environment
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
     HOW_TO_INSTALL,
@@ -27,7 +28,6 @@ from designer.ngspice import (
     accept,
     accept_sweep,
     check_netlist,
-    clean_environment,
     offending_line,
     require_version,
     said,

@@ -23,6 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from designer.environment import changed_environment, clean_environment
 from designer.errors import EnvironmentMissing
 from designer.ngspice import (
     HOW_TO_INSTALL,
@@ -32,9 +33,7 @@ from designer.ngspice import (
     Waveforms,
     accept,
     accept_sweep,
-    changed_environment,
     check_netlist,
-    clean_environment,
     require_version,
 )
 

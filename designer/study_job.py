@@ -17,8 +17,8 @@ from designer.api import RunResult, Synthesis
 from designer.catalog import Catalog, load_catalog
 from designer.design_files import load
 from designer.equation_check import EquationCheck
-from designer.folder import DESIGN, MODEL, REPORTS, TOLERANCE, Folder, StageName
-from designer.job import Outcome, design_inputs, made_from
+from designer.folder import DESIGN, REPORTS, TOLERANCE, Folder, StageName
+from designer.job import Outcome, design_inputs, standing_inputs
 from designer.jsonout import dumps, run_json
 from designer.kept import KEPT, Kept
 from designer.layers import Here, Runner
@@ -61,16 +61,7 @@ def run_into(
     folder = Folder(out)
     options = rung_choice.chosen(folder, options, progress)
     wanted, options = _study_wanted(folder, modelfile, catalog, options)
-    origin = made_from(folder)
-    if (
-        folder.state("design", wanted["design"][0]) == "other"
-        and origin.get("model") == modelfile.sha256
-        and origin.get("measured") == wanted["design"][0].get("measured")
-        and modelfile.source == out / MODEL
-    ):
-        # A folder that came from elsewhere: its parts stand, whatever can be bought here.
-        progress.note("the catalogue or the tool is not the one this design was made with")
-        wanted["design"] = (origin, wanted["design"][1])
+    wanted |= standing_inputs(folder, modelfile, catalog, progress)
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
     if not todo:
         answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))

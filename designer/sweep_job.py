@@ -10,10 +10,9 @@ from typing import Any
 
 from designer import __version__, basins, parameter_map, point_changes, sweep, sweep_points
 from designer.catalog import load_catalog
-from designer.design_files import load
 from designer.errors import InputError
 from designer.folder import Folder, StageName
-from designer.job import source
+from designer.job import read_design, source
 from designer.jsonout import dumps, plain
 from designer.modelfile import ModelFile, read_model_file
 from designer.parameter_map import MapPlan
@@ -39,7 +38,7 @@ def answer(
         in the way. Nothing is written then.
     """
     began = time.perf_counter()
-    modelfile, subject = _subject(path, request)
+    modelfile, subject = _subject(path, request, progress)
     plan = plan_of(request, subject, modelfile)
     said = _provenance(modelfile, request, plan)
     if out is None:
@@ -72,12 +71,12 @@ def answer(
 # ---------------------------------------------------------------------------------------------
 
 
-def _subject(path: Path, request: Request) -> tuple[ModelFile, Subject]:
+def _subject(path: Path, request: Request, progress: Progress) -> tuple[ModelFile, Subject]:
     if path.is_dir():
-        modelfile, _ = source(path, path)
         if request.circuit:
-            made = load(Folder(path), modelfile, load_catalog())
-            return modelfile, BoardSubject(made.design)
+            made = read_design(path, progress=progress)
+            return made.modelfile, BoardSubject(made.design)
+        modelfile, _ = source(path, path)
     else:
         modelfile = read_model_file(path)
         if request.circuit:

@@ -16,7 +16,7 @@ from designer import api, design_files, gate, trade_rungs, trade_yield
 from designer.api import Synthesis
 from designer.catalog import load_catalog
 from designer.folder import Folder
-from designer.job import Options, design_inputs, made_from
+from designer.job import Options, standing_inputs
 from designer.jsonout import dumps
 from designer.modelfile import ModelFile
 from designer.preconditions import cores, naming, need_responses, require_ngspice
@@ -97,13 +97,7 @@ def answer(
         progress.stage("responses of the model, parts")
         return _document(api.synthesise(modelfile, catalog), extent, options, progress), False
     folder = Folder(out)
-    wanted = design_inputs(modelfile, catalog)
-    origin = made_from(folder)
-    if "design" in (folder.manifest.stages if folder.manifest else {}) and (
-        origin.get("model") == modelfile.sha256
-        and origin.get("measured") == wanted["design"][0].get("measured")
-    ):
-        wanted["design"] = (origin, wanted["design"][1])  # its parts stand, wherever it was made
+    wanted = standing_inputs(folder, modelfile, catalog, progress)
     levels = [f"{share:g}:{reltol:g}" for share, reltol in extent.levels]
     inputs = {**wanted["design"][0], **asdict(extent), "levels": levels, "seed": options.seed}
     wanted["trade"] = (inputs, list(NAMES))

@@ -19,7 +19,6 @@ import os
 import pickle
 import shutil
 import signal
-import sys
 import tempfile
 import time
 import weakref
@@ -33,19 +32,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
+from designer.environment import changed_environment
 from designer.errors import EnvironmentMissing
-from designer.ngspice import (
-    Analysis,
-    Backend,
-    SimulationFailed,
-    Simulator,
-    Sweep,
-    Waveforms,
-    changed_environment,
-    clean_environment,
-    open_simulator,
-    set_environment,
-)
+from designer.ngspice import Analysis, Backend, SimulationFailed
+from designer.spice_worker import Reply, told, work
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -206,7 +196,7 @@ class SpicePool:
 
     def _look_at(self, worker: _Worker, waiting: deque[_Task]) -> tuple[int, Any] | None:
         """Take a worker's message, or draw the consequences of its silence."""
-        reply: _Reply | None = None
+        reply: Reply | None = None
         complaint = f"gave no answer within {self._timeout if worker.ready else START_TIMEOUT:g} s"
         if worker.connection.poll():
             try:
@@ -256,15 +246,6 @@ class _Task:
     index: int
     job: bytes
     complaints: list[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class _Reply:
-    """What a worker says: first how its start went, then one for each job."""
-
-    text: str = ""  # at the start: ngspice's version, or what is missing
-    value: bytes = b""  # pickled result or SimulationFailed
-    last: bool = False  # the worker ends after this
 
 
 @dataclass(eq=False)
@@ -322,7 +303,7 @@ def _start(backend: Backend, folder: Path, workers: list[_Worker]) -> None:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(
-        target=_work, args=(theirs, backend, str(folder)), name="designer-spice", daemon=True
+        target=work, args=(theirs, backend, str(folder)), name="designer-spice", daemon=True
     )
     # A held signal stays held in the child, so Ctrl-C cannot hit it before it can say that it
     # ignores it. The tracker would lift the hold if it were started inside the block.
@@ -337,73 +318,4 @@ def _unpack(value: bytes) -> Any:
     try:
         return pickle.loads(value)
     except Exception as error:
-        return SimulationFailed(f"analysis failed: its result cannot be read: {_told(error)}")
-
-
-# ---------------------------------------------------------------------------------------------
-# Inside a worker
-
-
-def _work(connection: Connection, backend: Backend, folder: str) -> None:
-    """The whole life of a worker."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.setsid()  # what it starts ends with it
-    os.dup2(2, 1)  # standard output is the parent's: no library prints into its JSON
-    _move_to(folder)
-    try:
-        simulator = open_simulator(backend)
-    except EnvironmentMissing as error:
-        connection.send_bytes(pickle.dumps(_Reply(str(error), last=True)))
-        return
-    connection.send_bytes(pickle.dumps(_Reply(simulator.version)))
-    while simulator.usable:
-        try:
-            job = connection.recv_bytes()
-        except EOFError:  # the parent is gone
-            break
-        value = _outcome(simulator, job)
-        with contextlib.suppress(BrokenPipeError):
-            connection.send_bytes(pickle.dumps(_Reply(value=value, last=not simulator.usable)))
-    os._exit(0)  # libngspice tidies up a heap that may be corrupt; there is nothing to tidy
-
-
-def _move_to(folder: str) -> None:
-    """Make an empty home and working directory, and a place for temporary files beside it."""
-    home, temporary = Path(folder, "home"), Path(folder, "tmp")
-    home.mkdir()
-    temporary.mkdir()
-    sys.path[:] = [os.path.abspath(entry) for entry in sys.path]  # modules are still to be found
-    changes = clean_environment(str(home))
-    changes.pop("NGSPICE_LIBRARY_PATH", None)  # which library is the user's to say
-    set_environment({**changes, "TMPDIR": str(temporary)})
-    tempfile.tempdir = None  # it looks again
-    os.chdir(home)
-
-
-def _outcome(simulator: Simulator, job: bytes) -> bytes:
-    """The pickled result of a pickled job; whatever goes wrong is a `SimulationFailed`."""
-    try:
-        try:
-            todo: SpiceJob[Any] = pickle.loads(job)
-        except Exception as error:
-            raise SimulationFailed(f"analysis failed: it cannot be read: {_told(error)}") from error
-        try:
-            waveforms: Waveforms | Sweep
-            if todo.analysis == "tran":
-                waveforms = simulator.run(todo.netlist, todo.signals, todo.stop_time)
-            else:
-                waveforms = simulator.sweep(
-                    todo.netlist, todo.signals, todo.stop_time, todo.analysis
-                )
-        except (ValueError, OSError, EnvironmentMissing) as error:
-            raise SimulationFailed(f"simulation failed: {_told(error)}") from error
-        try:
-            return pickle.dumps(todo.reduce(waveforms))
-        except Exception as error:
-            raise SimulationFailed(f"analysis failed: {_told(error)}", waveforms.log) from error
-    except SimulationFailed as failure:
-        return pickle.dumps(SimulationFailed(failure.reason, failure.log))
-
-
-def _told(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+        return SimulationFailed(f"analysis failed: its result cannot be read: {told(error)}")

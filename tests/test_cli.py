@@ -224,8 +224,7 @@ def test_same_inputs_are_not_computed_again(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     out, done = finished
-    before = _tree(out)
-    began = time.monotonic()
+    before = _tree(out)  # with times in it, which no second computation would repeat
     model = str(home / "small.toml")
     for verb in (["run", model, "--out", str(out)], ["run", str(out)]):
         assert cli.status([*verb, "--samples", str(SAMPLES), "--json", "--resume"]) == 0
@@ -236,7 +235,6 @@ def test_same_inputs_are_not_computed_again(
     assert cli.status(["synthesise", model, "--out", str(out), "--json", "-q"]) == 0
     assert _strict(capfd.readouterr().out)["parts"] == _strict(done.stdout)["parts"]
     assert _tree(out) == before
-    assert time.monotonic() - began < 20
 
 
 def test_overwrite_replaces_listed_files_only(
@@ -544,14 +542,12 @@ def test_folders_that_cannot_be_written(tmp_path: Path, capfd: pytest.CaptureFix
 def test_missing_ngspice_is_exit_3(home: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     environment = {**os.environ, "PATH": str(tmp_path), "PYTHONPATH": str(ROOT)}
-    began = time.monotonic()
     process = _process("run", _model(home), "--out", out, "--json", env=environment)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 3
     assert stdout == ""
     assert "apt-get install" in stderr
     assert "Traceback" not in stderr
-    assert time.monotonic() - began < 15
     assert not out.exists()
 
 
@@ -618,6 +614,7 @@ def test_killed_study_goes_on_and_ends_the_same(
     assert _without_cost(out) == _without_cost(whole)
 
 
+@pytest.mark.slow
 def test_ctrl_c_is_exit_130(home: Path) -> None:
     out = home / "interrupted"
     arguments = ["run", str(home / "small.toml"), "--out", str(out), "--samples", "500"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections import Counter
 from itertools import combinations
 
 import pytest
@@ -13,6 +14,7 @@ from designer import drawing
 from designer.board_parts import fitted
 from designer.boardspec import BoardChoice
 from designer.circuit import Circuit, Section
+from designer.components import Numbers, components, designator, pin_numbers
 from designer.drawing_cells import Amplifier, Chain, board_cells, circuit_cells
 from designer.fittings import Connector, TestPoint
 from tests.stages import CATALOG
@@ -24,6 +26,10 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def board(name: str) -> Circuit:
     return fitted(CIRCUITS[name], BoardChoice(), CATALOG)
+
+
+def numbers(name: str) -> Numbers:
+    return pin_numbers(components(board(name), CATALOG, BoardChoice()))
 
 
 def texts(svg: str) -> list[tuple[str, tuple[float, float, float, float]]]:
@@ -45,7 +51,8 @@ def test_every_part_is_drawn_once(name: str) -> None:
     circuit = board(name)
     said = " \n ".join(text for text, _ in texts(drawing.svg(circuit)))
     for part in (*circuit.parts, *circuit.fittings):
-        found = re.findall(rf"(?<![\w·]){part.name}(?![\w])", said)
+        name = part.name if isinstance(part, Section) else designator(part.name)
+        found = re.findall(rf"(?<![\w·]){name}(?![\w])", said)
         if isinstance(part, Connector):
             assert found
         elif isinstance(part, TestPoint | Section):
@@ -56,10 +63,23 @@ def test_every_part_is_drawn_once(name: str) -> None:
 
 @pytest.mark.parametrize("name", CIRCUITS)
 def test_no_text_lies_on_another(name: str) -> None:
-    boxes = texts(drawing.svg(board(name), "A title"))
+    boxes = texts(drawing.svg(board(name), "A title", numbers(name)))
     for (one, a), (two, b) in combinations(boxes, 2):
         apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
         assert apart, (one, two)
+
+
+def test_op_amps_show_the_pads_of_their_case() -> None:
+    """Of a TL074 in SO-14, by its data sheet: A has 2, 3 and 1, the supply 4 and 11."""
+    pads = numbers("paper")
+    assert pads["U1A"] == {"-": "2", "+": "3", "OUT": "1"}
+    assert pads["U1D"] == {"-": "13", "+": "12", "OUT": "14"}
+    circuit = board("paper")
+    said = [text for text, _ in texts(drawing.svg(circuit, "", pads))]
+    plain = [text for text, _ in texts(drawing.svg(circuit))]
+    shown = Counter(said) - Counter(plain)
+    wanted = Counter(pad for s in circuit.sections for pad in pads[s.name].values())
+    assert shown == wanted + Counter(f"{p}: V+ 4, V- 11" for p in circuit.packages)
 
 
 @pytest.mark.parametrize("name", CIRCUITS)

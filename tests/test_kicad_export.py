@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,11 @@ import pytest
 
 from designer import cli, kicad_files
 from designer.api import Synthesis
+from designer.catalog import ENVIRONMENT, load_catalog
 from designer.errors import InputError
 from designer.kicad_project import Project
 from tests.paper_cases import PAPER
+from tests.test_catalog import own_opamp
 
 MODEL = """
 format = 1
@@ -118,6 +121,40 @@ def test_an_edited_board_is_kept_until_it_is_to_be_replaced(made: Path) -> None:
         assert board.read_bytes() == written
     finally:
         board.write_bytes(written)
+
+
+def test_a_folder_made_with_another_catalogue(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every verb reads its parts and says which catalogue they are from; no choice is made anew."""
+    folder = tmp_path / "design"
+    shutil.copytree(made, folder)
+    design, project = (folder / "design.json").read_bytes(), snapshot(folder / "kicad")
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "own.toml").write_text(own_opamp("5 mV"), encoding="utf-8")
+    before = load_catalog().hash[:12]
+    monkeypatch.setenv(ENVIRONMENT, str(mine))
+    now = load_catalog().hash[:12]
+    assert now != before
+    for verb in (["rules"], ["export"], ["simulate", "--engine", "circuit", "--omega", "1.2"]):
+        done = designer(verb[0], folder, *verb[1:])
+        assert done.returncode in (0, 1), done.stderr
+        assert f"made with catalogue {before}" in done.stderr.replace("\n", " ")
+        assert now in done.stderr
+        assert (folder / "design.json").read_bytes() == design
+    assert snapshot(folder / "kicad") == project
+    assert "--overwrite" in designer("export", folder).stderr
+    done = designer("export", folder, "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert (folder / "design.json").read_bytes() == design
+    assert json.loads((folder / "manifest.json").read_text())["stages"]["kicad"]["inputs"][
+        "catalogue"
+    ].startswith(now)
+    refused = designer("synthesise", folder)  # it would choose the parts anew
+    assert refused.returncode == 2
+    assert before in refused.stderr
+    assert now in refused.stderr
 
 
 def test_a_model_file_needs_a_place_to_write(tmp_path: Path) -> None:

@@ -75,8 +75,7 @@ def test_kicads_own_deck_shows_the_same_responses(name: str, tmp_path: Path) -> 
             run = FirstRun(each.excitation, result.settings, own.stop_time, each.orbit.start)
             sheet = replace(project(circuit, mounting), run=run)
             folder = written(files(sheet), tmp_path / str(i))
-            # R50A ends in no number, which KiCad warns of; the netlist is whole all the same.
-            theirs_text = spice(folder, warned=name == "composites")
+            theirs_text = spice(folder)
             jobs += [own, replace(own, netlist=theirs_text)]
         found = dict(pool.map(jobs))
     for i, each in enumerate(asked):

@@ -10,11 +10,14 @@ import re
 import tomllib
 from dataclasses import FrozenInstanceError, fields
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import BaseModel
 
+from designer import modelfile
 from designer.circuitspec import SIDE_CONDITIONS
 from designer.errors import InputError
 from designer.model import Dimensionless
@@ -27,6 +30,7 @@ from designer.modelfile import (
     parse_model_file,
     read_model_file,
 )
+from designer.responsespec import ResponseTable
 from designer.starter import TEXT
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -557,3 +561,70 @@ def test_what_the_starter_shows_in_comments_is_valid() -> None:
     read = parse_model_file(SMALL + "\n".join(lines[lines.index("[spread]") :])).spread
     assert (read.resistors.law, read.temperature, read.supply) == ("normal", (10.0, 40.0), 0.02)
     assert read.measured == "measured.csv"
+
+
+# What docs/model-file.md says of the keys.
+
+DOCS = (EXAMPLES.parent / "docs" / "model-file.md").read_text(encoding="utf-8")
+TABLES: dict[str, type[BaseModel]] = {
+    name: table
+    for name, field in modelfile._File.model_fields.items()
+    for table in (*get_args(field.annotation), field.annotation)
+    if isinstance(table, type) and issubclass(table, BaseModel)
+} | {"response": ResponseTable}
+
+
+def rows(name: str) -> dict[str, list[str]]:
+    """Rows of a table of the docs by key; [model] and [mechanical] share a heading."""
+    shared = name in ("model", "mechanical")
+    heading = "`[model]`" if shared else "`[[response]]`" if name == "response" else f"`[{name}]`"
+    section = DOCS.split(f"\n## {heading}", 1)[1].split("\n## ", 1)[0]
+    if shared:
+        section = next(t for t in section.split("\n\n") if t.startswith(f"| key | `[{name}]`"))
+    found: dict[str, list[str]] = {}
+    for row in re.findall(r"^\| (`.*) \|$", section, re.MULTILINE):
+        first, *cells = (cell.strip(" |") for cell in row.split(" | "))
+        keys = re.findall(rf"`(?:\[\[{name}\.)?(\w+)(?:\]\])?`", first)
+        found |= {key: [first, *cells] for key in keys}
+    return found
+
+
+@pytest.mark.parametrize("name", ["model", "mechanical"])
+def test_the_docs_say_what_is_required_and_what_else_holds(name: str) -> None:
+    said, table = rows(name), TABLES[name]
+    assert said.keys() == table.model_fields.keys()
+    for key, field in table.model_fields.items():
+        assert said[key][-1] == ("required" if field.is_required() else f'`"{field.default}"`'), key
+    fine = {"model": MODEL, "mechanical": DRILL[DRILL.index("[mechanical]") :].split("\n\n")[0]}
+    for key in set(said) - {"sides"}:
+        rest, count = re.subn(rf"^{key} *=.*\n?", "", fine[name], flags=re.MULTILINE)
+        assert count == 1, key
+        assert refused(f"format = 1\n{rest}").field == f"{name}.{key}"
+
+
+@pytest.mark.parametrize("key", sorted(set(rows("model")) - {"sides"}))
+def test_the_docs_say_the_domain_of_each_parameter(key: str) -> None:
+    """The ends of the interval that the docs give, by trying them."""
+    domain = rows("model")[key][2]
+    for end, inside in ((0.0, "[0" in domain), (1.0, "1]" in domain or domain == "> 0")):
+        text = "format = 1\n" + re.sub(rf"^{key} = .*", f"{key} = {end}", MODEL, flags=re.M)
+        if inside:
+            assert getattr(parse_model_file(text).model, key) == end
+        else:
+            assert refused(text).field == f"model.{key}"
+
+
+@pytest.mark.parametrize("name", ["response", "tuning", "circuit", "search", "spread"])
+def test_the_docs_name_every_key(name: str) -> None:
+    said = rows(name)
+    fields_of = TABLES[name].model_fields
+    assert said.keys() == fields_of.keys()
+    for key, field in fields_of.items():
+        if len(said[key]) < 3:  # a table without a column of defaults
+            continue
+        names, shown = re.findall(r"`(\w+)`", said[key][0]), said[key][1].split(", ")
+        default = shown[min(names.index(key), len(shown) - 1)] if names else ""
+        if isinstance(field.default, float):
+            assert float(default) == field.default, key
+        elif isinstance(field.default, str):
+            assert default == f'`"{field.default}"`', key

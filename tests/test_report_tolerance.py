@@ -20,8 +20,9 @@ from designer.margins import Prediction
 from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
 from designer.report_data import ReportData
+from designer.report_design import condition_table
 from designer.report_layers import Layers
-from designer.report_tables import condition_table, provenance_table
+from designer.report_tables import provenance_table
 from designer.report_tolerance import facts
 from designer.verdict import Verdict
 from designer.yield_maps import Axis, YieldMap

@@ -37,7 +37,7 @@ BY_KICAD = (
     "supply-width",
 )
 """Rules whose pair is a board that breaks them in KiCad's check, and one that just keeps them."""
-BY_READING = ("decoupling-distance",)
+BY_READING = ("decoupling-distance", "board-outline")
 
 
 @cache
@@ -291,27 +291,33 @@ def test_tracks_arcs_vias_and_zones_are_read(tmp_path: Path) -> None:
 # Read from the file
 
 
+def shifted(name: str, by: tuple[float, float]) -> str:
+    """The exported board with one component moved [mm]."""
+
+    def moved(item: Expression) -> Expression:
+        if item.name != "footprint" or reference(item) != name:
+            return item
+        at = item.get("at")
+        turn = at.number(2) if len(at.atoms) > 2 else None
+        new = expression("at", at.number(0) + by[0], at.number(1) + by[1], turn)
+        return Expression(tuple(new if i is at else i for i in item.items))
+
+    return edited(moved)
+
+
+def by_reading(text: str, folder: Path) -> dict[str, Outcome]:
+    """What is said of a board without KiCad."""
+    board = board_of(text, folder)
+    return by_id(rule_board.on_board(board, base().components, custom(), {}, "not asked"))
+
+
 def decoupled(distance: float, folder: Path) -> Outcome:
     """C903 moved so that its nearer pad is this far from U1's V+."""
     board = board_of(drawn(), folder)
     pin = next(p for p in board.pads("U1") if p.net == "vcc")
     pad = next(p for p in board.pads("C903") if p.net == "vcc")
-
-    def moved(item: Expression) -> Expression:
-        if item.name != "footprint" or reference(item) != "C903":
-            return item
-        at = item.get("at")
-        x = at.number(0) + pin.at[0] + distance - pad.at[0]
-        y = at.number(1) + pin.at[1] - pad.at[1]
-        turn = at.number(2) if len(at.atoms) > 2 else None
-        new = expression("at", x, y, turn)
-        return Expression(tuple(new if i is at else i for i in item.items))
-
-    return by_id(
-        rule_board.on_board(
-            board_of(edited(moved), folder), base().components, custom(), {}, "not asked"
-        )
-    )["decoupling-distance"]
+    by = pin.at[0] + distance - pad.at[0], pin.at[1] - pad.at[1]
+    return by_reading(shifted("C903", by), folder)["decoupling-distance"]
 
 
 def test_a_far_decoupling_capacitor_is_caught_and_a_near_miss_is_not(tmp_path: Path) -> None:
@@ -328,6 +334,100 @@ def test_a_capacitor_on_the_other_rail_does_not_decouple_this_one(tmp_path: Path
     board = board_of(drawn(), tmp_path)
     found = by_id(rule_board.on_board(board, listed, custom(), {}, "not asked"))
     assert found["decoupling-distance"].status == NOT_RUN
+
+
+def edge() -> tuple[Expression, dict[str, float]]:
+    """The outline of the exported board, a rectangle, and where its sides are [mm]."""
+    found = next(i for i in read(drawn()).all("gr_rect"))
+    (left, top), (right, bottom) = ((p.number(0), p.number(1)) for p in
+                                    (found.get("start"), found.get("end")))  # fmt: skip
+    return found, {"left": left, "top": top, "right": right, "bottom": bottom}
+
+
+def pads_of(name: str) -> list[tuple[float, float, float, float]]:
+    """Centre and half sizes of a component's pads as the file states them, the component turned by
+    whole right angles."""
+    out = []
+    footprint = next(i for i in read(drawn()).all("footprint") if reference(i) == name)
+    at = footprint.get("at")
+    turn = round(at.number(2) if len(at.atoms) > 2 else 0.0) % 360
+    for pad in footprint.all("pad"):
+        x, y = pad.get("at").number(0), pad.get("at").number(1)
+        w, h = (pad.get("size").number(i) / 2.0 for i in (0, 1))
+        c, s = {0: (1, 0), 90: (0, 1), 180: (-1, 0), 270: (0, -1)}[turn]
+        place = at.number(0) + x * c + y * s, at.number(1) - x * s + y * c
+        out.append((*place, *((w, h) if s == 0 else (h, w))))
+    return out
+
+
+def at_edge(gap: float, folder: Path, name: str = "R4", side: str = "right") -> Outcome:
+    """A component moved so that its outermost copper is this far inside one side of the board."""
+    limits = edge()[1]
+    if side == "right":
+        by = limits["right"] - gap - max(x + w for x, _, w, _ in pads_of(name)), 0.0
+    else:
+        by = 0.0, limits["top"] + gap - min(y - h for _, y, _, h in pads_of(name))
+    return by_reading(shifted(name, by), folder)["board-outline"]
+
+
+@pytest.mark.parametrize(("name", "side"), [("R4", "right"), ("C903", "top"), ("U1", "right")])
+def test_a_part_past_the_edge_is_caught_and_a_near_miss_is_not(
+    tmp_path: Path, name: str, side: str
+) -> None:
+    for gap in (0.45, 0.01, -1.0, -50.0):
+        past = at_edge(gap, tmp_path, name, side)
+        assert past.status == FAIL
+        assert past.where.startswith(f"{name}.")
+        # Across the edge from 0 on; outside, by how far the outermost copper is.
+        assert past.value == pytest.approx(gap, abs=1e-5)
+    near = at_edge(0.55, tmp_path, name, side)
+    assert near.status == PASS
+    assert near.value == pytest.approx(0.55, abs=1e-5)
+    assert "read from the board file" in near.found
+
+
+def test_without_an_edge_or_with_a_gap_in_it_nothing_is_passed(tmp_path: Path) -> None:
+    box = edge()[1]
+    bare = edited(lambda i: None if i.name == "gr_rect" else i)
+    found = by_reading(bare, tmp_path)["board-outline"]
+    assert found.status == NOT_RUN
+    assert "no edge" in found.found
+    corners = [(box["left"], box["top"]), (box["right"], box["top"]),
+               (box["right"], box["bottom"]), (box["left"], box["bottom"])]  # fmt: skip
+
+    def drawn_in_lines(gap: float) -> str:
+        whole = read(bare)
+        lines = [
+            expression(
+                "gr_line",
+                expression("start", *a),
+                expression("end", *b),
+                expression("layer", "Edge.Cuts"),
+            )
+            for a, b in zip(corners, [*corners[1:], (corners[0][0] + gap, corners[0][1])],
+                            strict=True)
+        ]  # fmt: skip
+        return write(Expression((*whole.items, *lines)))
+
+    assert by_reading(drawn_in_lines(0.0), tmp_path)["board-outline"].status == PASS
+    found = by_reading(drawn_in_lines(0.5), tmp_path)["board-outline"]
+    assert found.status == NOT_RUN
+    assert "not closed" in found.found
+
+
+@pytest.mark.kicad
+def test_kicad_measures_the_same_distance_from_the_edge(tmp_path: Path) -> None:
+    """Its own rule, at the gap between a pad and the edge: it stays silent of what is outside."""
+    rule = CustomRule("edge", "edge_clearance", 2.0, True)
+    limits = edge()[1]
+    right = max(x + w for x, _, w, _ in pads_of("R4"))
+    text = shifted("R4", (limits["right"] - 0.45 - right, 0.0))
+    told = board_drc.report(text, rules_text((rule,)), tmp_path / "near")
+    said = [v for v in board_drc.violations(told, (rule,)) if "R4" in v.where]
+    here = by_reading(text, tmp_path)["board-outline"].value
+    assert min(v.actual for v in said) == pytest.approx(here, abs=0.005)
+    told = board_drc.report(shifted("R4", (500.0, 0.0)), rules_text((rule,)), tmp_path / "outside")
+    assert not [v for v in board_drc.violations(told, (rule,)) if "R4" in v.where]
 
 
 # ---------------------------------------------------------------------------------------------
@@ -352,7 +452,7 @@ def test_without_kicad_only_what_is_read_is_run(
     for id_ in BY_KICAD:
         assert of_board[id_].status == NOT_RUN
         assert "not installed" in of_board[id_].found
-    assert of_board["decoupling-distance"].status == PASS
+    assert {of_board[id_].status for id_ in BY_READING} == {PASS}
 
 
 def program(folder: Path, script: str) -> None:

@@ -8,8 +8,9 @@ import pytest
 
 from designer.board_parts import fitted
 from designer.boardspec import BoardChoice
+from designer.bom import bill
 from designer.circuit import Circuit, Section, nominal_board
-from designer.components import components, joined
+from designer.components import components, designator, joined
 from designer.deck import Excitation, SolverSettings, write
 from designer.errors import InputError
 from designer.views import View
@@ -65,6 +66,22 @@ def test_components_are_the_board_and_carry_its_nets(circuit: Circuit) -> None:
         wanted = [net for part in parts for net in part.nets]
         wanted += ["vcc", "vee"] if component.kind == "op-amp" else []
         assert carried == sorted(wanted)
+
+
+def test_every_designator_ends_in_a_number_and_none_meet() -> None:
+    """R50A of the circuit is R50A1 on the board; a R50 or a R501 beside it is another."""
+    names = ["R50", "R501", "R50A", "R50B", "R5", "R50A2", "U1", "TP1", "C903"]
+    found = [designator(name) for name in names]
+    assert len(set(found)) == len(names)
+    assert all(name[-1].isdigit() for name in found)
+    board = fitted(CIRCUITS["composites"], CHOICE, CATALOG)
+    by_part = {name: c for c in components(board, CATALOG, CHOICE) for name in c.parts}
+    assert by_part["R50A"].reference == "R50A1"
+    assert by_part["R50A"].quantity == board.values["R50A"]
+    (line,) = (
+        line for line in bill(components(board, CATALOG, CHOICE)) if "R50A1" in line.designators
+    )
+    assert "R50A" not in line.designators
 
 
 @pytest.mark.parametrize("circuit", CIRCUITS.values(), ids=CIRCUITS)
