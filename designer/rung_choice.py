@@ -17,7 +17,8 @@ from designer.hearing import NOMINAL_SAMPLES, OWN_SAMPLES
 from designer.options import Options
 from designer.progress import Progress
 from designer.study import RungName
-from designer.trade import BOARD, RESPONSE, SHARE
+from designer.trade import RESPONSE, SHARE
+from designer.trade_errors import BOARD
 from designer.trade_rungs import CIRCUIT, MODEL, RK4
 
 TRADE = "trade.json"
@@ -66,7 +67,7 @@ def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
 
 def _choice(said: Mapping[str, Any]) -> Choice:
     wrong = [
-        f"ω = {c['omega']:g}"
+        _place(c)
         for c in said["cheapest"]
         if c["question"] == RESPONSE
         and c["of"] == BOARD
@@ -76,7 +77,7 @@ def _choice(said: Mapping[str, Any]) -> Choice:
     warning = ""
     if wrong:
         warning = (
-            f"; at {', '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
+            f"; at {'; '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
             "board's n-p-q, and yields are not computed above it"
         )
     found = [c for c in said["cheapest"] if c["question"] == SHARE]
@@ -95,3 +96,8 @@ def _choice(said: Mapping[str, Any]) -> Choice:
         "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
         f"than {100.0 * overall['bound']:g} %{warning}",
     )
+
+
+def _place(said: Mapping[str, Any]) -> str:
+    b = f", b = {said['b']:g}" if "b" in said else ""  # trades before they said b
+    return f"ω = {said['omega']:g}{b}"
