@@ -25,6 +25,7 @@ from designer.commands import (
     _session,
     app,
 )
+from designer.commands_tolerance import StudyRung
 from designer.errors import InputError
 from designer.progress import Progress
 
@@ -59,6 +60,12 @@ def search(
             help="No upgrade of this kind (docs/cure.md names them); may be repeated.",
         ),
     ] = None,
+    rung: Annotated[
+        StudyRung | None,
+        typer.Option(
+            "--rung", help="Of the final study; auto: by a trade that is in the folder. [auto]"
+        ),
+    ] = None,
     seed: Seed = 1,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
@@ -73,13 +80,15 @@ def search(
         from designer.options import Options
 
         count = SAMPLES if samples is None else samples
-        options = Options(seed, jobs, count, overwrite, resume)
+        said = StudyRung.AUTO if rung is None else rung
+        options = Options(seed, jobs, count, overwrite, resume, rung=said.value)
         options.check()
         if not model.exists():
             raise InputError(model, "MODEL|DIR", "nothing", "a model file or a design folder")
         if model.is_dir():
-            if samples is not None:
-                raise InputError(None, "--samples", samples, "no such option with a design folder")
+            for name, given in (("--samples", samples), ("--rung", rung)):
+                if given is not None:
+                    raise InputError(None, name, given, "no such option with a design folder")
             result = _cured(model, out, wanted, budget, without or [], options, progress)
             if json:
                 _print_json(result.answer)

@@ -301,7 +301,7 @@ def warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
     return out
 
 
-def _wave_bound(orbit: Orbit) -> float:
+def wave_bound(orbit: Orbit) -> float:
     """Tighter where the orbit is slow: errors of each period add up, to 1/(1 - ρ) of one."""
     return WAVE_BOUND * min(1.0, 5.0 * (1.0 - orbit.radius)) if orbit.radius < 1.0 else WAVE_BOUND
 
@@ -346,7 +346,7 @@ def _judge(
     wanted = subject.orbit
     difference, wave, bound, passed = float("nan"), float("nan"), float("nan"), False
     if wanted.status is OrbitStatus.PERIODIC and subject.rung == "ideal":
-        bound = _wave_bound(wanted)
+        bound = wave_bound(wanted)
     if len(good) == len(runs):
         passed = all(r.orbit.response == wanted.response for r in good)
         wave = wave_error(subject, good[0])

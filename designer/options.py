@@ -57,9 +57,10 @@ class Options:
         said = ["designer", verb, _base(model)]
         said += [] if out is None else ["--out", _base(out)]
         said += ["--samples", str(self.samples), "--seed", str(self.seed)]
+        if verb in ("tolerance", "search"):
+            said += [] if self.rung == "auto" else ["--rung", self.rung]
         if verb == "tolerance":
             said += [] if self.until is None else ["--until", f"{self.until:g}"]
-            said += [] if self.rung == "auto" else ["--rung", self.rung]
             said += ["--tuned"] if self.tuned else []
             said += ["--reached"] if self.reached else []
             said += [word for over in self.maps for word in ("--map", over)]

@@ -160,6 +160,8 @@ def _circuits(pool: SpicePool, one: Built, followed: Followed) -> list[_Entry]:
             # Of the full op-amps this is what the ideal ones leave out, not a numerical error.
             error = waveform_error(np.interp(grid, time, states[:, 0]), wanted)
         setting = f"T/{subject.period / settings.max_step:.0f}, reltol {settings.reltol:g}"
+        if settings is passed.settings and not passed.passed:
+            setting += ", gate not passed"
         entries.append(
             _Entry(setting, clock.entrant(name, gate.job(long, settings), gate.length(long)), error)
         )

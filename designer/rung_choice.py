@@ -3,11 +3,14 @@
 A study decides on the exact circuit and asks ngspice about some boards of each response, `LEAST` at
 least (``auto``). Where a trade has shown that the exact circuit's yield is further from ngspice's
 than its bound, every board goes to ngspice. What a user asks for with ``--rung`` stands.
+
+A trade goes with the design it was made of. A search that replaces a design keeps the word of its
+trade, if that was of the same model file, until there is a trade of the design that was found.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,12 +19,16 @@ from designer.folder import Folder
 from designer.hearing import NOMINAL_SAMPLES, OWN_SAMPLES
 from designer.options import Options
 from designer.progress import Progress
-from designer.study import RungName
-from designer.trade import BOARD, RESPONSE, SHARE
+from designer.study import RUNGS, RungName
+from designer.trade import RESPONSE, SHARE
+from designer.trade_errors import BOARD
 from designer.trade_rungs import CIRCUIT, MODEL, RK4
 
 TRADE = "trade.json"
 """What ``designer.trade_job`` writes."""
+SEARCH = "search.json"
+"""What ``designer.search_job`` writes."""
+EARLIER = " (of the design that stood here before the search)"
 DECIDE = (RK4, MODEL, CIRCUIT, "ideal")
 """Rungs that a yield can be computed on, and those below them."""
 LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
@@ -37,21 +44,46 @@ class Choice:
 
 
 def choose(folder: Folder) -> Choice:
-    """By the folder's ``trade.json``, if its stage is complete; else ``auto``.
+    """By the folder's ``trade.json``, if its stage is complete, else by what its search has kept of
+    an earlier one; else ``auto``.
 
     Raises
     ------
-    InputError : the file is not what ``trade`` wrote.
+    InputError : the file is not what ``trade``, or ``search``, wrote.
     """
-    stage = folder.manifest.stages.get("trade") if folder.manifest else None
-    if stage is None or not stage.complete:
-        return Choice("auto", "")
-    said = folder.json(TRADE)
-    try:
-        return _choice(said)
-    except (KeyError, TypeError, ValueError) as error:
-        found = f"{type(error).__name__}: {error}"
-        raise InputError(folder / TRADE, "cheapest", found, "what trade wrote") from None
+    stages = folder.manifest.stages if folder.manifest else {}
+    if "trade" in stages and stages["trade"].complete:
+        return _read(folder, TRADE, "cheapest", _choice)
+    if "search" in stages and stages["search"].complete:
+        return _read(folder, SEARCH, "trade", _kept)
+    return Choice("auto", "")
+
+
+def before_search(folder: Folder, model: str) -> Choice | None:
+    """What a trade says here, if it is of the model file with this hash; None without one.
+
+    To be asked before a search touches the folder.
+    """
+    stages = folder.manifest.stages if folder.manifest else {}
+    of = [stages[name].inputs.get("model") for name in ("design", "search") if name in stages]
+    if "search" in stages and not stages["search"].complete:
+        return None  # whose the design is cannot be told
+    choice = choose(folder) if model in of else Choice("auto", "")
+    return choice if choice.reason else None
+
+
+def for_search(folder: Folder, options: Options, progress: Progress) -> RungName:
+    """The rung of the study at the end of a search, which is said. ``exact`` stands for "as usual":
+    the search's confirmation asks ngspice about `LEAST` boards of each response."""
+    if options.rung != "auto":
+        return options.rung
+    choice = choose(folder)
+    progress.note(
+        choice.reason
+        or "rung: no trade of this design, so the exact circuit decides the final study, and "
+        f"ngspice's word on {LEAST} boards of each response decides whether it is confirmed"
+    )
+    return "ngspice" if choice.rung == "ngspice" else "exact"
 
 
 def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
@@ -64,9 +96,31 @@ def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
     return replace(options, rung=choice.rung)
 
 
+def _read(
+    folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], Choice]
+) -> Choice:
+    said = folder.json(name)
+    try:
+        return choice(said)
+    except (KeyError, TypeError, ValueError) as error:
+        found = f"{type(error).__name__}: {error}"
+        wrote = f"what {name.removesuffix('.json')} wrote"
+        raise InputError(folder / name, key, found, wrote) from None
+
+
+def _kept(said: Mapping[str, Any]) -> Choice:
+    kept = said.get("trade")
+    if kept is None:
+        return Choice("auto", "")
+    if kept["rung"] not in RUNGS:
+        raise ValueError(kept["rung"])
+    reason = str(kept["reason"]).removesuffix(EARLIER)
+    return Choice(kept["rung"], f"{reason}{EARLIER}")
+
+
 def _choice(said: Mapping[str, Any]) -> Choice:
     wrong = [
-        f"ω = {c['omega']:g}"
+        _place(c)
         for c in said["cheapest"]
         if c["question"] == RESPONSE
         and c["of"] == BOARD
@@ -76,7 +130,7 @@ def _choice(said: Mapping[str, Any]) -> Choice:
     warning = ""
     if wrong:
         warning = (
-            f"; at {', '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
+            f"; at {'; '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
             "board's n-p-q, and yields are not computed above it"
         )
     found = [c for c in said["cheapest"] if c["question"] == SHARE]
@@ -95,3 +149,8 @@ def _choice(said: Mapping[str, Any]) -> Choice:
         "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
         f"than {100.0 * overall['bound']:g} %{warning}",
     )
+
+
+def _place(said: Mapping[str, Any]) -> str:
+    b = f", b = {said['b']:g}" if "b" in said else ""  # trades before they said b
+    return f"ω = {said['omega']:g}{b}"

@@ -7,18 +7,19 @@ A found design is written as any other: ``model.toml`` is the model file with ev
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from designer import __version__, confirmation, design_files, gate, pipeline
+from designer import __version__, confirmation, design_files, gate, pipeline, rung_choice
 from designer.api import Synthesis
 from designer.catalog import Catalog, load_catalog
 from designer.errors import InputError
 from designer.folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder, StageName
 from designer.gate import Subject
-from designer.hearing import OWN_SAMPLES, Kind, ask_random
+from designer.hearing import OWN_SAMPLES, Ask, Kind, Why
 from designer.job import Outcome, design_inputs, made_from, model_file
 from designer.jsonout import dumps, run_json
 from designer.limiting import limitings
@@ -27,6 +28,7 @@ from designer.options import Options
 from designer.preconditions import cores, naming, require_ngspice
 from designer.progress import Progress
 from designer.provenance import provenance
+from designer.rung_choice import SEARCH
 from designer.search import look, search
 from designer.search_heard import RUNG, Listener
 from designer.search_json import confirmation_json, search_json
@@ -36,9 +38,10 @@ from designer.spice_batch import program_version
 from designer.study import check, tolerance
 from designer.study_folder import FolderStores
 from designer.study_job import SPICE_TIMEOUT, run_into
+from designer.verdict import Answer, Verdict
 from designer.workers import SpicePool
 
-ASKED, SEARCH, CANDIDATES = "asked.toml", "search.json", "candidates.jsonl"
+ASKED, CANDIDATES = "asked.toml", "candidates.jsonl"
 FILES = [ASKED, SEARCH, CANDIDATES]
 CONFIRMATION = "confirmation.json"
 SAMPLES = 4000
@@ -90,13 +93,18 @@ def searched_into(
             "another folder, or --overwrite to replace what manifest.json lists",
         )
     program_version()
+    goes_on = begun and options.resume
+    kept = folder.json(SEARCH) if goes_on and (folder / SEARCH).exists() else {}
+    word = None if goes_on else rung_choice.before_search(folder, modelfile.sha256)
+    trade = kept.get("trade") if word is None else asdict(word)
     began = time.perf_counter()
     jobs = cores() if options.jobs is None else options.jobs
     windows = look(modelfile, catalog, jobs, progress)
     source = provenance(modelfile, catalog.hash, seed=options.seed, settings={"rules": RULES})
-    if not (begun and options.resume):
+    if not goes_on:
         (folder / CANDIDATES).unlink(missing_ok=True)
     folder.begin({"search": (inputs, FILES)}, source)
+    folder.write(SEARCH, dumps({"format": 1, "trade": trade}))  # trade.json goes with its design
     folder.write(ASKED, modelfile.text)
     memory = Memory(folder / CANDIDATES, inputs["model"])
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
@@ -118,7 +126,7 @@ def searched_into(
     folder.begin(design_inputs(final, catalog), design_files.design_provenance(made))
     design_files.write(folder, made, files)
     folder.finish("design")
-    said = {**search_json(found), "provenance": source}
+    said = {**search_json(found), "trade": trade, "provenance": source}
     folder.write(SEARCH, dumps({**said, "cost": {"seconds": time.perf_counter() - began}}))
     folder.finish("search")
     return model_file(out / MODEL)
@@ -142,7 +150,8 @@ def search_into(
     if stage is None or not stage.complete:
         program_version()
     final = searched_into(modelfile, out, options, progress)
-    study = run_into(final, out, replace(options, rung="exact"), progress, command)
+    rung = rung_choice.for_search(Folder(out), options, progress)
+    study = run_into(final, out, replace(options, rung=rung), progress, lambda _: command(options))
     confirmed = _confirmed(final, out, options, progress)
     folder = Folder(out)
     answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
@@ -225,8 +234,9 @@ def _confirm(
                 for q, g in zip(study.plan.questions, gates, strict=True)
             ),
         )
-        asks = [ask for ask in ask_random(study.answers, 0) if ask.kind is Kind.OWN]
-        asks = [ask for ask in asks if plan.questions[ask.question].settings is not None]
+        asks = [
+            a for a in to_confirm(study.answers) if plan.questions[a.question].settings is not None
+        ]
         step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
         heard = confirmation.hear(plan, asks, pool, jobs, step, rung=RUNG)
     answers = {(a.sample, a.question): a for a in study.answers}
@@ -236,6 +246,18 @@ def _confirm(
     for index, found in zip(study.asked, gates, strict=True):
         rows[index]["gate"] = found.as_dict()
     return {"rung": RUNG, "responses": rows}
+
+
+def to_confirm(answers: Iterable[Answer]) -> list[Ask]:
+    """The first `OWN_SAMPLES` boards of each response that the exact circuit has an answer to, from
+    their own orbit: one without is replaced by the next."""
+    count: Counter[int] = Counter()
+    asks = []
+    for a in sorted(answers, key=lambda a: (a.question, a.sample)):
+        if a.verdict is not Verdict.FAILED and count[a.question] < OWN_SAMPLES:
+            count[a.question] += 1
+            asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
+    return asks
 
 
 def _inputs(modelfile: ModelFile, catalog: Catalog, options: Options) -> dict[str, Any]:

@@ -13,9 +13,10 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from designer.jsonout import FORMAT, plain
 from designer.plots import CIRCUIT, GRID, MUTED, NGSPICE, new_figure, styled
 from designer.plots import MODEL as OF_THE_MODEL
-from designer.trade import BOARD, EQUATIONS, RESPONSE, WAVEFORM, Cheapest, Compared, Trade, Truth
+from designer.trade import RESPONSE, WAVEFORM, Cheapest, Trade
+from designer.trade_errors import BOARD, EQUATIONS, Compared, Truth
 from designer.trade_rungs import RUNGS
-from designer.trade_yield import BoardTrade
+from designer.trade_yield import BoardTrade, LeftOut
 
 TITLES = {
     "rk4": "model, Runge-Kutta",
@@ -38,15 +39,17 @@ _LOOKS = {
 def trade_json(
     found: Trade, provenance: Mapping[str, Any], seconds: float, title: str
 ) -> dict[str, Any]:
-    """``rungs``, ``cheapest``, ``truths`` and ``boards``."""
+    """``rungs``, ``cheapest``, ``truths``, ``boards`` and ``left_out``."""
+    boards = [r.boards for r in found.responses]
     document = {
         "format": FORMAT,
         "title": title,
-        "rungs": [_row(row) for some in found.rows for row in some],
-        "truths": [
-            _truth(some[0], t) for some, t in zip(found.rows, found.truths, strict=True) if some
+        "rungs": [_row(row) for r in found.responses for row in r.rows],
+        "truths": [_truth(r.truth) for r in found.responses],
+        "boards": [_boards(b) for b in boards if isinstance(b, BoardTrade)],
+        "left_out": [
+            {**b.label.as_dict(), "reason": b.reason} for b in boards if isinstance(b, LeftOut)
         ],
-        "boards": [_boards(b) for b in found.boards if b is not None],
         "cheapest": [_cheapest(c) for c in found.cheapest],
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
@@ -55,39 +58,41 @@ def trade_json(
 
 
 def _row(row: Compared) -> dict[str, Any]:
-    a = row.answer
     return {
-        "rung": a.rung,
-        "level": a.level,
-        "settings": a.settings,
-        "omega": row.omega,
-        "expected": row.expected,
-        "response": a.orbit.response,
-        "reason": a.reason,
+        **row.label.as_dict(),
+        "rung": row.rung,
+        "level": row.level,
+        "settings": row.settings,
+        "response": row.response,
+        "reason": row.reason,
+        "gate": row.gate,
         "right": dict(row.right),
         "error": row.error[BOARD],
         "error_of_equations": row.error[EQUATIONS],
         "impact_velocity_error": row.velocity[BOARD],
         "impact_velocity_error_of_equations": row.velocity[EQUATIONS],
         "numerical_error": row.numerical,
-        "seconds_per_period": a.seconds,
+        "seconds_per_period": row.seconds,
     }
 
 
-def _truth(row: Compared, truth: Truth) -> dict[str, Any]:
+def _truth(truth: Truth) -> dict[str, Any]:
     return {
-        "omega": row.omega,
-        "response": truth.orbit.response,
+        **truth.label.as_dict(),
+        "response": truth.response,
         "sure": truth.sure,
         "uncertainty": truth.error,
         "impact_velocity_uncertainty": truth.velocity,
+        "impacts": dict(truth.impacts),
     }
 
 
 def _boards(b: BoardTrade) -> dict[str, Any]:
     difference, low, high = b.difference
+    counts = {k: v for k, v in b.__dict__.items() if k not in ("label", "seconds")}
     return {
-        **{k: v for k, v in b.__dict__.items() if k != "seconds"},
+        **b.label.as_dict(),
+        **counts,
         "difference": difference,
         "low": low,
         "high": high,
@@ -96,17 +101,24 @@ def _boards(b: BoardTrade) -> dict[str, Any]:
 
 
 def _cheapest(c: Cheapest) -> dict[str, Any]:
+    label = dict.fromkeys(("number", "omega", "b", "expected"))
     return {
+        **(label if c.label is None else c.label.as_dict()),
         "question": c.question,
         "of": c.of,
-        "omega": c.omega,
         "rung": c.rung,
         "level": c.level,
         "bound": c.bound,
         "measured": c.measured,
         "shown": c.shown,
         "seconds": c.seconds,
+        "note": c.note,
     }
+
+
+def name(row: Mapping[str, Any]) -> str:
+    """A response as people are told of it: its number, ω and b."""
+    return f"{row['number']}: ω = {row['omega']:g}, b = {row['b']:g}"
 
 
 def sheet(answer: Mapping[str, Any]) -> str:
@@ -114,21 +126,21 @@ def sheet(answer: Mapping[str, Any]) -> str:
     lines = [
         f"# Time and error: {answer['title']}",
         "",
-        "The cheapest rung and setting that answers each question, for all responses together. "
-        "`board` is the nominal circuit with full op-amps in ngspice at the finest step, "
-        "`equations` the exact flow of the model. Where the bound is not kept by any rung, the one "
-        "that comes nearest is named.",
+        f"Made by `designer trade` with `--boards {_boards_asked(answer)} --seed "
+        f"{answer['provenance']['seed']}`; the data are in `trade.json`.",
         "",
-        "| question | of | rung | setting | measured | kept | CPU seconds |",
-        "|---|---|---|---|---|---|---|",
+        "The cheapest rung and setting that answers each question, for all responses together, and "
+        "against what its error is measured: `board` is the nominal circuit with full op-amps in "
+        "ngspice at the finest step, `equations` the exact flow of the model, `ideal` ngspice with "
+        "ideal op-amps on the same boards. Where the bound is not kept by any rung, the one that "
+        "comes nearest is named. A setting of ngspice that did not pass the numerics gate is never "
+        "named.",
+        "",
+        "| question | against | rung | setting | measured | kept | CPU seconds | |",
+        "|---|---|---|---|---|---|---|---|",
     ]
-    alone = len({row["omega"] for row in answer["rungs"]}) == 1
-    lines += [
-        f"| {c['question']} | {c['of']} | {TITLES[c['rung']]} | {c['level']} | "
-        f"{_measured(c)} | {'yes' if c['shown'] else 'no'} | {_short(c['seconds'])} |"
-        for c in answer["cheapest"]
-        if c["omega"] is None or alone
-    ]
+    alone = len(answer["truths"]) == 1
+    lines += [_answered(c) for c in answer["cheapest"] if c["number"] is None or alone]
     lines += [
         "",
         "Seconds are of one drive period of each response, for yields of one board of each. "
@@ -138,34 +150,54 @@ def sheet(answer: Mapping[str, Any]) -> str:
         "## By response",
         "",
         "Error of x₁ (RMS over its peak) against the board, and CPU milliseconds of a drive period;"
-        " another n-p-q than the board's is named.",
+        " another n-p-q than the board's is named. `step ×4` is four times the step that the gate "
+        "tries first, so coarser; `step ×0.5` is finer.",
         "",
     ]
-    omegas = list(dict.fromkeys(row["omega"] for row in answer["rungs"]))
     kinds = list(dict.fromkeys((row["rung"], row["level"]) for row in answer["rungs"]))
-    heads = [f"{t['response']} at {t['omega']:g}" for t in answer["truths"]]
+    heads = [f"{name(t)}: {t['response']}" for t in answer["truths"]]
     lines += ["| rung | setting | " + " | ".join(heads) + " |", "|---" * (2 + len(heads)) + "|"]
-    by = {(row["rung"], row["level"], row["omega"]): row for row in answer["rungs"]}
+    by = {(row["rung"], row["level"], row["number"]): row for row in answer["rungs"]}
     for rung, level in kinds:
-        cells = [_cell(by.get((rung, level, omega))) for omega in omegas]
+        cells = [_cell(by.get((rung, level, t["number"]))) for t in answer["truths"]]
         lines.append(f"| {TITLES[rung]} | {level} | {' | '.join(cells)} |")
     if answer["boards"]:
         lines += [
             "",
             "## Boards",
             "",
-            "Yield of the exact circuit less ngspice's on the same boards, with its 95 % interval.",
+            "Yield of the exact circuit less that of ngspice with ideal op-amps on the same boards,"
+            " with its 95 % interval.",
             "",
-            "| ω | boards | ok | only exact | only ngspice | undecided | difference | interval |",
+            "| response | boards | ok | only exact | only ngspice | undecided | difference |"
+            " interval |",
             "|---|---|---|---|---|---|---|---|",
         ]
         lines += [
-            f"| {b['omega']:g} | {b['boards']} | {b['ok']} | {b['lost']} | {b['gained']} | "
+            f"| {name(b)} | {b['boards']} | {b['ok']} | {b['lost']} | {b['gained']} | "
             f"{b['undecided']} | {_percent(b['difference'])} | {_percent(b['low'])} to "
             f"{_percent(b['high'])} |"
             for b in answer["boards"]
         ]
+    if answer["left_out"]:
+        lines += ["", "No boards were asked of:", ""]
+        lines += [f"- {name(row)}: {row['reason']}" for row in answer["left_out"]]
     return "\n".join(lines) + "\n"
+
+
+def _boards_asked(answer: Mapping[str, Any]) -> int:
+    return int(answer["provenance"]["settings"]["trade"]["boards"])
+
+
+def _answered(c: Mapping[str, Any]) -> str:
+    start = f"| {c['question']} | {c['of']} |"
+    if c["rung"] is None:
+        return f"{start} – | – | – | – | – | {c['note']} |"
+    kept = "yes" if c["shown"] else "no"
+    return (
+        f"{start} {TITLES[c['rung']]} | {c['level']} | {_measured(c)} | {kept} | "
+        f"{_short(c['seconds'])} | {c['note']} |"
+    )
 
 
 def _measured(c: Mapping[str, Any]) -> str:
@@ -179,7 +211,8 @@ def _cell(row: Mapping[str, Any] | None) -> str:
         return "–"
     error = _percent(row["error"]) if row["right"][BOARD] else row["response"]
     seconds = row["seconds_per_period"]
-    return f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
+    said = f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
+    return f"{said} (gate not passed)" if row["gate"] is False else said
 
 
 def _percent(value: float | None) -> str:
@@ -195,39 +228,46 @@ def _short(value: float | None) -> str:
 
 KEYS = {"trade": "error", "trade-numerics": "numerical_error"}
 """Pictures, and which error each shows."""
-_AXES = {"error": "RMS error of x₁ / peak", "numerical_error": "numerics alone: RMS of x₁ / peak"}
+_AXES = {
+    "error": "RMS error of x₁ / peak,\nagainst the board",
+    "numerical_error": "RMS error of x₁ / peak, against\nthe rung's own equations",
+}
+_PALE = 0.3
+"""Opacity of what did not pass the gate."""
 
 
 @styled
 def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     """Error over the time of a drive period, a panel for each response; hollow where the n-p-q is
-    not the board's. What the error is measured against is not shown.
+    not the board's, pale where ngspice's setting did not pass the gate. What the error is measured
+    against is not shown.
 
     key : "error", against the board, where a line joins what no other rung beats in both; or
-    "numerical_error", against the rung's own equations, so that rungs do not compete.
+    "numerical_error", against the exact flow of the rung's own equations, or its finest run, so
+    that rungs do not compete.
     """
-    omegas = list(dict.fromkeys(row["omega"] for row in answer["rungs"]))
-    columns = min(3, len(omegas))
-    rows = -(-len(omegas) // columns)
+    truths = answer["truths"]
+    columns = min(3, len(truths))
+    rows = -(-len(truths) // columns)
     figure = new_figure(max(3.3 * columns, 7.2), 2.7 * rows + 0.9)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
-    for axes in grid[len(omegas) :]:
+    for axes in grid[len(truths) :]:
         axes.set_visible(False)
     # Neither none nor exactly 0: those are not on the axes.
     shown = [row for row in answer["rungs"] if row[key] and row["seconds_per_period"]]
-    for i, (axes, omega) in enumerate(zip(grid, omegas, strict=False)):
-        _panel(axes, [row for row in shown if row["omega"] == omega], key)
-        said = next(t["response"] for t in answer["truths"] if t["omega"] == omega)
-        axes.set_title(f"ω = {omega:g}: {said}", loc="left")
+    for i, (axes, truth) in enumerate(zip(grid, truths, strict=False)):
+        _panel(axes, [row for row in shown if row["number"] == truth["number"]], key)
+        axes.set_title(f"{name(truth)}: {truth['response']}", loc="left")
         if i % columns == 0:
             axes.set_ylabel(_AXES[key])
-        if i + columns >= len(omegas):
+        if i + columns >= len(truths):
             axes.set_xlabel("CPU seconds of a drive period")
     used = [r for r in RUNGS if any(row["rung"] == r for row in shown)]
-    handles = [
-        Line2D([], [], ls="", marker=_LOOKS[r][1], color=_LOOKS[r][0], ms=5, label=TITLES[r])
-        for r in used
-    ]
+    handles = [_mark(*_LOOKS[r], TITLES[r]) for r in used]
+    if any(not row["right"][BOARD] for row in shown):
+        handles.append(_mark(MUTED, "o", "hollow: another n-p-q", mfc="white"))
+    if any(row["gate"] is False for row in shown):
+        handles.append(_mark(MUTED, "o", "pale: gate not passed", alpha=_PALE))
     if key == "error":
         handles.append(Line2D([], [], color=MUTED, lw=0.9, label="front"))
     handles.append(Line2D([], [], color=MUTED, lw=0.9, ls=(0, (4, 2)), label="0.1 %"))
@@ -235,15 +275,19 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
     return figure
 
 
+def _mark(colour: str, marker: str, label: str, **look: Any) -> Line2D:
+    return Line2D([], [], ls="", marker=marker, color=colour, ms=5, label=label, **look)
+
+
 def _panel(axes: Axes, rows: Sequence[Mapping[str, Any]], key: str) -> None:
     points = []
     for row in rows:
         colour, marker = _LOOKS[row["rung"]]
-        right = row["right"][BOARD]
+        right, passed = row["right"][BOARD], row["gate"] is not False
         at = row["seconds_per_period"], row[key]
-        face = colour if right else "white"
-        axes.plot(*at, ls="", marker=marker, ms=5, color=colour, mfc=face, zorder=3)
-        if right:
+        face, alpha = colour if right else "white", None if passed else _PALE
+        axes.plot(*at, ls="", marker=marker, ms=5, color=colour, mfc=face, alpha=alpha, zorder=3)
+        if right and passed:
             points.append(at)
     line: list[tuple[float, float]] = []
     for at in sorted(points):

@@ -6,13 +6,11 @@ Nothing here prints; ``designer.commands_trade`` does.
 from __future__ import annotations
 
 import io
-import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from designer import api, design_files, gate, trade_rungs, trade_yield
+from designer import api, design_files, trade_pieces, trade_rungs, trade_yield
 from designer.api import Synthesis
 from designer.catalog import load_catalog
 from designer.folder import Folder
@@ -22,12 +20,16 @@ from designer.modelfile import ModelFile
 from designer.preconditions import cores, naming, need_responses, require_ngspice
 from designer.progress import Progress
 from designer.provenance import provenance
+from designer.responses import ModelResponse
 from designer.rung_choice import TRADE
 from designer.stopwatch import SpiceClock
-from designer.study import check
-from designer.trade import Trade, trade
-from designer.trade_rungs import LEVELS, ROUNDS, Answer
-from designer.trade_yield import BOARDS
+from designer.trade import Response, Trade, trade
+from designer.trade_errors import compare
+from designer.trade_label import Label
+from designer.trade_pieces import CHUNK, PIECES, Pieces, read_pieces
+from designer.trade_rungs import LEVELS, ROUNDS
+from designer.trade_yield import BOARDS, BoardTrade, LeftOut, Tally
+from designer.verdict import StudyPlan
 from designer.workers import SpicePool
 
 SHEET = "trade.md"
@@ -35,6 +37,8 @@ PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png"
 NAMES = (TRADE, SHEET, *PICTURES)
 TIMEOUT = 900.0
 """The longest that one run of ngspice may take, s."""
+RULES = 2
+"""Raised whenever the same inputs are to give another answer."""
 
 
 @dataclass(frozen=True)
@@ -47,39 +51,72 @@ class Extent:
     rounds: int = ROUNDS
 
 
-def measure(made: Synthesis, extent: Extent, *, seed: int, jobs: int, progress: Progress) -> Trade:
+def measure(
+    made: Synthesis, extent: Extent, pieces: Pieces, *, seed: int, jobs: int, progress: Progress
+) -> Trade:
     """Every rung on every response of a design, and the boards.
+
+    pieces : what is there already of this very design, extent and seed.
 
     Raises
     ------
     EnvironmentMissing : ngspice is missing.
     """
+    count = len(made.found)
     with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
         require_ngspice(pool)
-        step = progress.stage("rungs", len(made.found))
-        answers = trade_rungs.answers(
-            made,
-            pool,
-            SpiceClock(timed),
-            levels=extent.levels,
-            rounds_=extent.rounds,
-            progress=step,
-        )
-        boards: Sequence[trade_yield.BoardTrade | None] = ()
-        if extent.boards:
-            checked = check(made, pool, progress)
-            seconds = tuple(_ideal(some) for some in answers)
-            boards = trade_yield.boards(
-                made,
-                checked,
-                pool,
-                seconds,
-                count=extent.boards,
-                seed=seed,
-                jobs=jobs,
-                progress=progress,
-            )
-    return trade(made, answers, boards)
+        clock = SpiceClock(timed)
+        rungs = []
+        for number, r in enumerate(made.found, start=1):
+
+            def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
+                progress.stage(f"response {number} of {count}, every rung")
+                found = trade_rungs.measured(
+                    made, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
+                )
+                rows, truth = compare(Label.of(number, r), found.answers)
+                return trade_pieces.rungs_json(rows, truth, found.settings, found.seconds)
+
+            rungs.append(trade_pieces.rungs(pieces.piece(f"rungs {number}", rung)))
+        responses = []
+        for number, (rows, truth, settings, seconds) in enumerate(rungs, start=1):
+            boards: BoardTrade | LeftOut | None = None
+            if extent.boards:
+                plan = trade_yield.question(
+                    made, number, settings, samples=extent.boards, seed=seed
+                )
+                label = truth.label
+                if isinstance(plan, str):
+                    boards = LeftOut(label, plan)
+                else:
+                    tallied = _tally(plan, label, count, pieces, pool, jobs, progress)
+                    boards = BoardTrade.of(label, tallied, seconds)
+            responses.append(Response(rows, truth, boards))
+    return trade(responses)
+
+
+def _tally(
+    plan: StudyPlan,
+    label: Label,
+    count: int,
+    pieces: Pieces,
+    pool: SpicePool,
+    jobs: int,
+    progress: Progress,
+) -> Tally:
+    """The boards of one response, of ``count``, piece by piece."""
+    total = Tally()
+    for first in range(0, plan.samples, CHUNK):
+        samples = range(first, min(first + CHUNK, plan.samples))
+
+        def some(samples: range = samples) -> dict[str, Any]:
+            said = f"boards {samples.start + 1} to {samples.stop} of {plan.samples}"
+            step = progress.stage(f"response {label.number} of {count}, {said}", len(samples))
+            return asdict(trade_yield.tally(plan, samples, pool, jobs, step))
+
+        name = f"boards {label.number}, {samples.start} to {samples.stop - 1}"
+        total += trade_pieces.tally(pieces.piece(name, some))
+    return total
 
 
 def answer(
@@ -95,15 +132,19 @@ def answer(
     catalog = load_catalog()
     if out is None:
         progress.stage("responses of the model, parts")
-        return _document(api.synthesise(modelfile, catalog), extent, options, progress), False
+        made = api.synthesise(modelfile, catalog)
+        return _document(made, extent, Pieces(), options, progress), False
     folder = Folder(out)
     wanted = standing_inputs(folder, modelfile, catalog, progress)
-    levels = [f"{share:g}:{reltol:g}" for share, reltol in extent.levels]
+    levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
     inputs = {**wanted["design"][0], **asdict(extent), "levels": levels, "seed": options.seed}
-    wanted["trade"] = (inputs, list(NAMES))
+    inputs["rules"] = RULES
+    wanted["trade"] = (inputs, [*NAMES, PIECES])
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
     if not todo:
         return folder.json(TRADE), True
+    goes_on = "design" not in todo and folder.state("trade", inputs) == "unfinished"
+    known = read_pieces(folder / PIECES) if goes_on and options.resume else {}
     progress.stage("responses of the model, parts")
     if "design" in todo:
         made = api.synthesise(modelfile, catalog)
@@ -114,26 +155,32 @@ def answer(
         folder.finish("design")
     else:
         made = design_files.load(folder, modelfile, catalog)
-    document = _document(made, extent, options, progress)
-    if "design" not in todo:
         folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+    guard = folder.watch()
+
+    def save(text: str) -> None:
+        guard()
+        folder.write(PIECES, text)
+
+    document = _document(made, extent, Pieces(known, save), options, progress)
+    guard()
     _write(folder, document)
+    (folder / PIECES).unlink(missing_ok=True)
     folder.finish("trade")
     return folder.json(TRADE), False
 
 
 def _document(
-    made: Synthesis, extent: Extent, options: Options, progress: Progress
+    made: Synthesis, extent: Extent, pieces: Pieces, options: Options, progress: Progress
 ) -> dict[str, Any]:
     from designer.trade_files import trade_json  # Matplotlib takes a while to import
 
-    began = time.perf_counter()
     jobs = cores() if options.jobs is None else options.jobs
-    found = measure(made, extent, seed=options.seed, jobs=jobs, progress=progress)
+    found = measure(made, extent, pieces, seed=options.seed, jobs=jobs, progress=progress)
     said = provenance(
         made.modelfile, made.catalog.hash, seed=options.seed, settings={"trade": asdict(extent)}
     )
-    return trade_json(found, said, time.perf_counter() - began, made.modelfile.title)
+    return trade_json(found, said, pieces.seconds, made.modelfile.title)
 
 
 def _write(folder: Folder, document: dict[str, Any]) -> None:
@@ -147,11 +194,3 @@ def _write(folder: Folder, document: dict[str, Any]) -> None:
         stream = io.BytesIO()
         plots.to_png(figure, stream)
         folder.write(f"{name}.png", stream.getvalue())
-
-
-def _ideal(some: Sequence[Answer]) -> float:
-    """CPU time of a drive period of the rung ``ideal`` at the gate's tolerance, else at the
-    finest."""
-    found = [a for a in some if a.rung == "ideal"]
-    at_gate = [a for a in found if a.settings["reltol"] == gate.RELTOL]
-    return (at_gate or found)[-1].seconds if found else float("nan")

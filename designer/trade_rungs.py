@@ -3,20 +3,21 @@
 The rungs, by what they compute: the model (fixed-step Runge-Kutta as the paper's baseline, and the
 exact flow), the nominal circuit by the exact flow, and ngspice with ideal op-amps, with bandwidth
 and slew (``dynamic``), with a macromodel (``full``). The largest step of ngspice is a fraction of
-the period that follows the shortest contact (``gate.first_steps``): × 1 at 1e-5 is what the
-numerics gate tries first, × 0.25 four times that step. Its tolerance goes with the step, for beside
-a tight one ngspice takes the small steps anyway.
+the period that follows the shortest contact (``gate.first_steps``): "step ×1, reltol 1e-05" is
+what the numerics gate tries first, "step ×4" four times that step, so coarser. The tolerance goes
+with the step, for beside a tight one ngspice takes the small steps anyway. Of each setting it is
+said whether it passes the gate (``designer.trade_gate``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from designer import fixed_step, gate, pipeline
+from designer import fixed_step, gate, pipeline, trade_gate
 from designer.api import Synthesis
 from designer.circuit_kernel import POINTS
 from designer.deck import Excitation, SolverSettings
@@ -38,8 +39,8 @@ RK4, MODEL, CIRCUIT = "rk4", "model", "circuit"
 RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS)
 TOP: Rung = "full"
 """The most faithful rung."""
-LEVELS = ((0.25, 1e-3), (0.5, 1e-4), (1.0, gate.RELTOL), (2.0, 0.1 * gate.RELTOL))
-"""Steps of ngspice over those that the gate tries first, and its relative tolerance."""
+LEVELS = ((4.0, 1e-3), (2.0, 1e-4), (1.0, gate.RELTOL), (0.5, 0.1 * gate.RELTOL))
+"""ngspice's largest step over the one that the gate tries first, and its relative tolerance."""
 STEPS = (0.04, 0.02, 0.01, fixed_step.PAPERS_STEP)
 """Of Runge-Kutta, in dimensionless time."""
 SETTLED = 40
@@ -58,7 +59,7 @@ class Answer:
     level : names the setting alike for all responses. settings : of the solver. orbit : in model
     units as far as it is used: n-p-q, status, impacts. shown : (n · POINTS,) first displacement in
     model units; empty where there is none. seconds : CPU time of a drive period. reason : why there
-    is no answer.
+    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs.
     """
 
     rung: str
@@ -68,6 +69,22 @@ class Answer:
     shown: Array
     seconds: float = float("nan")
     reason: str = ""
+    gate: bool | None = None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A response on every rung.
+
+    subject : its nominal circuit. settings : those of ngspice with ideal op-amps that pass the
+    gate; None where none do. seconds : CPU time of a drive period at these, nan without.
+    """
+
+    response: ModelResponse
+    subject: Subject
+    answers: tuple[Answer, ...]
+    settings: SolverSettings | None
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -78,47 +95,45 @@ class _Asked:
     model: Dimensionless
     volts: Array
     subject: Subject
-    entrants: list[Entrant] = field(default_factory=list)
 
 
-def answers(
+def subject(made: Synthesis, r: ModelResponse) -> Subject:
+    """The nominal circuit of a design, on the orbit that this response has there."""
+    reduction = pipeline.nominal_reduction(made.design)
+    scales = made.design.errors.scales
+    excitation = Excitation(scales.frequency(r.omega), made.design.amplitude(r.b))
+    return Subject(reduction, excitation, on_circuit(reduction.system(), made.design, r))
+
+
+def measured(
     made: Synthesis,
+    r: ModelResponse,
     pool: SpicePool,
     clock: SpiceClock,
     *,
     levels: Sequence[tuple[float, float]] = LEVELS,
     rounds_: int = ROUNDS,
-    progress: Callable[[], None] = lambda: None,
-) -> tuple[tuple[Answer, ...], ...]:
-    """For each response of the design what every rung says; progress : called once a response.
+) -> Measured:
+    """What every rung says of a response of the design, and what it costs.
 
     pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
     """
-    reduction = pipeline.nominal_reduction(made.design)
-    system = reduction.system()
-    out = []
-    for r in made.found:
-        excitation = Excitation(
-            made.design.errors.scales.frequency(r.omega), made.design.amplitude(r.b)
-        )
-        orbit = on_circuit(system, made.design, r)
-        asked = _Asked(
-            r,
-            replace(made.design.model, b=r.b),
-            made.design.volts(r.b),
-            Subject(reduction, excitation, orbit),
-        )
-        entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
-        taken = rounds([entrant for _, entrant in entries], rounds_)
-        seconds = np.median(taken, axis=0)
-        out.append(
-            tuple(
-                replace(answer, seconds=float(s))
-                for (answer, _), s in zip(entries, seconds, strict=True)
-            )
-        )
-        progress()
-    return tuple(out)
+    one = subject(made, r)
+    asked = _Asked(r, replace(made.design.model, b=r.b), made.design.volts(r.b), one)
+    entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
+    entrants = [entrant for _, entrant in entries]
+    settings = None
+    if one.orbit.status is OrbitStatus.PERIODIC:
+        (word,) = gate.check(pool, [one])
+        settings = word.settings if word.passed else None
+    if settings is not None:
+        entrants.append(_timed(one, settings, clock))
+    seconds = [float(s) for s in np.median(rounds(entrants, rounds_), axis=0)]
+    answers = tuple(
+        replace(answer, seconds=s)
+        for (answer, _), s in zip(entries, seconds[: len(entries)], strict=True)
+    )
+    return Measured(r, one, answers, settings, seconds[-1] if settings else float("nan"))
 
 
 def _exact(asked: _Asked) -> Iterator[tuple[Answer, Entrant]]:
@@ -180,34 +195,48 @@ def _spice(
     asked: _Asked, pool: SpicePool, clock: SpiceClock, levels: Sequence[tuple[float, float]]
 ) -> Iterator[tuple[Answer, Entrant]]:
     subject = asked.subject
-    contact = gate.shortest_contact(subject.orbit, subject.system, subject.excitation)
-    first = gate.first_steps(subject, contact)
-    on = [replace(subject, rung=rung) for rung in SPICE_RUNGS]
     if not len(subject.orbit.start):
         return
-    runs: list[tuple[Subject, str, SolverSettings]] = []
-    for one in gate.warmed(pool, on):
-        for share, reltol in levels:
-            step = one.period / max(1, round(share * first))
-            name = f"× {share:g}, {reltol:g}"
-            runs.append((one, name, SolverSettings("trap", step, reltol)))
-    jobs = [gate.job(one, settings, keep=True) for one, _, settings in runs]
+    contact = gate.shortest_contact(subject.orbit, subject.system, subject.excitation)
+    first = gate.first_steps(subject, contact)
+    on = gate.warmed(pool, [replace(subject, rung=rung) for rung in SPICE_RUNGS])
+    ladder = [(max(1, round(first / factor)), reltol) for factor, reltol in levels]
+    names = [f"step ×{factor:g}, reltol {reltol:g}" for factor, reltol in levels]
+    # The other method is compared at the finer one of two settings: never at the coarsest.
+    kinds = [("trap", k) for k in range(len(levels))]
+    kinds += [("gear", k) for k in range(1, len(levels))]
+    asks = [
+        (one, SolverSettings(method, one.period / ladder[k][0], ladder[k][1]))
+        for one in on
+        for method, k in kinds
+    ]
+    jobs = [gate.job(one, way, keep=way.method == "trap") for one, way in asks]
     heard = dict(pool.map(jobs))
-    for k, (one, name, settings) in enumerate(runs):
-        short = replace(one, discard=TIMED - 4 * (one.orbit.n or MAX_PERIOD))
-        job = gate.job(replace(short, discard=max(short.discard, 0)), settings)
-        periods = gate.length(replace(short, discard=max(short.discard, 0)))
-        entrant = clock.entrant(one.rung, job, periods)
-        said = {**settings.as_dict(), "steps_a_period": round(one.period / settings.max_step)}
-        said["discarded_periods"] = one.discard
-        found = heard[k]
-        if isinstance(found, SimulationFailed):
-            failed = Orbit(OrbitStatus.FAILED, reason=found.reason)
-            yield Answer(one.rung, name, said, failed, np.zeros(0), reason=found.reason), entrant
-            continue
-        orbit = _in_model_units(found.orbit, asked.volts)
-        shown = _traced(found, float(asked.volts[0]))
-        yield Answer(one.rung, name, said, orbit, shown, reason=orbit.reason), entrant
+    for i, one in enumerate(on):
+        own = {kind: heard[i * len(kinds) + j] for j, kind in enumerate(kinds)}
+        runs = [own["trap", k] for k in range(len(levels))]
+        verdicts = trade_gate.passed(one, runs, [own["gear", k] for k in range(1, len(levels))])
+        for k, (found, passed) in enumerate(zip(runs, verdicts, strict=True)):
+            settings = asks[i * len(kinds) + k][1]
+            entrant = _timed(one, settings, clock)
+            said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
+            said["discarded_periods"] = one.discard
+            if isinstance(found, SimulationFailed):
+                orbit, shown = Orbit(OrbitStatus.FAILED, reason=found.reason), np.zeros(0)
+            else:
+                orbit = _in_model_units(found.orbit, asked.volts)
+                shown = _traced(found, float(asked.volts[0]))
+            yield (
+                Answer(one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
+                entrant,
+            )
+
+
+def _timed(subject: Subject, settings: SolverSettings, clock: SpiceClock) -> Entrant:
+    """A short run from the orbit, for its time."""
+    least = TIMED - 4 * (subject.orbit.n or MAX_PERIOD)
+    short = replace(subject, discard=max(least, 0))
+    return clock.entrant(subject.rung, gate.job(short, settings), gate.length(short))
 
 
 def _in_model_units(orbit: Orbit, volts: Array) -> Orbit:

@@ -10,18 +10,19 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
 
-from designer import exact, pipeline
+from designer import exact, pipeline, trade_rungs
 from designer.api import Synthesis
 from designer.confirmation import hear
-from designer.hearing import Ask, Hearing, Kind, Why
+from designer.deck import SolverSettings
+from designer.hearing import Ask, Kind, Why
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked
-from designer.preconditions import cores
-from designer.progress import Progress
 from designer.proportion import wilson
-from designer.verdict import Answer, Question, Verdict
+from designer.trade_label import Label
+from designer.verdict import StudyPlan, Verdict
 from designer.workers import SpicePool
 
 BOARDS = 100
@@ -29,23 +30,68 @@ BOARDS = 100
 
 
 @dataclass(frozen=True)
-class BoardTrade:
-    """One response on boards that both engines decided.
+class LeftOut:
+    """A response of which no boards were asked, and why."""
 
-    gained, lost : boards that only ngspice calls ok, and that only the exact circuit does.
-    undecided : boards that one of them has no answer to. periods : drive periods of ngspice for a
-    board, mean. seconds : CPU time of a board, by rung.
+    label: Label
+    reason: str
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts of boards, which add up.
+
+    decided : by both engines. ok : by the exact circuit. gained, lost : boards that only ngspice
+    calls ok, and that only the exact circuit does. undecided : boards that one of them has no
+    answer to. runs, periods : of ngspice, and their drive periods. seconds : CPU time of the exact
+    circuit.
     """
 
-    omega: float
-    expected: str | None
+    decided: int = 0
+    ok: int = 0
+    gained: int = 0
+    lost: int = 0
+    undecided: int = 0
+    runs: int = 0
+    periods: float = 0.0
+    seconds: float = 0.0
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class BoardTrade:
+    """One response on boards that both engines decided; see ``Tally``.
+
+    periods : drive periods of ngspice for a board, mean. seconds : CPU time of a board, by rung.
+    """
+
+    label: Label
     boards: int
     ok: int
     gained: int
     lost: int
     undecided: int
     periods: float
-    seconds: dict[str, float]
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, label: Label, tally: Tally, spice: float) -> BoardTrade:
+        """spice : CPU time of a drive period of ngspice at the gate's settings."""
+        asked = tally.decided + tally.undecided
+        periods = tally.periods / tally.runs if tally.runs else math.nan
+        exactly = tally.seconds / asked if asked else math.nan
+        return cls(
+            label,
+            tally.decided,
+            tally.ok,
+            tally.gained,
+            tally.lost,
+            tally.undecided,
+            periods,
+            {"circuit": exactly, "ideal": periods * spice},
+        )
 
     @property
     def difference(self) -> tuple[float, float, float]:
@@ -77,88 +123,67 @@ class BoardTrade:
         return low > bound or high < -bound
 
 
-def boards(
+def question(
     made: Synthesis,
-    checked: tuple[Checked, ...],
-    pool: SpicePool,
-    spice_seconds: tuple[float, ...],
+    number: int,
+    settings: SolverSettings | None,
     *,
-    count: int = BOARDS,
-    seed: int = 1,
-    jobs: int | None = None,
-    progress: Progress | None = None,
-) -> tuple[BoardTrade | None, ...]:
-    """For each response; None where it can be no question of a study.
+    samples: int,
+    seed: int,
+) -> StudyPlan | str:
+    """The study of response ``number`` alone; where it can be no question of one, why not.
 
-    checked : of this design. spice_seconds : CPU time of a drive period of the rung ``ideal`` at
-    the gate's settings, by response.
+    settings : of ngspice, those that passed the gate.
     """
-    said = Progress() if progress is None else progress
-    jobs = cores() if jobs is None else jobs
-    asked = [
-        i
-        for i, c in enumerate(checked)
-        if c.model.found
-        and c.circuit.status is OrbitStatus.PERIODIC
-        and c.gate is not None
-        and c.gate.passed
-    ]
-    out: list[BoardTrade | None] = [None] * len(checked)
-    if not asked:
-        return tuple(out)
+    response = made.found[number - 1]
+    if not response.found:
+        return "the model does not show it"
+    nominal = trade_rungs.subject(made, response)
+    if nominal.orbit.status is not OrbitStatus.PERIODIC:
+        return f"the nominal circuit is {nominal.orbit.response}"
+    if settings is None:
+        return "the numerics gate did not pass"
+    checked = Checked(response, nominal.orbit, nominal.excitation, None)
     plan = pipeline.plan_study(
-        made.modelfile,
-        made.design,
-        [checked[i] for i in asked],
-        made.catalog,
-        samples=count,
-        seed=seed,
+        made.modelfile, made.design, [checked], made.catalog, samples=samples, seed=seed
     )
-    step = said.stage(f"{count} boards, exact circuit", count * len(asked))
+    (asked,) = plan.questions
+    return replace(plan, questions=(replace(asked, settings=settings),))
+
+
+def tally(
+    plan: StudyPlan,
+    samples: range,
+    pool: SpicePool,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> Tally:
+    """These boards of a study of one response, by both engines; progress : called once a board."""
+    exact.block(plan, samples[:1], jobs)  # what is compiled on the way is no cost of a board
     began = time.process_time()
-    answers = exact.block(plan, range(count), jobs, step)
-    exactly = (time.process_time() - began) / max(len(answers), 1)
-    asks = [
-        Ask(a.sample, a.question, Kind.NOMINAL, Why.ALL)
-        for a in answers
-        if a.verdict is not Verdict.FAILED
-    ]
-    step = said.stage(f"{count} boards, ngspice", len(asks))
-    heard = {(h.sample, h.question): h for h in hear(plan, asks, pool, jobs, step)}
-    for number, i in enumerate(asked):
-        mine = [a for a in answers if a.question == number]
-        pairs = [(a, heard.get((a.sample, number))) for a in mine]
-        out[i] = _of_one(plan.questions[number], pairs, exactly, spice_seconds[i])
-    return tuple(out)
+    answers = exact.block(plan, samples, jobs)
+    seconds = time.process_time() - began
+    asks = [Ask(a.sample, 0, Kind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED]
+    heard = {h.sample: h for h in hear(plan, asks, pool, jobs, progress)}
+    asked = plan.questions[0]
+    both = []
+    for answer in answers:
+        hearing = heard.get(answer.sample)
+        said = None if hearing is None else hearing.survives(asked)
+        if answer.verdict in (Verdict.OK, Verdict.LOST) and said is not None:
+            both.append((answer.verdict is Verdict.OK, said))
+    periods = [h.periods + 4 * max(asked.start.n, 1) for h in heard.values()]
+    return Tally(
+        decided=len(both),
+        ok=sum(mine for mine, _ in both),
+        gained=sum(theirs and not mine for mine, theirs in both),
+        lost=sum(mine and not theirs for mine, theirs in both),
+        undecided=len(answers) - len(both),
+        runs=len(periods),
+        periods=float(sum(periods)),
+        seconds=seconds,
+    )
 
 
 def _joined(a: float, b: float, against: float) -> float:
     return math.sqrt(a * a + b * b + 2.0 * against * a * b)
-
-
-def _of_one(
-    question: Question,
-    pairs: list[tuple[Answer, Hearing | None]],
-    exactly: float,
-    spice: float,
-) -> BoardTrade:
-    assert question.spec.omega is not None
-    expect = question.spec.expect
-    both = []
-    for answer, hearing in pairs:
-        said = None if hearing is None else hearing.survives(question)
-        if answer.verdict in (Verdict.OK, Verdict.LOST) and said is not None:
-            both.append((answer.verdict is Verdict.OK, said))
-    periods = [h.periods + 4 * max(question.start.n, 1) for _, h in pairs if h is not None]
-    mean = sum(periods) / len(periods) if periods else math.nan
-    return BoardTrade(
-        omega=question.spec.omega,
-        expected=None if expect is None else str(expect),
-        boards=len(both),
-        ok=sum(mine for mine, _ in both),
-        gained=sum(theirs and not mine for mine, theirs in both),
-        lost=sum(mine and not theirs for mine, theirs in both),
-        undecided=len(pairs) - len(both),
-        periods=mean,
-        seconds={"circuit": exactly, "ideal": mean * spice},
-    )

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import csv
 import json
+from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from designer import cli
-from designer.modelfile import parse_model_file
-from designer.search_job import confirms
+from designer import cli, rung_choice
+from designer.errors import InputError
+from designer.folder import Folder, StageName
+from designer.jsonout import dumps
+from designer.modelfile import parse_model_file, read_model_file
+from designer.options import Options
+from designer.progress import Progress
+from designer.search_job import confirms, to_confirm
 from designer.search_levers import Choice
 from designer.search_memory import Memory
 from designer.search_resolved import resolved
+from designer.trade import IDEAL, SHARE
+from designer.verdict import Verdict
 from tests.search_cases import asked, made
 
 OPEN = 'omega = "best"\nexpect = "1-2-2"\nb = [0.25, 0.27]'
@@ -34,6 +44,115 @@ def files(folder: Path) -> dict[str, str]:
     """Hashes of the files, those of JSON without their times."""
     said = read(folder / "manifest.json")["files"]
     return {name: entry["sha256"] for name, entry in said.items()}
+
+
+def with_trade(path: Path, rung: str, stage: StageName = "design", model: str = "") -> Folder:
+    """A folder with a finished trade that says this rung of its yields.
+
+    stage : what else there is, of the model file with the hash ``model``; as it is if "".
+    """
+    folder = Folder(path)
+    if model:
+        folder.begin({stage: ({"model": model}, ["design.json"])}, {})
+        folder.write("design.json", '{"format": 1}')
+        folder.finish(stage)
+    folder.begin({"trade": ({}, ["trade.json"])}, {})
+    row = {"question": SHARE, "of": IDEAL, "rung": rung, "measured": 0.005, "bound": 0.01}
+    folder.write("trade.json", dumps({"format": 1, "cheapest": [row]}))
+    folder.finish("trade")
+    return folder
+
+
+class Heard(Progress):
+    """Keeps its notes."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+
+@pytest.mark.parametrize(
+    ("trade", "rung", "word"),
+    [
+        ("ideal", "ngspice", "every board in ngspice"),
+        ("circuit", "exact", "40 boards of each response"),
+        (None, "exact", "no trade of this design"),
+    ],
+)
+def test_the_final_study_takes_its_rung_by_a_trade_and_says_so(
+    tmp_path: Path, trade: str | None, rung: str, word: str
+) -> None:
+    folder = Folder(tmp_path) if trade is None else with_trade(tmp_path, trade)
+    heard = Heard()
+    assert rung_choice.for_search(folder, Options(), heard) == rung
+    assert word in heard.notes[0]
+    for asked_for in ("exact", "ngspice"):
+        options = Options(rung=asked_for)
+        assert rung_choice.for_search(folder, options, heard) == asked_for
+    assert len(heard.notes) == 1
+
+
+@pytest.mark.parametrize("stage", ["design", "search"])
+def test_a_trade_counts_for_a_search_of_the_same_model_file(tmp_path: Path, stage: Any) -> None:
+    folder = with_trade(tmp_path, "ideal", stage, "this")
+    word = rung_choice.before_search(folder, "this")
+    assert word is not None
+    assert word.rung == "ngspice"
+    assert rung_choice.before_search(folder, "another") is None
+    assert rung_choice.before_search(Folder(tmp_path / "free"), "this") is None
+
+
+def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through interruptions, and until the design that was found has a trade of its own."""
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(asked(OPEN), encoding="utf-8")
+    with_trade(out, "ideal", "design", read_model_file(model).sha256)
+
+    def interrupted(*_: object, **__: object) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("designer.search_job.look", lambda *_: ())
+    monkeypatch.setattr("designer.search_job.search", interrupted)
+    words = ("search", model, "--out", out, "-q")
+    assert run(*words) == 2  # the design is one that no search made
+    assert run(*words, "--overwrite") == 130
+    kept = read(out / "search.json")["trade"]
+    assert kept["rung"] == "ngspice"
+    (out / "trade.json").unlink()  # as when the found design is written
+    assert run(*words, "--resume") == 130
+    assert read(out / "search.json")["trade"] == kept
+
+    found = Folder(tmp_path / "found")
+    found.begin({"search": ({}, ["search.json"])}, {})
+    found.write("search.json", dumps({"format": 1, "trade": kept}))
+    found.finish("search")
+    choice = rung_choice.choose(found)
+    assert choice.rung == "ngspice"
+    assert "stood here before" in choice.reason
+    found.write("search.json", dumps({"format": 1, "trade": asdict(choice)}))
+    assert rung_choice.choose(found) == choice  # said once, however often it is handed on
+    with_trade(tmp_path / "found", "circuit")
+    assert rung_choice.choose(Folder(tmp_path / "found")).rung == "auto"
+    found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
+    with pytest.raises(InputError, match="what search wrote"):
+        rung_choice.choose(found)
+
+
+def test_forty_boards_of_each_response_confirm_even_where_some_have_no_answer() -> None:
+    answers: Any = [
+        SimpleNamespace(sample=i, question=q, verdict=Verdict.FAILED if i % 3 == q else Verdict.OK)
+        for i in range(100)
+        for q in (0, 1)
+    ]
+    asks = to_confirm(answers)
+    assert Counter(a.question for a in asks) == {0: 40, 1: 40}
+    assert all(a.sample % 3 != a.question for a in asks)
+    assert [a.sample for a in asks if a.question == 0][:3] == [1, 2, 4]
+    assert Counter(a.question for a in to_confirm(answers[:20])) == {0: 6, 1: 7}
 
 
 def test_a_resolved_file_says_what_was_open() -> None:
@@ -115,6 +234,19 @@ def test_a_search_from_end_to_end(
     assert run("search", model, "--out", cut, *options) == 2
     assert run("search", model, "--out", cut, *options, "--resume") == 0
     assert files(cut) == before
+
+    # A trade of the found design that its final study does not suffice: the same search extends it.
+    trade = whole / "trade.json"
+    with_trade(whole, "ideal")
+    capsys.readouterr()
+    assert run("search", model, "--out", whole, *options, "--rung", "exact") == 0
+    assert not (whole / "ngspice.parquet").exists()
+    assert run("search", model, "--out", whole, *options[:-1], "--json") == 0
+    said = capsys.readouterr()
+    assert "every board in ngspice" in said.err
+    (response,) = json.loads(said.out)["responses"]
+    assert response["agreement"]["nominal_start"]["asked"] == 60
+    assert trade.exists()
 
     # The folder is a design folder like any other.
     capsys.readouterr()

@@ -15,32 +15,38 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from designer import cli, hearing, rung_choice
+from designer import cli, hearing, rung_choice, trade_gate, trade_pieces, trade_rungs, trade_yield
 from designer.circuit_kernel import POINTS
+from designer.deck import SolverSettings
 from designer.errors import InputError
 from designer.folder import Folder
+from designer.gate import BOUND
+from designer.jsonout import dumps
 from designer.manifest import Stage
+from designer.ngspice import SimulationFailed
 from designer.options import Options
 from designer.orbit import Orbit, OrbitStatus
 from designer.progress import Progress
 from designer.rung_choice import choose, chosen
 from designer.trade import (
-    BOARD,
-    EQUATIONS,
+    IDEAL,
     IMPACT,
+    NO_IMPACTS,
     RESPONSE,
     SHARE,
     WAVE,
+    Response,
     Trade,
-    alike,
     cheapest,
-    difference,
     trade,
 )
+from designer.trade_errors import BOARD, EQUATIONS, alike, compare, difference
 from designer.trade_files import front, sheet, trade_json
 from designer.trade_job import NAMES
+from designer.trade_label import Label
 from designer.trade_rungs import Answer
-from designer.trade_yield import BoardTrade
+from designer.trade_yield import BoardTrade, LeftOut, Tally
+from designer.waveform_orbit import Read
 
 WAVEFORM = np.sin(2.0 * np.pi * np.arange(POINTS) / POINTS)
 MODEL = """format = 1
@@ -79,19 +85,27 @@ def said(rung: str, level: str, error: float, seconds: float, kind: Orbit | None
     return Answer(rung, level, {}, found, shown, seconds)
 
 
-def judged(*answers: Answer, boards: tuple[BoardTrade | None, ...] = ()) -> Trade:
-    made: Any = SimpleNamespace(found=[SimpleNamespace(omega=1.55, expected="1-1-1")])
-    return trade(made, [answers], boards)
+ONE = Label(1, 1.55, 0.25, "1-1-1")
+
+
+def answered(
+    *answers: Answer, label: Label = ONE, boards: BoardTrade | LeftOut | None = None
+) -> Response:
+    return Response(*compare(label, answers), boards)
+
+
+def judged(*answers: Answer, boards: BoardTrade | LeftOut | None = None) -> Trade:
+    return trade([answered(*answers, boards=boards)])
 
 
 LADDER = (
     said("rk4", "Δt = 0.01", 0.02, 1e-5),
     said("model", "exact", 0.02, 1e-6),
     said("circuit", "exact", 0.004, 2e-6),
-    said("ideal", "× 1", 0.004, 5e-3),
-    said("full", "× 0.5", 0.0005, 1e-2),
-    said("full", "× 1", 0.0001, 2e-2),
-    said("full", "× 2", 0.0, 4e-2),
+    said("ideal", "step ×1", 0.004, 5e-3),
+    said("full", "step ×2", 0.0005, 1e-2),
+    said("full", "step ×1", 0.0001, 2e-2),
+    said("full", "step ×0.5", 0.0, 4e-2),
 )
 
 
@@ -102,14 +116,15 @@ def picked(found: Trade, question: str, of: str = BOARD) -> Any:
 
 def test_the_cheapest_keeps_the_bound_with_the_truths_own_uncertainty() -> None:
     found = judged(*LADDER)
-    (truth,) = found.truths
+    (one,) = found.responses
+    truth = one.truth
     assert truth.error == pytest.approx(1e-4)
     assert truth.sure
     response, impact, wave = (picked(found, q) for q in (RESPONSE, IMPACT, WAVE))
     assert (response.rung, response.measured, response.shown) == ("model", 0.0, True)
     assert impact.rung == "circuit"
     assert impact.measured == pytest.approx(0.004 + 1e-4, rel=1e-3)
-    assert (wave.rung, wave.level) == ("full", "× 0.5")
+    assert (wave.rung, wave.level) == ("full", "step ×2")
     assert wave.measured == pytest.approx(0.0005 + 1e-4, rel=1e-3)
     own = picked(found, WAVE, EQUATIONS)
     assert (own.rung, own.measured, own.shown) == ("model", 0.0, True)
@@ -119,12 +134,12 @@ def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
     found = judged(
         said("model", "exact", 0.02, 1e-6),
         said("circuit", "exact", 0.01, 1e-6),
-        said("full", "× 1", 0.005, 1e-2),
-        said("full", "× 2", 0.0, 2e-2),
+        said("full", "step ×1", 0.005, 1e-2),
+        said("full", "step ×0.5", 0.0, 2e-2),
     )
     wave = picked(found, WAVE)
     assert not wave.shown
-    assert (wave.rung, wave.level) == ("full", "× 1")  # the truth itself does not compete
+    assert (wave.rung, wave.level) == ("full", "step ×1")  # the truth itself does not compete
 
 
 def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
@@ -138,10 +153,10 @@ def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
 def test_a_truth_that_is_not_sure_answers_nothing() -> None:
     found = judged(
         said("model", "exact", 0.0, 1e-6),
-        said("full", "× 1", 0.0, 1e-2, orbit(2, 2, (1.0, 1.0), (1.0, 1.0))),
-        said("full", "× 2", 0.0, 2e-2),
+        said("full", "step ×1", 0.0, 1e-2, orbit(2, 2, (1.0, 1.0), (1.0, 1.0))),
+        said("full", "step ×0.5", 0.0, 2e-2),
     )
-    assert not found.truths[0].sure
+    assert not found.responses[0].truth.sure
     assert not picked(found, RESPONSE).shown
     assert not picked(found, WAVE).shown
 
@@ -155,17 +170,96 @@ def test_a_rung_with_another_response_keeps_no_bound() -> None:
 
 def test_all_responses_together_ask_one_setting() -> None:
     """The cheapest alone differs; together the one that is right on both is taken."""
-    good = judged(*LADDER).rows[0]
-    bad = judged(
+    good = answered(*LADDER)
+    bad = answered(
         said("rk4", "Δt = 0.01", 0.02, 1e-5),
         said("model", "exact", 0.02, 1e-6, orbit(2, 2, (1.0, 1.0), (1.0, 1.0))),
         *LADDER[2:],
     )
-    both = cheapest(RESPONSE, BOARD, [good, bad.rows[0]], [bad.truths[0]] * 2)
+    both = cheapest(RESPONSE, BOARD, [good, bad])
     assert both is not None
-    assert both.omega is None
+    assert both.label is None
     assert both.rung == "circuit"
     assert both.seconds == pytest.approx(4e-6)
+
+
+def test_two_responses_at_one_frequency_are_told_apart() -> None:
+    """By number and b, wherever one of them is named."""
+    other = [replace(a, orbit=orbit(2, 2, (1.0, 1.0), (1.0, 1.0))) for a in LADDER]
+    labels = Label(1, 1.55, 0.25, "1-1-1"), Label(2, 1.55, 0.3, "1-2-2")
+    answer = document(
+        trade(
+            [
+                answered(*LADDER, label=labels[0]),
+                answered(*other, label=labels[1], boards=LeftOut(labels[1], "a reason")),
+            ]
+        )
+    )
+    for key in ("rungs", "truths"):
+        assert {(r["number"], r["b"]) for r in answer[key]} == {(1, 0.25), (2, 0.3)}
+    assert {r["response"] for r in answer["rungs"] if r["number"] == 2} == {"1-2-2"}
+    of_each = [c for c in answer["cheapest"] if c["question"] == RESPONSE and c["of"] == BOARD]
+    assert [(c["number"], c["omega"], c["b"]) for c in of_each] == [
+        (1, 1.55, 0.25), (2, 1.55, 0.3), (None, None, None)
+    ]  # fmt: skip
+    text = sheet(answer)
+    assert "1: ω = 1.55, b = 0.25: 1-1-1 | 2: ω = 1.55, b = 0.3: 1-2-2" in text
+    assert "- 2: ω = 1.55, b = 0.3: a reason" in text
+    titles = [axes.get_title(loc="left") for axes in front(answer).axes]
+    assert titles == ["1: ω = 1.55, b = 0.25: 1-1-1", "2: ω = 1.55, b = 0.3: 1-2-2"]
+
+
+def test_a_setting_that_did_not_pass_the_gate_is_never_named() -> None:
+    """It is the cheapest that keeps every bound, by luck; and the only one near the waveform."""
+    lucky = replace(said("ideal", "step ×4", 0.0004, 1e-9), gate=False)
+    named = judged(lucky, *LADDER)
+    assert {c.level for c in named.cheapest if c.rung == "ideal"} == set()
+    alone = judged(lucky, *(a for a in LADDER if a.rung != "full"), *LADDER[-2:])
+    assert picked(alone, WAVE).rung != "ideal"
+    passed = judged(replace(lucky, gate=True), *LADDER)
+    assert picked(passed, WAVE).level == "step ×4"
+    answer = document(named)
+    assert "| ngspice, ideal op-amps | step ×4 | 0.04 %, 1e-06 (gate not passed) |" in sheet(answer)
+    told = [text.get_text() for text in front(answer).legends[0].get_texts()]
+    assert "pale: gate not passed" in told
+
+
+def test_where_nothing_strikes_no_impact_velocity_is_asked() -> None:
+    still = orbit(0, 0, (), ())
+    quiet = [replace(a, orbit=still) for a in LADDER]
+    found = judged(*quiet)
+    for of in (BOARD, EQUATIONS):
+        one = picked(found, IMPACT, of)
+        assert (one.rung, one.level, one.shown, one.note) == (None, None, None, NO_IMPACTS)
+        assert picked(found, RESPONSE, of).shown
+    assert f"| {IMPACT} | board | – | – | – | – | – | no impacts |" in sheet(document(found))
+    second = answered(*quiet, label=Label(2, 1.55, 1.5, "1-0-0"))
+    both = cheapest(IMPACT, BOARD, [answered(*LADDER), second])
+    assert both is not None
+    assert (both.rung, both.shown, both.note) == ("circuit", True, "without response 2: no impacts")
+
+
+@pytest.mark.parametrize("rung", ["dynamic", "full"])
+def test_the_gate_of_a_setting_asks_two_steps_and_two_methods(rung: str) -> None:
+    def run(kind: Orbit, off: float = 0.0) -> Any:
+        return Read(kind, np.full((9, 4), 1.0 + off), None)
+
+    found = replace(orbit(), extremes=np.array([[-1.0, 2.0]] * 4))
+    other = replace(found, p=2)
+    subject: Any = SimpleNamespace(rung=rung, orbit=found)
+    near, far = 1.9 * BOUND, 2.1 * BOUND  # over a peak of 2
+    good = [run(found), run(found, near), run(found)]
+    assert trade_gate.passed(subject, good, [run(found)] * 2) == (True, True, True)
+    assert trade_gate.passed(subject, good, [run(found, far)] * 2) == (False, False, False)
+    assert trade_gate.passed(subject, good, [run(found), run(other)]) == (True, False, False)
+    failed = SimulationFailed("a reason")
+    rough = [failed, run(found), run(found)]
+    assert trade_gate.passed(subject, rough, [run(found)] * 2) == (False, True, True)
+    step = [run(found, far), run(found), run(found)]
+    assert trade_gate.passed(subject, step, [run(found)] * 2) == (False, True, True)
+    assert trade_gate.passed(subject, [run(found)], []) == (False,)
+    unknown = Orbit(OrbitStatus.NOT_SETTLED)
+    assert trade_gate.passed(subject, [run(unknown)] * 3, [run(unknown)] * 2) == (False,) * 3
 
 
 def test_velocities_are_compared_in_order_of_size_and_across_twins() -> None:
@@ -181,8 +275,7 @@ def test_velocities_are_compared_in_order_of_size_and_across_twins() -> None:
 
 def of_boards(boards: int, gained: int, lost: int) -> BoardTrade:
     return BoardTrade(
-        1.55,
-        "1-1-1",
+        ONE,
         boards,
         boards - gained,
         gained,
@@ -191,6 +284,24 @@ def of_boards(boards: int, gained: int, lost: int) -> BoardTrade:
         10.0,
         {"circuit": 1e-4, "ideal": 0.05},
     )
+
+
+@given(st.lists(st.integers(0, 50), min_size=8, max_size=8), st.integers(1, 7))
+def test_boards_counted_in_pieces_are_the_boards(counts: list[int], cut: int) -> None:
+    first = Tally(*(c * cut // 7 for c in counts))
+    rest = Tally(*(c - c * cut // 7 for c in counts))
+    assert first + rest == Tally(*counts)
+
+
+def test_pieces_come_back_as_they_were() -> None:
+    rows, truth = compare(ONE, [replace(LADDER[0], seconds=math.nan), *LADDER[1:]])
+    settings = SolverSettings("trap", 1.0 / 3.0, 1e-5)
+    said = json.loads(dumps(trade_pieces.rungs_json(rows, truth, settings, 0.1)))
+    back = trade_pieces.rungs(said)
+    assert repr(back) == repr((rows, truth, settings, 0.1))  # nan is not nan
+    lost = trade_pieces.rungs(json.loads(dumps(trade_pieces.rungs_json((), truth, None, math.nan))))
+    assert lost[2] is None
+    assert math.isnan(lost[3])
 
 
 @given(st.integers(1, 2000), st.data())
@@ -229,29 +340,47 @@ def test_the_interval_covers_the_truth_nineteen_times_in_twenty() -> None:
 
 
 def test_the_yield_goes_to_the_exact_circuit_unless_it_is_shown_to_be_off() -> None:
-    near = judged(*LADDER, boards=(of_boards(1000, 0, 0),))
-    assert (picked(near, SHARE).rung, picked(near, SHARE).shown) == ("circuit", True)
-    few = judged(*LADDER, boards=(of_boards(40, 0, 0),))
-    assert (picked(few, SHARE).rung, picked(few, SHARE).shown) == ("circuit", False)
-    off = judged(*LADDER, boards=(of_boards(200, 60, 0),))
-    assert (picked(off, SHARE).rung, picked(off, SHARE).shown) == ("ideal", True)
+    near = judged(*LADDER, boards=of_boards(1000, 0, 0))
+    assert (picked(near, SHARE, IDEAL).rung, picked(near, SHARE, IDEAL).shown) == ("circuit", True)
+    few = judged(*LADDER, boards=of_boards(40, 0, 0))
+    assert (picked(few, SHARE, IDEAL).rung, picked(few, SHARE, IDEAL).shown) == ("circuit", False)
+    off = judged(*LADDER, boards=of_boards(200, 60, 0))
+    assert (picked(off, SHARE, IDEAL).rung, picked(off, SHARE, IDEAL).shown) == ("ideal", True)
+    assert "off by more than 1 %" in picked(off, SHARE, IDEAL).note
+
+
+def test_yields_of_all_responses_name_those_that_were_not_asked() -> None:
+    labels = [Label(n, 1.55, 0.25, "1-1-1") for n in (1, 2)]
+    asked = replace(of_boards(1000, 0, 0), label=labels[0])
+    found = trade(
+        [
+            answered(*LADDER, label=labels[0], boards=asked),
+            answered(*LADDER, label=labels[1], boards=LeftOut(labels[1], "a reason")),
+        ]
+    )
+    shares = [c for c in found.cheapest if c.question == SHARE]
+    assert [(c.label, c.note) for c in shares] == [
+        (labels[0], ""), (None, "without response 2")
+    ]  # fmt: skip
 
 
 def document(found: Trade) -> dict[str, Any]:
-    return trade_json(found, {}, 1.0, "a title")
+    source = {"seed": 1, "settings": {"trade": {"boards": 40}}}
+    return trade_json(found, source, 1.0, "a title")
 
 
 def test_the_json_has_the_keys_of_the_contract_and_the_sheet_says_them() -> None:
-    answer = document(judged(*LADDER, boards=(of_boards(40, 1, 0),)))
+    answer = document(judged(*LADDER, boards=of_boards(40, 1, 0)))
     assert json.loads(json.dumps(answer, allow_nan=False)) == answer
     for row in answer["rungs"]:
         assert {"rung", "settings", "omega", "error", "seconds_per_period"} <= set(row)
     assert [row["error"] for row in answer["rungs"]][-1] == 0.0
     text = sheet(answer)
+    assert "`--boards 40 --seed 1`" in text
     assert (
-        "| waveform within 0.1 % | board | ngspice, full op-amps | × 0.5 | 0.06 % | yes |" in text
+        "| waveform within 0.1 % | board | ngspice, full op-amps | step ×2 | 0.06 % | yes |" in text
     )
-    assert "| 1.55 | 40 | 39 | 0 | 1 | 0 | -2.5 % |" in text
+    assert "| 1: ω = 1.55, b = 0.25 | 40 | 39 | 0 | 1 | 0 | -2.5 % |" in text
     for key in ("error", "numerical_error"):
         assert len(front(answer, key).axes) == 1
 
@@ -272,11 +401,11 @@ def folder_with(path: Path, answer: dict[str, Any] | None) -> Folder:
 def test_a_study_takes_the_rung_that_was_measured(tmp_path: Path) -> None:
     assert choose(Folder(tmp_path / "none")) == rung_choice.Choice("auto", "")
     assert choose(folder_with(tmp_path / "begun", None)).rung == "auto"
-    near = document(judged(*LADDER, boards=(of_boards(1000, 0, 0),)))
+    near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     choice = choose(folder_with(tmp_path / "near", near))
     assert choice.rung == "auto"
     assert "40 boards of each response" in choice.reason
-    off = document(judged(*LADDER, boards=(of_boards(200, 60, 0),)))
+    off = document(judged(*LADDER, boards=of_boards(200, 60, 0)))
     choice = choose(folder_with(tmp_path / "off", off))
     assert choice.rung == "ngspice"
     assert "every board in ngspice" in choice.reason
@@ -291,7 +420,7 @@ def test_a_response_that_ideal_op_amps_do_not_show_is_named(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("rung", ["exact", "ngspice"])
 def test_what_was_asked_for_stands(tmp_path: Path, rung: Any) -> None:
-    near = document(judged(*LADDER, boards=(of_boards(1000, 0, 0),)))
+    near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     folder = folder_with(tmp_path / "near", near)
     options = Options(rung=rung)
     assert chosen(folder, options, Progress()) is options
@@ -353,15 +482,65 @@ def test_trade_measures_a_design_and_keeps_it(
     steps = [r["error_of_equations"] for r in by["rk4"]]
     assert steps[-1] < steps[0] / 10.0  # four times eight the steps of a method of order 4
     assert by["ideal"][-1]["numerical_error"] < 1e-3
+    assert [r["gate"] for r in by["rk4"] + by["model"]] == [None] * 5
+    assert by["ideal"][2]["gate"]  # the paper's case passes at the gate's first step
     assert {r["response"] for r in rows} == {"1-1-1"}
     questions = {(c["question"], c["of"]) for c in answer["cheapest"]}
-    assert questions == {*product((RESPONSE, IMPACT, WAVE), (BOARD, EQUATIONS)), (SHARE, BOARD)}
+    assert questions == {*product((RESPONSE, IMPACT, WAVE), (BOARD, EQUATIONS)), (SHARE, IDEAL)}
     assert cli.status(["trade", str(out), "--boards", "2", "--json", "-q"]) == 0
     assert json.loads(capfd.readouterr().out) == answer  # reused
     assert cli.status(["trade", str(out), "--boards", "3", "-q"]) == 2
     assert "--overwrite" in capfd.readouterr().err
     assert cli.status(["tolerance", str(out), "--samples", "2", "--jobs", "2"]) == 0
     assert "rung by trade.json" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_an_interrupted_trade_goes_on_where_it_was(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C after the rungs and the first boards; then neither is done again, and the boards are
+    those of one go."""
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(MODEL, encoding="utf-8")
+    words = ["trade", str(model), "--out", str(out), "--boards", "6", "--jobs", "2", "-q"]
+    monkeypatch.setattr("designer.trade_job.CHUNK", 3)
+    count, done = trade_yield.tally, list[range]()
+
+    def interrupted(plan: Any, samples: range, *rest: Any) -> Any:
+        if done:
+            raise KeyboardInterrupt
+        done.append(samples)
+        return count(plan, samples, *rest)
+
+    monkeypatch.setattr("designer.trade_yield.tally", interrupted)
+    assert cli.status(words) == 130
+    assert done == [range(3)]
+    assert not json.loads((out / "manifest.json").read_text())["complete"]
+    kept = json.loads((out / trade_pieces.PIECES).read_text())["pieces"]
+    assert set(kept) == {"rungs 1", "boards 1, 0 to 2"}
+    monkeypatch.setattr("designer.trade_yield.tally", count)
+    measured = trade_rungs.measured
+    monkeypatch.setattr("designer.trade_rungs.measured", None)  # to call it would fail
+    assert cli.status(words) == 2
+    assert "--resume" in capfd.readouterr().err
+    whole = (out / trade_pieces.PIECES).read_text()
+    (out / trade_pieces.PIECES).write_text(whole[:-9])
+    assert cli.status([*words, "--resume"]) == 2
+    assert trade_pieces.PIECES in capfd.readouterr().err
+    (out / trade_pieces.PIECES).write_text(whole)
+    assert cli.status([*words, "--resume", "--json"]) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert json.loads((out / "manifest.json").read_text())["complete"]
+    assert not (out / trade_pieces.PIECES).exists()
+    assert answer["rungs"][-1]["seconds_per_period"] == kept["rungs 1"]["rows"][-1]["seconds"]
+    monkeypatch.setattr("designer.trade_rungs.measured", measured)
+    monkeypatch.setattr("designer.trade_job.CHUNK", 100)
+    once = ["trade", str(model), "--boards", "6", "--jobs", "2", "-q", "--json"]
+    assert cli.status(once) == 0
+    (mine,), (theirs,) = answer["boards"], json.loads(capfd.readouterr().out)["boards"]
+    for key in ("boards", "ok", "gained", "lost", "undecided", "periods"):
+        assert mine[key] == theirs[key]
 
 
 def test_numbers_that_cannot_be_are_refused(
