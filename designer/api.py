@@ -63,10 +63,10 @@ class RunResult:
 
     @property
     def satisfied(self) -> bool:
-        """Whether every wanted response was found, every engine shows it, and the netlist computes
-        the model's equation."""
+        """Whether every wanted response was found, every engine shows it and can be trusted there,
+        and the netlist computes the model's equation."""
         right = self.equations is None or self.equations.passed
-        return right and all(c.model.found and c.agrees for c in self.checked)
+        return right and all(c.model.found and c.agrees and c.trusted for c in self.checked)
 
 
 def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesis:

@@ -77,6 +77,23 @@ class GateResult:
     wave: float = float("nan")
     wave_bound: float = float("nan")
 
+    @property
+    def why(self) -> str:
+        """Why it did not pass, at the finest step tried; empty where it did."""
+        if self.passed:
+            return ""
+        if isinstance(self.read, SimulationFailed):
+            return self.read.reason
+        said = []
+        if self.difference > BOUND:
+            said.append(f"strobes differ by {self.difference:.1g} of the peak, bound {BOUND:g}")
+        if self.wave > self.wave_bound:
+            said.append(
+                f"the wave is {self.wave:.1g} of the peak off the exact circuit's, bound "
+                f"{self.wave_bound:.1g}"
+            )
+        return ", ".join(said) or "its runs do not all show the exact circuit's response"
+
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""
         return {

@@ -158,7 +158,8 @@ def simulate_answer(
     overwrite: bool = False,
     rung: Rung = "ideal",
 ) -> tuple[dict[str, Any], bool]:
-    """The verb ``simulate``: its JSON object, and whether every wanted response was found.
+    """The verb ``simulate``: its JSON object, and whether every wanted response was found
+    and can be trusted.
 
     plots : the directory for pictures; ``overwrite`` replaces those of the same names.
     """
@@ -190,7 +191,7 @@ def simulate_answer(
     if plots is not None:
         progress.stage("pictures")
         answer["files"] = simulate_plots.write(plots, names, simulated, overwrite)
-    return plain(answer), all(s.found for s in simulated)
+    return plain(answer), all(s.found and s.trust.trusted for s in simulated)
 
 
 def read_design(

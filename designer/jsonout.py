@@ -138,6 +138,7 @@ def simulate_json(
                     for i, o in enumerate(s.others, start=1)
                 ],
                 "engine": s.settings,
+                "trust": s.trust.as_dict(),
                 "cost": {"periods": s.orbit.periods, "seconds": s.seconds},
             }
             for s in simulated

@@ -7,11 +7,11 @@ prints; ``designer.folder`` and the command line do.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from designer import gate
+from designer import gate, trust
 from designer.attempt import zone_of_spec
 from designer.catalog import Catalog
 from designer.circuit import nominal_board
@@ -29,6 +29,7 @@ from designer.spread import Spread
 from designer.spreadrules import check_names
 from designer.synthesis import check_choices, synthesise
 from designer.system import Array, Drive
+from designer.trust import Trust
 from designer.verdict import Answer, Question, StudyPlan, Yield, count
 from designer.workers import SpicePool
 
@@ -51,13 +52,15 @@ class Checked:
     """A wanted response on all three engines, for the nominal circuit.
 
     circuit : orbit of the exact circuit rung, in volts and seconds. gate : ngspice's settings and
-    its run; None where ngspice was not asked.
+    its run; None where ngspice was not asked. model_trust, circuit_trust : of the exact answers.
     """
 
     model: ModelResponse
     circuit: Orbit
     excitation: Excitation
     gate: GateResult | None
+    model_trust: Trust = field(default_factory=Trust)
+    circuit_trust: Trust = field(default_factory=Trust)
 
     @property
     def ngspice(self) -> Orbit | None:
@@ -70,9 +73,25 @@ class Checked:
         if not self.gate.passed:
             return Orbit(
                 OrbitStatus.FAILED,
-                reason=f"the numerics gate did not pass (steps a period: {self.gate.tried})",
+                reason=f"the numerics gate did not pass (steps a period: {self.gate.tried}): "
+                + self.gate.why,
             )
         return self.gate.read.orbit
+
+    @property
+    def trust(self) -> dict[str, Trust]:
+        """Of each engine's answer."""
+        said = {"model": self.model_trust, "circuit": self.circuit_trust}
+        heard = self.ngspice
+        return (
+            said
+            if heard is None
+            else {**said, "ngspice": trust.of_reason(heard.status, heard.reason)}
+        )
+
+    @property
+    def trusted(self) -> bool:
+        return all(said.trusted for said in self.trust.values())
 
     @property
     def agrees(self) -> bool:
@@ -141,8 +160,22 @@ def check(
             )
         )
     return tuple(
-        Checked(r, o, e, g) for r, o, e, g in zip(found, orbits, settings, met, strict=True)
+        Checked(
+            r,
+            o,
+            e,
+            g,
+            trust.of_orbit(model_flow(design, r), r.orbit),
+            trust.of_orbit(circuit_flow(system, design, r), o),
+        )
+        for r, o, e, g in zip(found, orbits, settings, met, strict=True)
     )
+
+
+def model_flow(design: Design, response: ModelResponse) -> Flow:
+    """The flow of the model at a response."""
+    model = replace(design.model, b=response.b)
+    return Flow(model.second_order().piecewise_linear(), Drive(response.omega))
 
 
 def plan_study(
@@ -186,9 +219,7 @@ def traces(design: Design, checked: Checked) -> dict[str, Trace]:
     out: dict[str, Trace] = {}
     b = checked.model.b
     volts, seconds = design.volts(b), design.errors.scales.seconds
-    model = replace(design.model, b=b)
-    flow = Flow(model.second_order().piecewise_linear(), Drive(checked.model.omega))
-    out["model"] = trace_of(flow, checked.model.orbit, np.ones(4), 1.0)
+    out["model"] = trace_of(model_flow(design, checked.model), checked.model.orbit, np.ones(4), 1.0)
     circuit = circuit_flow(nominal_reduction(design).system(), design, checked.model)
     out["circuit"] = trace_of(circuit, checked.circuit, volts, seconds)
     read = checked.gate.read if checked.gate is not None else None

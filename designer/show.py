@@ -97,6 +97,9 @@ def tolerance(answer: Mapping[str, Any]) -> None:
             *counted,
         )
     console.print(table)
+    for r in answer["responses"]:
+        for doubt in doubts(r.get("trust") or {}):
+            _line(console, f"ω = {r['omega']:g}: {doubt}")
     if answer.get("until") is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
         _line(console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
@@ -163,7 +166,7 @@ def simulated(answer: Mapping[str, Any]) -> None:
             table,
             f"{r['omega']:g}",
             r["expected"] or "-",
-            r["response"],
+            r["response"] + ("" if r["trust"]["trusted"] else " (not to be trusted)"),
             {True: "yes", False: "no", None: "-"}[r["symmetric"]],
             "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
             "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
@@ -175,6 +178,8 @@ def simulated(answer: Mapping[str, Any]) -> None:
     for r in answer["responses"]:
         if r["reason"]:
             _line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+        for doubt in doubts({"this response": r.get("trust")}):
+            _line(console, f"ω = {r['omega']:g}: {doubt}")
 
 
 def compared(answer: Mapping[str, Any]) -> None:
@@ -250,6 +255,15 @@ def files(folder: Path, reused: bool) -> None:
     """Where the results are."""
     how = "was there already, from the same inputs" if reused else "written"
     _line(_console(), f"{folder}: {how}")
+
+
+def doubts(trust: Mapping[str, Any]) -> list[str]:
+    """A line for each result that is not to be trusted (``designer.trust``), by what it is of."""
+    return [
+        f"{what} not to be trusted here: {'; '.join(said['reasons'])}"
+        for what, said in trust.items()
+        if said is not None and not said["trusted"]
+    ]
 
 
 def _console() -> Console:

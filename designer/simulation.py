@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from designer import attractor, gate, pipeline, waveform_orbit
+from designer import attractor, gate, pipeline, trust, waveform_orbit
 from designer.api import Synthesis, synthesise
 from designer.attractor import coexisting, settle, starts
 from designer.deck import Excitation
@@ -36,6 +36,7 @@ from designer.responses import (
     scale_of,
 )
 from designer.system import Array, Drive
+from designer.trust import Trust
 from designer.workers import SpicePool
 
 Engine = Literal["model", "circuit", "ngspice"]
@@ -51,7 +52,7 @@ class Simulated:
     twins : mirror twin of the orbit and of each of ``others``; None where an orbit is its own
     twin, or there is no mirror, or the engine was not asked (ngspice). b : the clearance; sides :
     the stops there are. settings : of the engine for this response. traces : where asked, the
-    orbit and its twin over their periods, each from its start.
+    orbit and its twin over their periods, each from its start. trust : of the orbit.
     """
 
     omega: float
@@ -65,6 +66,7 @@ class Simulated:
     sides: tuple[int, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     traces: tuple[Trace, ...] = ()
+    trust: Trust = field(default_factory=Trust)
 
     @property
     def twin(self) -> Orbit | None:
@@ -179,6 +181,7 @@ def _on_model(modelfile: ModelFile, spec: Response, traces: bool) -> Simulated:
         _sides(model),
         _exact_settings(flow, orbits[0], 1.0),
         _traces(flow, (orbits[0], twins[0]), np.ones(4), 1.0) if traces else (),
+        trust.of_orbit(flow, orbits[0]),
     )
 
 
@@ -266,6 +269,7 @@ def _on_circuit(made: Synthesis, spec: Response, scan: bool, traces: bool) -> Si
         _sides(made.design.model),
         _exact_settings(flow, measured[0], float(volts[0])),
         _traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
+        trust.of_orbit(flow, measured[0]),
     )
 
 
@@ -313,6 +317,7 @@ def _in_ngspice(
                 sides=_sides(made.design.model),
                 settings=_gate_settings(gates[0]) if gates else {},
                 traces=_spice_traces(gates[0], volts, scale) if gates and traces else (),
+                trust=trust.of_reason(heard[0].status, heard[0].reason),
             )
         )
     return tuple(out)

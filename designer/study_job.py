@@ -251,4 +251,12 @@ def _study_provenance(made: Synthesis, study: Study, options: Options) -> dict[s
 
 def _satisfied(answer: Mapping[str, Any]) -> bool:
     right = answer["equation_check"] is None or answer["equation_check"]["passed"]
-    return right and all(r["found"] and r["engines_agree"] for r in answer["responses"])
+    return right and all(
+        r["found"] and r["engines_agree"] and _trusted(r.get("trust", {}))
+        for r in answer["responses"]
+    )
+
+
+def _trusted(said: Mapping[str, Any]) -> bool:
+    """Of the engines' answers; a yield says only how far it is known. Older folders say nothing."""
+    return all(engine["trusted"] for name, engine in said.items() if name != "yield")

@@ -16,6 +16,7 @@ from designer.jsonout import FORMAT
 from designer.pipeline import Checked
 from designer.reached import Reached
 from designer.study import Study
+from designer.trust import of_yield
 from designer.tuning import Tuned
 from designer.verdict import Answer, Verdict, Yield, count
 from designer.yield_maps import YieldMap
@@ -74,6 +75,12 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "tuned": tuned_json(study.tuned_of(index)),
         "reached": _reached(study, index),
         "blame": _blame(study, index),
+        "trust": {
+            **{engine: said.verdict() for engine, said in checked.trust.items()},
+            "yield": None
+            if counted is None
+            else of_yield(counted, checked.circuit_trust).verdict(),
+        },
     }
     if counted is None:
         row["left_out"] = study.left_out[index]

@@ -32,7 +32,7 @@ REQUIRED = (
     "omega response status symmetric x1_max x1_min impact_velocities multipliers lyapunov others "
     "cost"
 )
-ADDED = "n p q start asymmetry twin impacts penetration miss extremes reason engine"
+ADDED = "n p q start asymmetry twin impacts penetration miss extremes reason engine trust"
 Captured = pytest.CaptureFixture[str]
 
 

@@ -1,0 +1,197 @@
+"""Whether a result can be trusted: its error, measured on the result itself, against what it says.
+
+A lap of an orbit is computed several ways that share no rounding error: by the kernel that
+answered, and by the general one with its steps cut differently, from starts a few roundings apart.
+What they differ by is what rounding does to a lap, with all that the flow magnifies inside it: a
+stop of stiffness μ turns a rounding error of the displacement into sqrt(μ) times as much of the
+velocity, and into μ times as much of the multipliers. The fixed point of the lap is off by that,
+times ‖(I - Φ)⁻¹‖, Φ the lap's linearised map. States count in units of their peaks.
+
+A result that says more than this error allows is *not to be trusted here*, and the reason is said:
+the tool gives no bare answer then.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from designer.attractor import STROBE_TOLERANCE, peaks_near
+from designer.flow import Flow, FlowResult, FlowStatus
+from designer.orbit import Orbit, OrbitStatus
+from designer.system import Array
+from designer.verdict import Yield
+
+ROUNDING = 2.0**-53
+"""Of a number in double precision."""
+SPLITS = (1, 2, 3, 5)
+"""Stretches a period of the general kernel's runs: each cuts its steps at other times."""
+APART = 8.0
+"""Roundings of the peak by which their starts differ from the orbit's."""
+MARGIN = 10.0
+"""A few runs show the usual rounding error; the bound is so many times the largest they show."""
+WORDS = "not to be trusted here"
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What is known of a result's error.
+
+    rounding : largest difference of a lap's end between the ways to compute it; magnification :
+    ‖Φ‖ of the lap; error : bound of the state's error, multiplier_error : of the largest
+    multiplier's modulus. States in units of their peaks; nan where nothing was measured. reasons :
+    why the result is not to be trusted; none where it is.
+    """
+
+    rounding: float = math.nan
+    magnification: float = math.nan
+    error: float = math.nan
+    multiplier_error: float = math.nan
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def trusted(self) -> bool:
+        return not self.reasons
+
+    def __str__(self) -> str:
+        """Empty where it is to be trusted."""
+        return f"{WORDS}: {'; '.join(self.reasons)}" if self.reasons else ""
+
+    def verdict(self) -> dict[str, Any]:
+        """Without the figures, which no two machines share: equal studies are equal files."""
+        return {"trusted": self.trusted, "reasons": list(self.reasons)}
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            **self.verdict(),
+            "rounding": self.rounding,
+            "magnification": self.magnification,
+            "error": self.error,
+            "multiplier_error": self.multiplier_error,
+        }
+
+
+def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
+    """Of what the exact engine says of a response; ``flow`` is the one it was found with.
+
+    Without a start there is no result: its status and reason say so, and nothing is measured.
+    Of a motion without a period, one drive period is a lap.
+    """
+    if not len(orbit.start):
+        return Trust()
+    n, size, mode = max(orbit.n, 1), flow.system.size, orbit.mode or None
+    peak = _peak(flow, orbit)
+    general = Flow(flow.system, flow.drive, fast=False)
+    apart = APART * ROUNDING * peak * np.random.default_rng(0).choice([-1, 1], (len(SPLITS), size))
+    runs = [flow.run(orbit.start, n, mode=mode, tangent=np.eye(size))]
+    runs += [
+        general.run(orbit.start + off, n, mode=mode, tangent=np.eye(size), points=k)
+        for k, off in zip(SPLITS, apart, strict=True)
+    ]
+    laps = [run.tangent * peak / peak[:, None] for run in runs if run.tangent is not None]
+    ended = [run.status for run in runs if run.status is not FlowStatus.DONE]
+    if ended:
+        return Trust(reasons=(f"a lap computed anew ends with: {ended[0]}",))
+    ends = np.array([run.strobes[-1] for run in runs]) / peak
+    magnification = float(np.linalg.norm(laps[0], 2))
+    rounding = float(np.ptp(ends, axis=0).max())
+    if runs[0].counts.any():  # all runs may have found the stop with the same last digit
+        rounding = max(rounding, ROUNDING * _kick(flow, peak) * magnification)
+    error = MARGIN * rounding * (_carried(laps[0]) if orbit.n else 1.0)
+    reasons = _reasons_of_lap(runs, error)
+    if orbit.n == 0:
+        return Trust(rounding, magnification, error, reasons=reasons)
+    open_by = MARGIN * float(np.ptp([_radius(lap) for lap in laps]))
+    if orbit.status is OrbitStatus.PERIODIC:
+        reasons += _reasons_of_orbit(orbit, error, open_by, float(peak[_moving(flow)]))
+    return Trust(rounding, magnification, error, open_by, reasons)
+
+
+def of_yield(counted: Yield, nominal: Trust) -> Trust:
+    """Of a yield: not better than the nominal orbit's that each board starts on, nor with so many
+    boards without an answer that they could move it out of its own interval."""
+    reasons = [f"the nominal response: {reason}" for reason in nominal.reasons]
+    if counted.failed:
+        least = counted.ok / counted.samples
+        most = (counted.ok + counted.failed) / counted.samples
+        low, high = counted.interval
+        if counted.failed == counted.samples or least < low or most > high:
+            reasons.append(
+                f"{counted.failed} of {counted.samples} boards have no answer; whatever they "
+                f"were, the yield lies between {100 * least:.3g} and {100 * most:.3g} %"
+            )
+    return Trust(error=nominal.error, reasons=tuple(reasons))
+
+
+def of_reason(status: OrbitStatus, reason: str) -> Trust:
+    """Of an engine that answers only behind a gate of its own: not where it has failed."""
+    return Trust(reasons=(reason,) if status is OrbitStatus.FAILED else ())
+
+
+# ---------------------------------------------------------------------------------------------
+
+
+def _moving(flow: Flow) -> int:
+    return flow.system.displacement[0] if flow.system.displacement else 0
+
+
+def _peak(flow: Flow, orbit: Orbit) -> Array:
+    """(states,) as `peaks_near`, from the orbit's extremes where it has them."""
+    if not len(orbit.extremes):
+        return peaks_near(flow, orbit.start, orbit.mode or None)
+    peak = np.abs(orbit.extremes).max(axis=1)
+    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+
+
+def _kick(flow: Flow, peak: Array) -> float:
+    """What a contact makes of a rounding error, of the peak: sqrt(μ) in the model."""
+    system, largest = flow.system, 1.0
+    for guard in system.mode(system.start).guards:
+        if guard.clearance >= 0:
+            A = system.mode(guard.target).A
+            rate = float(np.abs(np.linalg.eigvals(A)).max())
+            largest = max(largest, float(np.linalg.norm(A * peak / peak[:, None], 2)) / rate)
+    return largest
+
+
+def _carried(lap: Array) -> float:
+    """How much of a lap's error its fixed point has: ‖(I - Φ)⁻¹‖, at least 1."""
+    smallest = float(np.linalg.svd(np.eye(len(lap)) - lap, compute_uv=False)[-1])
+    return max(1.0, 1.0 / smallest) if smallest > 0.0 else math.inf
+
+
+def _reasons_of_lap(runs: list[FlowResult], error: float) -> tuple[str, ...]:
+    reasons = []
+    if not error <= STROBE_TOLERANCE:
+        reasons.append(
+            f"rounding errors, as the flow magnifies them, leave the state open by {error:.1g} of "
+            f"its peak, and to call a response periodic asks for {STROBE_TOLERANCE:.0e}"
+        )
+    counts = {tuple(int(c) for c in run.counts.sum(axis=(0, 1))) for run in runs}
+    if len(counts) > 1:
+        said = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
+        reasons.append(f"computed with other steps a lap has {said} impacts")
+    return tuple(reasons)
+
+
+def _reasons_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) -> tuple[str, ...]:
+    reasons = []
+    nearest = min(orbit.penetration, orbit.miss) / peak
+    if nearest <= error:
+        reasons.append(
+            f"a contact or a miss of {nearest:.1g} of the peak lies within the error of "
+            f"{error:.1g}: the count of impacts is open"
+        )
+    if abs(1.0 - orbit.radius) <= open_by:
+        reasons.append(
+            f"its largest multiplier cannot be told from 1 (it is open by {open_by:.1g}): whether "
+            "the response is stable is not known"
+        )
+    return tuple(reasons)
+
+
+def _radius(lap: Array) -> float:
+    return float(np.abs(np.linalg.eigvals(lap)).max())

@@ -1,0 +1,177 @@
+"""What is not to be trusted is said to be, and its near miss is not.
+
+Each check is shown in pairs: a case that it catches, and one just short of it that passes. The
+error bound itself is held against 40-digit arithmetic.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.references import Problem, truth
+from designer import attractor, cli, pipeline, show, trust
+from designer.attractor import settle
+from designer.deck import Excitation, SolverSettings
+from designer.flow import Flow
+from designer.gate import GateResult
+from designer.model import Dimensionless
+from designer.modelfile import Expect, Response
+from designer.ngspice import SimulationFailed
+from designer.orbit import Orbit, OrbitStatus
+from designer.responses import ModelResponse
+from designer.system import Drive
+from designer.trust import Trust
+from designer.verdict import Yield
+from designer.waveform_orbit import Read
+
+STIFFEST = 1.0 - 2.0**-52
+"""The stiffest stop but one that a double can ask for: one impact excites 7e7 of the frequency."""
+DAMPED = Problem(0.9, k0=0.999, zeta=0.2, b=0.5, lower=False)
+
+
+@cache
+def found(k0: float) -> tuple[Flow, Orbit]:
+    """The 1-1-0 response against a stop of this stiffness."""
+    model = Dimensionless(
+        DAMPED.m, DAMPED.k, k0, DAMPED.c, DAMPED.zeta, DAMPED.f20, DAMPED.b, sides="upper"
+    )
+    flow = Flow(model.second_order().piecewise_linear(), Drive(DAMPED.omega))
+    return flow, settle(flow, np.zeros(4))
+
+
+@pytest.mark.parametrize("k0", [0.99, 1.0 - 1e-6, 1.0 - 1e-9, 1.0 - 1e-12])
+def test_the_error_is_a_bound_and_not_a_wild_one(k0: float) -> None:
+    flow, orbit = found(k0)
+    assert orbit.response == "1-1-0"
+    exact = truth(replace(DAMPED, k0=k0), orbit.start, 1)
+    assert exact is not None
+    error = float((np.abs(exact.strobes[-1] - orbit.start) / np.abs(orbit.extremes).max(1)).max())
+    said = trust.of_orbit(flow, orbit)
+    assert error <= said.error <= 1e5 * max(error, 2.0**-53)
+
+
+def test_a_stop_too_stiff_for_double_precision() -> None:
+    caught, passes = (trust.of_orbit(*found(k0)) for k0 in (STIFFEST, 1.0 - 1e-12))
+    assert not caught.trusted
+    assert str(caught).startswith("not to be trusted here: rounding errors")
+    assert caught.error > attractor.STROBE_TOLERANCE > passes.error > 1e-12
+    assert passes.trusted
+    assert str(passes) == ""
+
+
+@pytest.mark.parametrize("margin", ["miss", "penetration"])
+def test_a_count_that_lies_within_the_error(margin: str) -> None:
+    flow, orbit = found(1.0 - 1e-9)
+    error = trust.of_orbit(flow, orbit).error
+    peak = float(np.abs(orbit.extremes[0]).max())
+    near, clear = (
+        trust.of_orbit(flow, replace(orbit, **{margin: factor * error * peak}))  # type: ignore[arg-type]
+        for factor in (0.9, 1.1)
+    )
+    assert [("the count of impacts is open" in r) for r in near.reasons] == [True]
+    assert clear.trusted
+
+
+@pytest.mark.parametrize(("zeta", "trusted"), [(1e-16, False), (1e-12, True)])
+def test_a_multiplier_that_cannot_be_told_from_one(zeta: float, trusted: bool) -> None:
+    """Without stops the multipliers are exp(λ T), λ the eigenvalues: -ζ times a figure near 1."""
+    model = Dimensionless(0.5, 0.5, 0.0, 0.5, zeta, 0.0, 0.25)
+    flow = Flow(model.second_order().piecewise_linear(), Drive(0.85))
+    reached = attractor.shoot(flow, np.array([0.3, 0.1, 0.2, 0.1]), 1)
+    assert reached is not None
+    orbit = attractor.describe(flow, reached[0], 1, reached[1], laps=1)
+    damped = replace(model, zeta=1e-3).second_order().state_matrix()
+    slowest = 1e3 * zeta * float(np.linalg.eigvals(damped).real.max()) * flow.drive.period
+    said = trust.of_orbit(flow, orbit)
+    assert abs(orbit.radius - np.exp(slowest)) <= said.multiplier_error
+    assert (-slowest > said.multiplier_error) is trusted
+    assert [("cannot be told from 1" in r) for r in said.reasons] == ([] if trusted else [True])
+
+
+def test_a_motion_without_a_period_is_judged_by_one_lap() -> None:
+    flow, _ = found(0.999)
+    start = np.array([0.1, 0.0, 0.0, 0.0])
+    said = trust.of_orbit(flow, Orbit(OrbitStatus.APERIODIC, start=start, mode=(0,)))
+    assert said.trusted
+    assert 0.0 < said.error < 1e-10
+
+
+def test_where_nothing_was_reached_the_status_speaks() -> None:
+    flow, _ = found(0.999)
+    assert trust.of_orbit(flow, Orbit(OrbitStatus.DIVERGED)) == Trust()
+
+
+@pytest.mark.parametrize(
+    ("counted", "trusted"),
+    [
+        (Yield(199, 0, 0, 1), True),  # 99.5 to 100 %, inside the interval of 199 of 199
+        (Yield(150, 0, 0, 50), False),
+        (Yield(100, 100, 0, 4), True),
+        (Yield(100, 100, 0, 40), False),
+        (Yield(0, 0, 0, 10), False),
+        (Yield(0, 10, 0, 0), True),
+    ],
+)
+def test_a_yield_that_boards_without_an_answer_could_move(counted: Yield, trusted: bool) -> None:
+    said = trust.of_yield(counted, Trust())
+    assert said.trusted is trusted
+    assert any("boards have no answer" in reason for reason in said.reasons) is not trusted
+
+
+def test_a_yield_is_no_better_than_the_nominal_response() -> None:
+    said = trust.of_yield(Yield(200, 0, 0, 0), Trust(reasons=("so it is",)))
+    assert said.reasons == ("the nominal response: so it is",)
+
+
+SETTINGS = SolverSettings("trap", 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("gate", "words"),
+    [
+        (GateResult(SETTINGS, False, 5e-3, Read(Orbit(OrbitStatus.PERIODIC), np.zeros((9, 4)),
+         None), (200, 400)), "strobes differ by 0.005 of the peak, bound 0.001"),
+        (GateResult(SETTINGS, False, 5e-4, Read(Orbit(OrbitStatus.PERIODIC), np.zeros((9, 4)),
+         None), (200,)), "do not all show the exact circuit's response"),
+        (GateResult(SETTINGS, False, np.nan, SimulationFailed("no answer"), (200,)), "no answer"),
+        (GateResult(SETTINGS, True, 5e-4, Read(Orbit(OrbitStatus.PERIODIC), np.zeros((9, 4)),
+         None), (200,)), ""),
+    ],
+)  # fmt: skip
+def test_ngspice_is_trusted_behind_its_gate_alone(gate: GateResult, words: str) -> None:
+    _, orbit = found(0.999)
+    response = ModelResponse(Response(1.0, Expect(1, 1, 1)), 0.25, orbit, (), True)
+    said = pipeline.Checked(response, orbit, Excitation(200.0, 4.0), gate).trust["ngspice"]
+    assert said.trusted is (words == "")
+    assert all(words in reason for reason in said.reasons)
+
+
+@pytest.mark.parametrize(("k0", "trusted"), [(STIFFEST, False), (0.999999999, True)])
+def test_simulate_says_it(
+    k0: float, trusted: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(
+        f"format = 1\n[model]\nm = 0.5\nk = 0.5\nk0 = {k0!r}\nc = 0.5\nzeta = 0.2\nf20 = 0.0\n"
+        'b = 0.5\nsides = "upper"\n'
+    )
+    assert cli.status(["simulate", str(path), "--omega", "0.9", "--json"]) == int(not trusted)
+    said = capfd.readouterr()
+    (row,) = json.loads(said.out)["responses"]
+    assert row["trust"]["trusted"] is trusted
+    assert cli.status(["simulate", str(path), "--omega", "0.9"]) == int(not trusted)
+    assert ("not to be trusted here" in capfd.readouterr().err) is not trusted
+
+
+def test_the_tables_name_what_is_not_to_be_trusted() -> None:
+    fine, open_ = Trust().as_dict(), Trust(reasons=("first", "second")).as_dict()
+    assert show.doubts({"circuit": fine, "ngspice": None}) == []
+    assert show.doubts({"circuit": fine, "yield": open_}) == [
+        "yield not to be trusted here: first; second"
+    ]
