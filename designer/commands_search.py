@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 4000
 """Boards of the final study; as ``search_job.SAMPLES``."""
+KINDS = ("grade", "reference", "op-amp", "dead-zone", "place", "trim")
+"""Of upgrades; as ``cure_branch.KINDS``."""
 
 
 @app.command()
@@ -57,7 +59,7 @@ def search(
         typer.Option(
             "--without",
             metavar="KIND",
-            help="No upgrade of this kind (docs/cure.md names them); may be repeated.",
+            help=f"Of a cure, no upgrade of this kind: {', '.join(KINDS)}; may be repeated.",
         ),
     ] = None,
     rung: Annotated[

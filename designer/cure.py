@@ -18,7 +18,7 @@ from typing import Any
 
 from designer import design_files, rung_choice
 from designer.api import Synthesis
-from designer.cure_branch import KINDS, cured
+from designer.cure_branch import KINDS, cured, kind_named
 from designer.cure_json import cure_json, front_csv
 from designer.cure_search import find_cure
 from designer.cure_study import Book
@@ -65,21 +65,22 @@ def cure(
     target : yield of every wanted response, as built (trimmed where the cure says so): the lower
     end of its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by
     the catalogue's price classes. out : folder for the cured design. without : kinds of upgrades
-    that are not wanted. options : seed, jobs, overwrite, resume.
+    that are not wanted; a hyphen may stand for a space. options : seed, jobs, overwrite, resume.
 
     Raises
     ------
     InputError : the target or the budget is none; an unknown kind; the folder is no design folder,
-        or holds a cure of other inputs, and the options do not say what to do.
+        or holds a cure of other inputs, or ``out`` holds a design, and the options do not say what
+        to do.
     """
     options = Options() if options is None else options
     said = Progress() if progress is None else progress
     options.check()
-    _check(target, budget, without)
+    unwanted = _checked(target, budget, without)
     if out is not None:
         if out.resolve() == folder.resolve():
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
-        Folder(out)  # refuses a place that is taken before the work, not after it
+        Folder(out)  # refuses a place where something else stands
     base = read_design(folder, progress=said)
     need_responses(base.modelfile)
     place = Folder(folder)
@@ -89,7 +90,7 @@ def cure(
         "rules": RULES,
         "yield": target,
         "budget": budget,
-        "without": sorted(set(without)),
+        "without": sorted(unwanted),
         "seed": options.seed,
     }
     wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
@@ -101,6 +102,8 @@ def cure(
         if out is not None:
             _write_design(base, answer, out, options, said)
         return CureResult(answer, bool(answer["reached"]), True)
+    if out is not None:
+        _check_room(base, out, options)
     rung = rung_choice.choose(place)
     if rung.rung == "ngspice":
         said.note(
@@ -125,7 +128,7 @@ def cure(
             target,
             budget=budget,
             trim=base.modelfile.tuning.offset,
-            without=frozenset(without),
+            without=unwanted,
             seed=options.seed,
             jobs=options.jobs,
             book=Book(known, save),
@@ -151,6 +154,22 @@ def cure(
     return CureResult(answer, found.reached, False)
 
 
+def _check_room(base: Synthesis, out: Path, options: Options) -> None:
+    """Refuse before the work a folder that could not be written after it.
+
+    Raises
+    ------
+    InputError : a design stands there, which is not to be overwritten; a file that the folder's
+        manifest does not list stands in the way.
+    """
+    folder = Folder(out)
+    if folder.manifest is not None and "design" in folder.manifest.stages and not options.overwrite:
+        expected = "a folder without a design, or --overwrite to replace it by the cured one"
+        raise InputError(None, "--out", str(out), expected)
+    # The cured design's files have the names of this one's.
+    folder.decide(design_inputs(base.modelfile, base.catalog), overwrite=True, resume=False)
+
+
 def _write_design(
     base: Synthesis, answer: dict[str, Any], out: Path, options: Options, said: Progress
 ) -> None:
@@ -170,14 +189,20 @@ def _write_design(
     folder.finish("design")
 
 
-def _check(target: float, budget: float | None, without: Collection[str]) -> None:
+def _checked(target: float, budget: float | None, without: Collection[str]) -> frozenset[str]:
+    """The kinds that are not wanted, by their own names."""
     if not 0.0 < target < 1.0:
         raise InputError(None, "--yield", target, "a share above 0 and below 1, such as 0.99")
     if budget is not None and not 0.0 <= budget < float("inf"):
         raise InputError(None, "--budget", budget, "a price >= 0, in euro")
-    for kind in without:
-        if kind not in KINDS:
-            raise InputError(None, "--without", kind, one_of(kind, KINDS))
+    kinds = set()
+    for name in without:
+        kind = kind_named(name)
+        if kind is None:
+            names = [k.replace(" ", "-") for k in KINDS]
+            raise InputError(None, "--without", name, one_of(name, names))
+        kinds.add(kind)
+    return frozenset(kinds)
 
 
 def _studies(place: Folder) -> dict[str, dict[str, str]]:

@@ -19,7 +19,13 @@ from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 OPAMP, DEAD_ZONE, REFERENCE = "op-amp", "dead zone", "reference"
 GRADE, PLACE, TRIM = "grade", "place", "trim"
 KINDS = (GRADE, REFERENCE, OPAMP, DEAD_ZONE, PLACE, TRIM)
-"""Kinds of upgrades, by the names that leave them out."""
+"""Kinds of upgrades, by the names that leave them out; for a space a hyphen may stand."""
+
+
+def kind_named(name: str) -> str | None:
+    """The kind that is meant by this name; None where there is none."""
+    plain = {kind.replace("-", " "): kind for kind in KINDS}
+    return plain.get(name.replace("-", " "))
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,10 @@ from designer.cure_picture import Picture, Way, picture
 from designer.cure_program import Program, cheapest
 from designer.cure_study import Book, Measured, asked, fresh, measure, measure_together, plan_of
 from designer.cure_trial import Cure, Trial, measured_none
-from designer.limiting import limiting
+from designer.limiting import limiting, together
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
+from designer.spread import Spread
 from designer.upgrade import Upgrades
 from designer.verdict import StudyPlan
 
@@ -349,8 +350,13 @@ class _Search:
         """What limits a response with nothing upgraded, in one line."""
         if number in self.unseen:
             return "the nominal circuit does not show it"
-        margin = self.pictures[0].ways[number][0].margin if self.pictures else None
-        return "" if margin is None else limiting(margin).line
+        seen = self.pictures[0] if self.pictures else None
+        margin = None if seen is None else seen.ways[number][0].margin
+        if seen is None or margin is None:
+            return ""
+        made = seen.branch.made
+        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        return limiting(margin, together(made.design.circuit, spread, seen.seed)).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
         """The design as it is, and trials by price, each with a higher worst yield than any cheaper

@@ -4,7 +4,8 @@ Two questions. Where is the border? From the nearest limit of the response's mar
 (``designer.margins``): an impact that grazes, a fold, doubling or torus at which the window of a
 neighbour begins, or another attractor in whose basin the nominal orbit comes to lie. And what moves
 a board across it? From the shares of the limit's variance over the spread: offsets and bias, the
-dead zone's own parts, the rails, or the parts that make the coefficients.
+dead zone's own parts, the rails, or the parts that make the coefficients. Parts that vary together
+count with what they have in common.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from typing import Any
 import numpy as np
 
 from designer import margins as smooth
+from designer.boards import Boards
+from designer.circuit import Circuit
 from designer.margins import Limit, Margin
-from designer.quantities import Quantity
-from designer.spread import draw_many
+from designer.quantities import Quantity, column
+from designer.spread import Spread, draw_many
 from designer.verdict import Answer, StudyPlan
 
 OFFSET, NULL, RAILS = "offset", "null", "rails"
@@ -37,6 +40,9 @@ HALF = 0.5
 """Of the variance, or of the lost boards: from here on a cause is the one that is named."""
 DRAWN = 256
 """Boards, at least, from which standard deviations are taken."""
+TOGETHER = 4000
+"""Boards from which a covariance is taken: a share is then known to about 2 %."""
+STREAM = "limiting:"
 _DEAD_ZONE = re.compile(r"R(2\d\d|50)[AB]?")
 
 
@@ -46,7 +52,7 @@ class Limiting:
 
     mechanism : one of ``MECHANISMS``. border : where the response ends, in words; distance : of
     the nominal board from it in standard deviations; nan without one. shares : of the border's
-    variance, by what moves it. line : all of it in one line.
+    variance, by what moves it; see ``shares``. line : all of it in one line.
     """
 
     mechanism: str
@@ -72,11 +78,20 @@ def limitings(
     boards = draw_many(plan.circuit, plan.spread, plan.seed, range(count))
     rows = [[a for a in answers if a.question == k] for k in range(len(plan.questions))]
     found = smooth.margins(plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=progress)
-    return tuple(limiting(margin) for margin in found)
+    drawn = together(plan.circuit, plan.spread, plan.seed)
+    return tuple(limiting(margin, drawn) for margin in found)
 
 
-def limiting(margin: Margin) -> Limiting:
-    """What limits a response, by its margin."""
+def together(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
+    """Boards to take the covariance of their parts from; None where each part varies by itself."""
+    shared = spread.groups or spread.temperature is not None or spread.supply > 0.0
+    if not shared and spread.measured is None:
+        return None
+    return draw_many(circuit, spread, seed, range(TOGETHER), STREAM)
+
+
+def limiting(margin: Margin, drawn: Boards | None = None) -> Limiting:
+    """What limits a response, by its margin. drawn : see ``together``."""
     if margin.sought and margin.there > HALF * margin.sought:
         border = f"another attractor takes over: {margin.there} of {margin.sought} lost boards"
         return Limiting(
@@ -85,7 +100,7 @@ def limiting(margin: Margin) -> Limiting:
     if not margin.limits:
         return Limiting(NOTHING, "", float("nan"), {}, NOTHING)
     limit = margin.limits[0]
-    moved = shares(margin.quantities, limit)
+    moved = shares(margin.quantities, limit, drawn)
     first = max(moved, key=lambda name: moved[name])
     mechanism = GRAZING if limit.kind in ("contact", "miss", "parting") else NEIGHBOUR
     if first != COEFFICIENTS and moved[first] >= HALF:
@@ -99,11 +114,25 @@ def limiting(margin: Margin) -> Limiting:
     return Limiting(mechanism, limit.what, limit.distance, moved, line)
 
 
-def shares(quantities: Sequence[Quantity], limit: Limit) -> dict[str, float]:
-    """Of the variance of a limit, by what moves it; they sum to 1."""
+def shares(
+    quantities: Sequence[Quantity], limit: Limit, drawn: Boards | None = None
+) -> dict[str, float]:
+    """Of the variance of a limit, by what moves it; they sum to 1.
+
+    drawn : boards on which quantities vary together; None: each varies by itself. A cause's share
+    is the covariance of what it adds with the whole: below 0 where it takes off what another adds.
+    """
     total = dict.fromkeys(NAMES, 0.0)
-    for quantity, slope in zip(quantities, limit.slopes, strict=True):
-        total[cause(quantity)] += float(slope) ** 2
+    if drawn is None:
+        for quantity, slope in zip(quantities, limit.slopes, strict=True):
+            total[cause(quantity)] += float(slope) ** 2
+    else:
+        added = {name: np.zeros(len(drawn)) for name in NAMES}
+        for q, slope in zip(quantities, limit.slopes, strict=True):
+            away = column(drawn, q) - q.nominal
+            added[cause(q)] += float(slope) / q.sigma * (away - away.mean())
+        form = np.sum(list(added.values()), axis=0)
+        total = {name: float(np.mean(one * form)) for name, one in added.items()}
     whole = float(np.sum(list(total.values())))
     return {name: value / whole if whole > 0.0 else 0.0 for name, value in total.items()}
 

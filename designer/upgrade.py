@@ -103,9 +103,25 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     parts = data.setdefault("spread", {}).setdefault("part", [])
     for grade in sorted(set(upgrades.grades.values())):
         names = [name for name, own in upgrades.grades.items() if own == grade]
-        parts.append({"names": names, "grade": grade})
+        picked = [name for name in names if _was_picked_out(modelfile, name, grade)]
+        others = [name for name in names if name not in picked]
+        parts += [{"names": others, "grade": grade}] * bool(others)
+        parts += [{"names": picked, "grade": grade, "law": "uniform"}] * bool(picked)
     read = parse_model_file(toml_text(data), modelfile.source)
     return replace(read, title=modelfile.title, measured=modelfile.measured)
+
+
+def _was_picked_out(modelfile: ModelFile, name: str, grade: float) -> bool:
+    """Whether a part of this grade is one of those that a binned law says were picked out: it lies
+    anywhere within the grade, while the law of what was left does not reach it."""
+    rules = modelfile.spread
+    kind = "resistors" if name.startswith("R") else "capacitors"
+    law = rules.resistors if kind == "resistors" else rules.capacitors
+    whole = name[:-1] if name[-1] in "AB" else name  # of a composite's two parts
+    for rule in rules.part:
+        if rule.law is not None and {name, whole, kind} & set(rule.names):
+            law = rule.law
+    return law.law == "binned" and grade <= law.inner
 
 
 def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:

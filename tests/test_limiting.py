@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,9 +21,12 @@ from designer.limiting import (
     limiting,
     limitings,
     shares,
+    together,
 )
 from designer.margins import Limit, Margin
-from designer.quantities import Quantity
+from designer.quantities import Quantity, quantities
+from designer.spread import Group
+from tests import bench_plans, paper_cases
 from tests.search_cases import catalog, made
 
 QUANTITIES = (
@@ -76,6 +81,50 @@ def test_shares_are_of_the_variance() -> None:
     found = shares(QUANTITIES, limit)
     assert found == {OFFSET: pytest.approx(1 / 6), NULL: 0.0, RAILS: 0.0,
                      COEFFICIENTS: pytest.approx(5 / 6)}  # fmt: skip
+
+
+def test_parts_that_track_count_with_what_they_share() -> None:
+    """Two parts of the dead zone and one of the linear part in a network, against the moments: with
+    a share s two deviations have the covariance s²·var, and each the variance (s² + (1 - s)²)·var.
+    """
+    circuit, s = paper_cases.subject(1).circuit, 0.9
+    grouped = Group("network:1", ("R201", "R203", "R4"), s)
+    spread = replace(bench_plans.SPREAD, groups=(grouped,))
+    drawn = together(circuit, spread, 3)
+    assert drawn is not None
+    every = quantities(circuit, drawn)
+    parts = tuple(q for q in every if q.part in ("R201", "R203", "R4", "R11"))
+    slope = {"R201": 2.0, "R203": -1.0, "R4": 1.5, "R11": 0.5}
+    limit = Limit("what", "fold", 1.0, 1.0, np.array([slope[q.part] for q in parts]))
+    rho = s**2 / (s**2 + (1.0 - s) ** 2)
+    null = 2.0**2 + 1.0 - 2.0 * 2.0 * rho + 1.5 * (2.0 - 1.0) * rho
+    rest = 1.5**2 + 0.5**2 + 1.5 * (2.0 - 1.0) * rho
+    found = shares(parts, limit, drawn)
+    assert found[NULL] == pytest.approx(null / (null + rest), abs=0.03)
+    assert found[COEFFICIENTS] == pytest.approx(rest / (null + rest), abs=0.03)
+    apart = shares(parts, limit)
+    assert apart[NULL] == pytest.approx(5.0 / 7.5)
+    assert abs(apart[NULL] - found[NULL]) > 0.1  # so it matters
+
+
+def test_a_cause_may_take_off_what_another_adds() -> None:
+    circuit = paper_cases.subject(1).circuit
+    spread = replace(bench_plans.SPREAD, groups=(Group("network:1", ("R201", "R4"), 1.0),))
+    drawn = together(circuit, spread, 3)
+    assert drawn is not None
+    parts = tuple(q for q in quantities(circuit, drawn) if q.part in ("R201", "R4"))
+    slope = {"R201": 2.0, "R4": -1.0}
+    limit = Limit("what", "fold", 1.0, 1.0, np.array([slope[q.part] for q in parts]))
+    # One number moves both: (2 - 1)² is left of the variance, 2·(2 - 1) and -1·(2 - 1) its parts.
+    assert shares(parts, limit, drawn)[NULL] == pytest.approx(2.0)
+    assert shares(parts, limit, drawn)[COEFFICIENTS] == pytest.approx(-1.0)
+
+
+def test_only_what_varies_together_is_drawn() -> None:
+    circuit = paper_cases.subject(1).circuit
+    assert together(circuit, bench_plans.SPREAD, 3) is None
+    warm = replace(bench_plans.SPREAD, temperature=(10.0, 40.0))
+    assert together(circuit, warm, 3) is not None
 
 
 def test_causes() -> None:
