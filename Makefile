@@ -11,7 +11,7 @@ LOCK := requirements/constraints.txt
 PARALLEL := --numprocesses auto --dist loadfile
 NEEDS_MORE := slow or kicad or browser or wheel or docs
 
-.PHONY: help env ngspice demo test check-all lint format bench reports lock clean
+.PHONY: help env ngspice demo test check-all lint format bench reports picture lock clean
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 
@@ -67,6 +67,9 @@ bench: $(VENV)/.bench ngspice ## run the benchmarks
 
 reports: env ngspice ## make the reports that this commit lacks
 	@DESIGNER=$(VENV)/bin/designer scripts/make-reports
+
+picture: env ngspice ## draw the README's picture
+	@$(VENV)/bin/python scripts/make-picture
 
 lock: ## resolve pyproject.toml anew into requirements/constraints.txt
 	@PYTHON=$(PYTHON) scripts/lock

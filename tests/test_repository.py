@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import subprocess
 import tomllib
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parent.parent
 CONSTRAINTS = ROOT / "requirements" / "constraints.txt"
@@ -120,3 +123,31 @@ def test_citation_names_the_version_and_the_licence_of_the_package() -> None:
     assert citation["version"] == designer.__version__
     assert citation["license"] == _pyproject()["project"]["license"]
     assert f"## [{designer.__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_readme_s_picture_and_table_are_of_the_same_boards() -> None:
+    """``scripts/make-picture`` writes the counts that it draws into the file."""
+    with Image.open(ROOT / "docs" / "images" / "paper.png") as picture:
+        drawn = picture.info["Yields"].splitlines()
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = text[text.index("Responses, 200 samples") :].split("\n\n", 1)[0].splitlines()[2:]
+    told = []
+    for line in table:
+        omega, *_, rate, _interval, lost, grazing, failed = line.split()
+        assert grazing == failed == "0"
+        ok = 200 - int(lost)
+        assert float(rate) == round(100 * ok / 200, 1)
+        told.append(f"{omega} {ok} of 200")
+    assert len(told) == 9
+    assert drawn == told
+
+
+def test_scripts_in_python_import_what_there_is() -> None:
+    """No target runs the one that draws the picture; here at least its names are looked up."""
+    path = ROOT / "scripts" / "make-picture"
+    loader = SourceFileLoader("make_picture", str(path))
+    spec = spec_from_loader("make_picture", loader)
+    assert spec is not None
+    module = module_from_spec(spec)
+    loader.exec_module(module)
+    assert callable(module.main)
