@@ -137,14 +137,21 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     assert read(out / "search.json")["trade"] == kept
 
     found = Folder(tmp_path / "found")
-    found.begin({"search": ({}, ["search.json"])}, {})
-    found.write("search.json", dumps({"format": 1, "trade": kept}))
+    stages: dict[StageName, Any] = {
+        "search": ({}, ["search.json"]),
+        "design": ({"model": "found"}, []),
+    }
+    found.begin(stages, {})
+    found.write("search.json", dumps({"format": 1, "trade": {**kept, "model": "found"}}))
     found.finish("search")
     choice = rung_choice.choose(found)
     assert choice.rung == "ngspice"
     assert "stood here before" in choice.reason
-    found.write("search.json", dumps({"format": 1, "trade": asdict(choice)}))
+    again = {**asdict(choice), "model": "found"}
+    found.write("search.json", dumps({"format": 1, "trade": again}))
     assert rung_choice.choose(found) == choice  # said once, however often it is handed on
+    found.write("search.json", dumps({"format": 1, "trade": {**again, "model": "another"}}))
+    assert rung_choice.choose(found) == rung_choice.Choice("auto", "")  # of another design
     with_trade(tmp_path / "found", "circuit")
     assert rung_choice.choose(Folder(tmp_path / "found")).rung == "auto"
     found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
