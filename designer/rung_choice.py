@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from designer.errors import InputError
@@ -54,8 +55,8 @@ def choose(folder: Folder) -> Choice:
     stages = folder.manifest.stages if folder.manifest else {}
     if "trade" in stages and stages["trade"].complete:
         return _read(folder, TRADE, "cheapest", _choice)
-    if "search" in stages and stages["search"].complete:
-        return _read(folder, SEARCH, "trade", _kept)
+    if "search" in stages and stages["search"].complete and "design" in stages:
+        return _read(folder, SEARCH, "trade", partial(_kept, stages["design"].inputs.get("model")))
     return Choice("auto", "")
 
 
@@ -108,9 +109,10 @@ def _read(
         raise InputError(folder / name, key, found, wrote) from None
 
 
-def _kept(said: Mapping[str, Any]) -> Choice:
+def _kept(model: object, said: Mapping[str, Any]) -> Choice:
+    """model : hash of the design's model file, which is another where somebody replaced it."""
     kept = said.get("trade")
-    if kept is None:
+    if kept is None or kept["model"] != model:
         return Choice("auto", "")
     if kept["rung"] not in RUNGS:
         raise ValueError(kept["rung"])

@@ -126,6 +126,8 @@ def searched_into(
     folder.begin(design_inputs(final, catalog), design_files.design_provenance(made))
     design_files.write(folder, made, files)
     folder.finish("design")
+    if trade is not None:
+        trade["model"] = final.sha256
     said = {**search_json(found), "trade": trade, "provenance": source}
     folder.write(SEARCH, dumps({**said, "cost": {"seconds": time.perf_counter() - began}}))
     folder.finish("search")

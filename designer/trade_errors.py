@@ -27,11 +27,11 @@ class Compared:
     """One rung at one setting on one response.
 
     response : n-p-q or status. seconds : CPU time of a drive period. gate : whether ngspice's
-    setting passed the numerics gate; None of what ngspice does not compute. right : whether its
-    n-p-q is the truth's (either twin), by truth. error : RMS difference of x1 over its peak;
-    velocity : largest relative difference of an impact's velocity; both by truth, nan where they
-    do not apply. numerical : error against the exact flow of the rung's own equations, or where
-    there is none its own finest run; nan for what it is measured against.
+    setting passed the numerics gate; None of what ngspice does not compute, and of the truth.
+    right : whether its n-p-q is the truth's (either twin), by truth. error : RMS difference of x1
+    over its peak; velocity : largest relative difference of an impact's velocity; both by truth,
+    nan where they do not apply. numerical : error against the exact flow of the rung's own
+    equations, or where there is none its own finest run; nan for what it is measured against.
     """
 
     label: Label

@@ -32,6 +32,7 @@ from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.responses import ModelResponse, on_circuit
 from designer.stopwatch import Entrant, SpiceClock, here, rounds
 from designer.system import Array, Drive
+from designer.trade_gate import Run
 from designer.waveform_orbit import Read, Reading, read
 from designer.workers import SpicePool
 
@@ -59,7 +60,8 @@ class Answer:
     level : names the setting alike for all responses. settings : of the solver. orbit : in model
     units as far as it is used: n-p-q, status, impacts. shown : (n · POINTS,) first displacement in
     model units; empty where there is none. seconds : CPU time of a drive period. reason : why there
-    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs.
+    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs,
+    and of the finest on ``TOP``.
     """
 
     rung: str
@@ -202,22 +204,24 @@ def _spice(
     on = gate.warmed(pool, [replace(subject, rung=rung) for rung in SPICE_RUNGS])
     ladder = [(max(1, round(first / factor)), reltol) for factor, reltol in levels]
     names = [f"step ×{factor:g}, reltol {reltol:g}" for factor, reltol in levels]
-    # The other method is compared at the finer one of two settings: never at the coarsest.
-    kinds = [("trap", k) for k in range(len(levels))]
-    kinds += [("gear", k) for k in range(1, len(levels))]
-    asks = [
-        (one, SolverSettings(method, one.period / ladder[k][0], ladder[k][1]))
-        for one in on
-        for method, k in kinds
-    ]
-    jobs = [gate.job(one, way, keep=way.method == "trap") for one, way in asks]
+    last = len(levels) - 1
+    asks: list[tuple[Subject, int, SolverSettings]] = []
+    for one in on:
+        for k, own in enumerate(ladder):
+            settings = _own(one, own)
+            asks.append((one, k, settings))
+            if not (one.rung == TOP and k == last):  # what is measured against needs no gate
+                asks += [(one, k, other) for other in trade_gate.companions(settings)]
+    jobs = [gate.job(one, said, keep=said == _own(one, ladder[k])) for one, k, said in asks]
     heard = dict(pool.map(jobs))
-    for i, one in enumerate(on):
-        own = {kind: heard[i * len(kinds) + j] for j, kind in enumerate(kinds)}
-        runs = [own["trap", k] for k in range(len(levels))]
-        verdicts = trade_gate.passed(one, runs, [own["gear", k] for k in range(1, len(levels))])
-        for k, (found, passed) in enumerate(zip(runs, verdicts, strict=True)):
-            settings = asks[i * len(kinds) + k][1]
+    runs: dict[tuple[Rung, int], list[Run]] = {}
+    for i, (one, k, _) in enumerate(asks):
+        runs.setdefault((one.rung, k), []).append(heard[i])
+    for one in on:
+        for k, own in enumerate(ladder):
+            settings = _own(one, own)
+            found, *beside = runs[one.rung, k]
+            passed = trade_gate.passed(one, found, (beside[0], beside[1])) if beside else None
             entrant = _timed(one, settings, clock)
             said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
             said["discarded_periods"] = one.discard
@@ -230,6 +234,12 @@ def _spice(
                 Answer(one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
                 entrant,
             )
+
+
+def _own(subject: Subject, ladder: tuple[int, float]) -> SolverSettings:
+    """Settings of so many steps a period and this tolerance."""
+    steps, reltol = ladder
+    return SolverSettings("trap", subject.period / steps, reltol)
 
 
 def _timed(subject: Subject, settings: SolverSettings, clock: SpiceClock) -> Entrant:

@@ -94,6 +94,16 @@ def test_the_final_study_takes_its_rung_by_a_trade_and_says_so(
     assert len(heard.notes) == 1
 
 
+def test_a_rung_that_is_asked_for_stands_in_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = Options(rung="ngspice").command("search", Path("m.toml"), Path("out"))
+    assert "--rung ngspice" in said
+    assert "--rung" not in Options().command("search", Path("m.toml"), Path("out"))
+    assert run("search", tmp_path, "--yield", 0.9, "--rung", "exact", "-q") == 2
+    assert "--rung" in capsys.readouterr().err  # a cure is decided on the exact circuit
+
+
 @pytest.mark.parametrize("stage", ["design", "search"])
 def test_a_trade_counts_for_a_search_of_the_same_model_file(tmp_path: Path, stage: Any) -> None:
     folder = with_trade(tmp_path, "ideal", stage, "this")
@@ -127,14 +137,21 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     assert read(out / "search.json")["trade"] == kept
 
     found = Folder(tmp_path / "found")
-    found.begin({"search": ({}, ["search.json"])}, {})
-    found.write("search.json", dumps({"format": 1, "trade": kept}))
+    stages: dict[StageName, Any] = {
+        "search": ({}, ["search.json"]),
+        "design": ({"model": "found"}, []),
+    }
+    found.begin(stages, {})
+    found.write("search.json", dumps({"format": 1, "trade": {**kept, "model": "found"}}))
     found.finish("search")
     choice = rung_choice.choose(found)
     assert choice.rung == "ngspice"
     assert "stood here before" in choice.reason
-    found.write("search.json", dumps({"format": 1, "trade": asdict(choice)}))
+    again = {**asdict(choice), "model": "found"}
+    found.write("search.json", dumps({"format": 1, "trade": again}))
     assert rung_choice.choose(found) == choice  # said once, however often it is handed on
+    found.write("search.json", dumps({"format": 1, "trade": {**again, "model": "another"}}))
+    assert rung_choice.choose(found) == rung_choice.Choice("auto", "")  # of another design
     with_trade(tmp_path / "found", "circuit")
     assert rung_choice.choose(Folder(tmp_path / "found")).rung == "auto"
     found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))

@@ -15,12 +15,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from designer import cli, hearing, rung_choice, trade_gate, trade_pieces, trade_rungs, trade_yield
+from designer import (
+    cli,
+    gate,
+    hearing,
+    rung_choice,
+    trade_gate,
+    trade_pieces,
+    trade_rungs,
+    trade_yield,
+)
 from designer.circuit_kernel import POINTS
 from designer.deck import SolverSettings
 from designer.errors import InputError
 from designer.folder import Folder
-from designer.gate import BOUND
+from designer.gate import BOUND, RELTOL
 from designer.jsonout import dumps
 from designer.manifest import Stage
 from designer.ngspice import SimulationFailed
@@ -28,6 +37,7 @@ from designer.options import Options
 from designer.orbit import Orbit, OrbitStatus
 from designer.progress import Progress
 from designer.rung_choice import choose, chosen
+from designer.stopwatch import SpiceClock
 from designer.trade import (
     IDEAL,
     IMPACT,
@@ -47,6 +57,8 @@ from designer.trade_label import Label
 from designer.trade_rungs import Answer
 from designer.trade_yield import BoardTrade, LeftOut, Tally
 from designer.waveform_orbit import Read
+from designer.workers import SpicePool
+from tests.paper_cases import synthesised
 
 WAVEFORM = np.sin(2.0 * np.pi * np.arange(POINTS) / POINTS)
 MODEL = """format = 1
@@ -245,21 +257,44 @@ def test_the_gate_of_a_setting_asks_two_steps_and_two_methods(rung: str) -> None
         return Read(kind, np.full((9, 4), 1.0 + off), None)
 
     found = replace(orbit(), extremes=np.array([[-1.0, 2.0]] * 4))
-    other = replace(found, p=2)
     subject: Any = SimpleNamespace(rung=rung, orbit=found)
-    near, far = 1.9 * BOUND, 2.1 * BOUND  # over a peak of 2
-    good = [run(found), run(found, near), run(found)]
-    assert trade_gate.passed(subject, good, [run(found)] * 2) == (True, True, True)
-    assert trade_gate.passed(subject, good, [run(found, far)] * 2) == (False, False, False)
-    assert trade_gate.passed(subject, good, [run(found), run(other)]) == (True, False, False)
-    failed = SimulationFailed("a reason")
-    rough = [failed, run(found), run(found)]
-    assert trade_gate.passed(subject, rough, [run(found)] * 2) == (False, True, True)
-    step = [run(found, far), run(found), run(found)]
-    assert trade_gate.passed(subject, step, [run(found)] * 2) == (False, True, True)
-    assert trade_gate.passed(subject, [run(found)], []) == (False,)
-    unknown = Orbit(OrbitStatus.NOT_SETTLED)
-    assert trade_gate.passed(subject, [run(unknown)] * 3, [run(unknown)] * 2) == (False,) * 3
+    near, far = run(found, 1.9 * BOUND), run(found, 2.1 * BOUND)  # over a peak of 2
+    same, other = run(found), run(replace(found, p=2))
+    assert trade_gate.passed(subject, same, (near, same))
+    assert trade_gate.passed(subject, other, (other, other))  # the rung's own n-p-q
+    for odd in (far, other, SimulationFailed("a reason")):
+        assert not trade_gate.passed(subject, odd, (same, same))
+        assert not trade_gate.passed(subject, same, (odd, same))
+        assert not trade_gate.passed(subject, same, (same, odd))
+    unknown = run(Orbit(OrbitStatus.NOT_SETTLED))
+    assert not trade_gate.passed(subject, unknown, (unknown, unknown))
+    ideal: Any = SimpleNamespace(rung="ideal", orbit=found)
+    assert not trade_gate.passed(ideal, other, (other, other))
+    half, gear = trade_gate.companions(SolverSettings("trap", 2e-6, 1e-5))
+    assert (half.method, half.max_step, half.reltol) == ("trap", 1e-6, 1e-5)
+    assert (gear.method, gear.max_step, gear.reltol) == ("gear", 1e-6, 1e-5)
+
+
+@pytest.mark.slow
+def test_a_setting_passes_where_the_gate_of_a_study_passes_it() -> None:
+    """1-6-6 of the paper's design: neither the gate's first step passes nor half of it."""
+    design = synthesised()
+    response = next(r for r in design.found if r.omega == 0.284)
+    with SpicePool(2, timeout=900.0) as pool, SpicePool(1, timeout=900.0) as timed:
+        (word,) = gate.check(pool, [trade_rungs.subject(design, response)])
+        found = trade_rungs.measured(
+            design,
+            response,
+            pool,
+            SpiceClock(timed),
+            levels=((1.0, RELTOL), (0.5, RELTOL), (0.25, RELTOL)),
+            rounds_=1,
+        )
+    ideal = [a for a in found.answers if a.rung == "ideal"]
+    assert word.tried == tuple(a.settings["steps_a_period"] for a in ideal)
+    assert [a.gate for a in ideal] == [False, False, word.passed] == [False, False, True]
+    assert found.settings == word.settings
+    assert found.seconds > 0.0
 
 
 def test_velocities_are_compared_in_order_of_size_and_across_twins() -> None:
