@@ -135,8 +135,8 @@ def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> Eq
         return asked + [_dc(design, rest, told=told) for rest in curve]
 
     heard = dict(pool.map(jobs(told=True)))
-    # Told where a rectifier rests, its diodes at the drop of a straight line, ngspice may end in vain
-    # where it finds the operating point by itself.
+    # Told where a rectifier rests, its diodes' drop a constant, ngspice may end in vain where it
+    # finds the operating point by itself.
     again = [i for i, sweep in heard.items() if _unconverged(sweep)]
     alone = jobs(told=False)
     heard |= {again[k]: sweep for k, sweep in pool.map(alone[i] for i in again)}
