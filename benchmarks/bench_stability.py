@@ -343,10 +343,10 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
         "## ngspice",
         "",
         _filled(
-            "Designs of the tool itself, E12 resistors and E6 capacitors; one response each on the "
-            "nominal board, from the exact circuit's orbit, behind the numerics gate with at most "
-            f"{stability_spice.LEVELS} of its step sizes. The axis k0 has one stop, ζ = 0.2, "
-            "b = 0.5 and ω = 0.9, where every stiffness shows 1-1-0. *Strobes differ* and *RMS* "
+            "Designs of the tool itself, E12 resistors and E6 capacitors, side conditions of swing "
+            "and load; one response each on the nominal board, from the exact circuit's orbit, "
+            f"behind the numerics gate with at most {stability_spice.LEVELS} step sizes. "
+            "The axis k0 has one stop, ζ = 0.2, b = 0.5 and ω = 0.9, where every stiffness shows 1-1-0. *Strobes differ* and *RMS* "
             "are of the peak of each state, RMS against the exact circuit; on `dynamic` and `full` "
             "part of it is the op-amps' bandwidth, which the exact circuit does not have."
         ),
@@ -365,8 +365,8 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
         "## Synthesis at the edges",
         "",
         _filled(
-            "Of the paper's case one figure at a time. *Costs* names the side conditions without "
-            "which the match would be better."
+            "Of the paper's case one figure at a time, side conditions of swing and load. *Costs* "
+            "names those without which the match would be better."
         ),
         "",
         *edge_table(edges),

@@ -27,7 +27,10 @@ MODEL: dict[str, Any] = {
 }  # fmt: skip
 ONE_SIDED: dict[str, Any] = {"zeta": 0.2, "b": 0.5, "sides": "upper"}
 """With ω = 0.9 a 1-1-0 at every stiffness of the stop: the paper's case is chaotic there."""
-CIRCUIT: dict[str, Any] = {"opamp": "TL074C", "resistors": "E12", "capacitors": "E6"}
+CIRCUIT: dict[str, Any] = {
+    "opamp": "TL074C", "resistors": "E12", "capacitors": "E6", "side_conditions": ["swing", "load"],
+}  # fmt: skip
+"""With every side condition synthesis takes up to a minute at the ends of the domain."""
 LEVELS = 3
 """Step sizes that the gate may try here, of its five."""
 BOARDS, SEED = 4, 77
@@ -75,7 +78,7 @@ def _toml(value: Any) -> str:
 def cases() -> Iterator[Case]:
     """Designs that ngspice is asked about."""
     yield Case("paper's case", 0.0, 0.85, {}, {}, ("ideal", "dynamic", "full"))
-    for k0 in (0.99, 0.999, 0.9999):
+    for k0 in (0.99, 0.9999):
         yield Case("k0", k0, 0.9, {**ONE_SIDED, "k0": k0}, {})
     yield Case("zeta", 0.01, 0.85, {"zeta": 0.01}, {})
     yield Case("zeta", 0.001, 2.0, {"zeta": 0.001, "b": 0.1}, {})
@@ -85,11 +88,11 @@ def cases() -> Iterator[Case]:
         yield Case("small clearance, b", b, 0.85, {"b": b}, {})
     yield Case("large clearance, b", 1.0, 0.85, {"b": 1.0, "zeta": 0.01}, {})
     low = {"resistor_range": [100.0, 1e4], "capacitor_range": [1e-8, 1e-5]}
-    yield Case("resistors up to", 1e4, 0.85, {}, {**low, "side_conditions": False})
+    yield Case("resistors up to", 1e4, 0.85, {}, low)
     high = {"resistor_range": [1e5, 1e7], "capacitor_range": [1e-11, 1e-8]}
-    yield Case("resistors from", 1e5, 0.85, {}, {**high, "side_conditions": False})
+    yield Case("resistors from", 1e5, 0.85, {}, high)
     yield Case("rectifier", 0.25, 0.85, {}, {"dead_zone": "rectifier"})
-    yield Case("rectifier, b", 1e-2, 0.85, {"b": 1e-2}, {"dead_zone": "rectifier"})
+    yield Case("rectifier, b", 0.05, 0.85, {"b": 0.05}, {"dead_zone": "rectifier"})
     for grade in (0.05, 0.2):
         yield Case("spread", grade, 0.85, {}, {}, ("ideal",), grade)
 
