@@ -30,6 +30,7 @@ from designer.deck import Excitation, SolverSettings
 from designer.mechanics import SecondOrderSystem
 from designer.ngspice import SimulationFailed, Sweep
 from designer.reduction import Reduction
+from designer.remedies import did_not_converge
 from designer.responses import ModelResponse, peaks
 from designer.synthesis import Design
 from designer.system import Array
@@ -87,6 +88,11 @@ class EquationCheck:
         return all(f.passed for f in self.findings)
 
     @property
+    def open(self) -> bool:
+        """Whether all that speaks against it is that ngspice gave no answer."""
+        return not self.passed and all(f.passed or f.reason for f in self.findings)
+
+    @property
     def worst(self) -> Finding:
         """The finding nearest to its bound, or past it; one without an answer first."""
         return max(self.findings, key=lambda f: np.inf if f.reason else f.deviation / f.bound)
@@ -122,10 +128,18 @@ def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> Eq
     rests = _rests(design, model, found)
     centre = _resonance(model)
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
-    jobs: list[SpiceJob[Any]] = [_ac(design, rest, low, high) for rest in rests]
     curve = rests if design.circuit.stops else ()
-    jobs += [_dc(design, rest) for rest in curve]
-    heard = dict(pool.map(jobs))
+
+    def jobs(told: bool) -> list[SpiceJob[Any]]:
+        asked = [_ac(design, rest, low, high, told=told) for rest in rests]
+        return asked + [_dc(design, rest, told=told) for rest in curve]
+
+    heard = dict(pool.map(jobs(told=True)))
+    # Told where a rectifier rests, its diodes' drop a constant, ngspice may end in vain where it
+    # finds the operating point by itself.
+    again = [i for i, sweep in heard.items() if _unconverged(sweep)]
+    alone = jobs(told=False)
+    heard |= {again[k]: sweep for k, sweep in pool.map(alone[i] for i in again)}
     findings = [_transfer(design, model, rest, heard[i]) for i, rest in enumerate(rests)]
     lines = {rest.contact: heard[len(rests) + i] for i, rest in enumerate(curve)}
     return EquationCheck((*findings, *(_curve(design, model, lines) if lines else ())), low, high)
@@ -226,16 +240,26 @@ def _rests(
 # What ngspice is asked
 
 
-def _deck(design: Design, source: str, analysis: str, generator: float, contact: int) -> str:
+def _deck(
+    design: Design,
+    source: str,
+    analysis: str,
+    generator: float,
+    contact: int,
+    *,
+    told: bool,
+    turned: bool = False,
+) -> str:
     """The deck that is simulated in time, with another generator line and analysis.
 
-    generator, contact : at the first operating point [V], which ngspice looks for from where the
-    reduction says it is: from zero it does not find every one.
+    generator, contact : at the first operating point [V]. told : ngspice looks for it from where
+    the reduction says it is; from zero it does not find every one, nor does it find every one from
+    there. turned : the generator's poles are exchanged, so that its voltage counts negative.
     """
     circuit = design.circuit
     board = nominal_board(circuit, ideal=True)
     try:
-        known = rest(Reduction(circuit, board), generator, contact)
+        known = rest(Reduction(circuit, board), generator, contact) if told else []
     except ArithmeticError:  # a floating net: ngspice shall say it
         known = []
     resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in known)] if known else []
@@ -251,7 +275,8 @@ def _deck(design: Design, source: str, analysis: str, generator: float, contact:
     for line in text.splitlines():
         word = line.split(maxsplit=1)[0]
         if word == circuit.generator.name:
-            line = f"{circuit.generator.name} {circuit.generator.net} 0 {source}"
+            poles = f"0 {circuit.generator.net}" if turned else f"{circuit.generator.net} 0"
+            line = f"{circuit.generator.name} {poles} {source}"
         elif word == ".tran":
             line = "\n".join([*resting, analysis])
         lines.append(line)
@@ -277,22 +302,28 @@ def _volts(design: Design, force: float) -> float:
     return -force * design.amplitude()
 
 
-def _ac(design: Design, resting: _Rest, low: float, high: float) -> SpiceJob[Sweep]:
+def _ac(design: Design, resting: _Rest, low: float, high: float, *, told: bool) -> SpiceJob[Sweep]:
     held = 0.0 if resting.contact == 0 else _volts(design, 0.5 * (resting.near + resting.far))
-    text = _deck(
-        design, f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}", held, resting.contact
-    )
+    source, card = f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
+    text = _deck(design, source, card, held, resting.contact, told=told)
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _as_it_is, "ac")
 
 
-def _dc(design: Design, resting: _Rest) -> SpiceJob[Sweep]:
-    first, last = sorted((_volts(design, resting.near), _volts(design, resting.far)))
+def _dc(design: Design, resting: _Rest, *, told: bool) -> SpiceJob[Sweep]:
+    """From the near end, where the stage carries least; upwards, as every sweep goes."""
+    near, far = _volts(design, resting.near), _volts(design, resting.far)
+    turned = far < near
+    first, last = (-near, -far) if turned else (near, far)
     step = (last - first) / POINTS
     # Half a step more: the last point is not lost to rounding.
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
     nets = (design.circuit.state_nets[0], STAGE)
-    text = _deck(design, "DC 0", card, first, resting.contact)
+    text = _deck(design, "DC 0", card, near, resting.contact, told=told, turned=turned)
     return SpiceJob(text, nets, last - 0.01 * step, _as_it_is, "dc")
+
+
+def _unconverged(heard: Sweep | SimulationFailed) -> bool:
+    return isinstance(heard, SimulationFailed) and did_not_converge(heard)
 
 
 def _as_it_is(sweep: Sweep) -> Sweep:

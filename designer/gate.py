@@ -273,18 +273,19 @@ def first_steps(subject: Subject, contact: float) -> int:
     return min(max(STEPS_PER_PERIOD, wanted), MOST_STEPS)
 
 
-def check(pool: SpicePool, subjects: Sequence[Subject]) -> list[GateResult]:
+def check(pool: SpicePool, subjects: Sequence[Subject], levels: int = LEVELS) -> list[GateResult]:
     """Find the coarsest settings that pass, for the nominal board of each response.
 
     All subjects move through the levels together, so that the workers stay busy. On a rung above
-    ``ideal`` a short run first says how many periods are discarded (``warm_start``).
+    ``ideal`` a short run first says how many periods are discarded (``warm_start``). levels : how
+    many step sizes are tried.
     """
     subjects = warmed(pool, subjects)
     contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
     steps = [first_steps(s, contact) for s, contact in zip(subjects, contacts, strict=True)]
     results: list[GateResult | None] = [None] * len(subjects)
     tried: list[list[int]] = [[] for _ in subjects]
-    for level in range(LEVELS):
+    for level in range(levels):
         open_ = [i for i, r in enumerate(results) if r is None or not r.passed]
         tasks = []
         for i in open_:

@@ -217,6 +217,23 @@ def test_a_sign_that_is_wrong_is_found(pool: SpicePool) -> None:
     assert not check(design, synthesis.found, pool).passed
 
 
+@pytest.mark.parametrize("values", [rectifier(5.0), bought(rectifier(5.0))])
+def test_a_diode_that_ngspice_finds_better_alone(pool: SpicePool, values: dict[str, float]) -> None:
+    """Told where the op-amps rest, ngspice ends here with "source stepping failed"."""
+    result = check(around(stage("rectifier", "both", values), stage_model("both")), (), pool)
+    assert set(by_name(result)) == ALL
+    assert result.passed, [str(f) for f in result.findings]
+
+
+def test_a_check_without_an_answer_is_open_and_a_wrong_one_is_not() -> None:
+    right, wrong = Finding("slope", 0.1, 0.2), Finding("slope", 0.3, 0.2)
+    silent = Finding("slope", float("nan"), 0.2, "no answer")
+    assert EquationCheck((right, silent)).open
+    assert not EquationCheck((right, silent)).passed
+    assert not EquationCheck((wrong, silent)).open
+    assert not EquationCheck((right,)).open
+
+
 def test_a_deck_that_ngspice_cannot_solve_says_why(pool: SpicePool) -> None:
     synthesis = made("paper")
     circuit = synthesis.design.circuit
