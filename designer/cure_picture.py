@@ -11,50 +11,34 @@ grades. z depends a little on the choice, so it is taken again of each choice th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from designer import margins
 from designer.boards import Boards
-from designer.cure_branch import PLACE, TRIM, Branch
+from designer.catalog import Catalog
+from designer.circuit import Circuit
+from designer.cure_branch import Branch
 from designer.cure_program import Demand, Option, Program, Slot
 from designer.cure_slots import PartSlot, part_slots
-from designer.cure_study import VERDICTS, Book, asked, measure, plan_of
+from designer.cure_study import Book, asked
+from designer.cure_ways import SAMPLES, Looker, Way, foretold
 from designer.margins import Margin
-from designer.responses import ModelResponse
 from designer.spread import Spread, draw_many
 from designer.system import Array
-from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
-from designer.verdict import BLOCK, Answer, Question, StudyPlan, count
-from designer.yield_maps import YieldMap, yield_map
+from designer.upgrade import Upgrades, rebuilt, upgraded_file
+from designer.verdict import StudyPlan
 
-SAMPLES = 250
-"""Boards on which a picture is taken: their verdicts choose the limits."""
 DRAWN = 4000
 """Boards that a linear form's distribution is taken from."""
+KEPT = 8
+"""Choices whose boards are kept."""
 CROSSINGS = 4
 """Lost boards of each response whose way to the loss is followed."""
-MAP_POINTS, MAP_BOARDS, TRIM_BOARDS = 7, 50, 100
 MOVED, TRIMMED = 1.0, 5.0
 """Trouble of another setting of the generator, and of trimming each board."""
 STREAM = "cure:"
-
-
-@dataclass(frozen=True)
-class Way:
-    """One way of showing a response.
-
-    response : its number. kind : "as it is", "omega", "b" or "trim". place : another than stated.
-    margin : None for trim, which has been measured instead: rate.
-    """
-
-    response: int
-    kind: str
-    question: Question
-    place: Place | None = None
-    margin: Margin | None = None
-    rate: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -68,6 +52,7 @@ class Picture:
     ratios: tuple[Mapping[str, float], ...]
     trim: float
     seed: int
+    _drawn: dict[tuple[int, ...], Boards] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -104,16 +89,26 @@ class Picture:
         chosen = pick[len(self.parts) :]
         return tuple(row[i] for row, i in zip(self.ways, chosen, strict=True))
 
-    def boards(self, pick: Sequence[int]) -> Boards:
-        """Boards of this choice, for its linear forms."""
+    def spread(self, pick: Sequence[int]) -> tuple[Circuit, Spread]:
+        """The circuit and the spread of this choice, each response where it was."""
         made = self.branch.made
-        upgrades = replace(self.upgrades(pick), places={}, opamp=None, dead_zone=None, trim=None)
+        chosen = replace(self, ways=()).upgrades(pick[: len(self.parts)])
+        upgrades = replace(chosen, opamp=None, dead_zone=None)
         modelfile = upgraded_file(made.modelfile, upgrades)
         circuit = made.design.circuit
         if upgrades.reference is not None:
-            circuit = with_parts_kept(made, modelfile).design.circuit
-        spread = Spread.of(modelfile, circuit, made.catalog)
-        return draw_many(circuit, spread, self.seed, range(DRAWN), STREAM)
+            circuit = rebuilt(made.design, modelfile, made.catalog)
+        return circuit, Spread.of(modelfile, circuit, made.catalog)
+
+    def boards(self, pick: Sequence[int]) -> Boards:
+        """Boards of this choice, for its linear forms."""
+        key = tuple(pick[: len(self.parts)])
+        if key not in self._drawn:
+            circuit, spread = self.spread(key)
+            while len(self._drawn) >= KEPT:
+                self._drawn.pop(next(iter(self._drawn)))
+            self._drawn[key] = draw_many(circuit, spread, self.seed, range(DRAWN), STREAM)
+        return self._drawn[key]
 
     def predicted(
         self,
@@ -226,126 +221,84 @@ def picture(
 ) -> Picture | None:
     """The picture of a branch; None where its nominal circuit does not show every response.
 
-    trim : half-width of the band of the DC offset. without : kinds of upgrades that are not wanted.
-    progress : called once a piece of work.
+    The response that the fewest boards show is looked at first, and where all its ways are hopeless
+    the branch is, and no more of it is looked at. trim : half-width of the band of the DC offset.
+    without : kinds of upgrades that are not wanted. progress : called once a piece of work.
     """
     made = branch.made
     parts = part_slots(made, without)
     questions = [q for q in asked(made, made.found) if q is not None]
     if len(questions) < len(made.found):
         return None
-    rows: list[list[Way]] = []
-    for r, question in enumerate(questions):
-        row = [Way(r, "as it is", question)]
-        rows.append(row)
-        plan = plan_of(made, question, seed)
-        seen = measure(plan, target, book, least=SAMPLES, most=SAMPLES, jobs=jobs)
-        progress()
-        if seen.counts.rate >= target:
-            continue
-        if PLACE not in without:
-            row += _moved(branch, r, made.found[r], plan, jobs, progress)
-        if TRIM not in without and trim > 0.0:
-            few = measure(
-                plan, target, book, trim=trim, least=TRIM_BOARDS, most=TRIM_BOARDS, jobs=jobs
-            )
-            progress()
-            row.append(Way(r, "trim", question, rate=few.counts.rate))
-    ways = _with_margins(branch, rows, seed, book, jobs, progress)
-    return Picture(branch, parts, ways, _ratios(branch, parts, seed), trim, seed)
+    bare = Picture(branch, parts, (), (), trim, seed)
+    pick = finest(parts, made.catalog)
+    circuit, spread = bare.spread(pick)
+    looker = Looker(
+        branch, target, seed, book, trim, without, bare.boards(pick),
+        StudyPlan(circuit, spread, seed, SAMPLES, ()), jobs, progress,
+    )  # fmt: skip
+    rows = [[looker.seen(Way(r, "as it is", question))] for r, question in enumerate(questions)]
+    out = False
+    for r in sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r)):
+        rows[r] = looker.ways(rows[r][0])
+        out = all(way.hopeless for way in rows[r])
+        if out:
+            break
+    bare = replace(
+        bare, ways=tuple(map(tuple, rows)), ratios=() if out else _ratios(branch, parts, seed)
+    )
+    # What limits the design as it is is told in any case.
+    told = branch.upgrades == Upgrades()
+    open_ways = [
+        (r, w)
+        for r, row in enumerate(rows)
+        for w, way in enumerate(row)
+        if (told and w == 0) or not (out or way.certain or way.hopeless or way.kind == "trim")
+    ]
+    if told and out:
+        bare = replace(bare, ratios=_ratios(branch, parts, seed))
+    return pictured(bare, open_ways, jobs, progress)
 
 
-def _moved(
-    branch: Branch,
-    number: int,
-    response: ModelResponse,
-    plan: StudyPlan,
+def pictured(
+    seen: Picture,
+    which: Sequence[tuple[int, int]],
     jobs: int,
-    progress: Callable[[], None],
-) -> list[Way]:
-    """Other places of a response in its window, where more boards show it: over ω, over b."""
-    out = []
-    for over in ("omega", "b"):
-        found = yield_map(
-            plan, 0, "b" if over == "b" else "omega", response.b,
-            samples=MAP_BOARDS, points=MAP_POINTS, jobs=jobs,
-        )  # fmt: skip
-        progress()
-        best = best_place(found)
-        if best is None:
-            continue
-        value = float(f"{best:.4g}")
-        place = Place(value, response.b) if over == "omega" else Place(response.omega, value)
-        base = branch.made
-        moved = with_parts_kept(
-            base, upgraded_file(base.modelfile, Upgrades(places={number: place}))
-        )
-        broken = {c.quantity for c in base.design.checks if not c.holds}
-        if any(not c.holds and c.quantity not in broken for c in moved.design.checks):
-            continue
-        question = asked(moved, [moved.found[number]])[0]
-        if question is not None:
-            out.append(Way(number, over, question, place))
-    return out
-
-
-def best_place(found: YieldMap) -> float | None:
-    """The middle of the longest row of settings with the highest yield; None where the setting in
-    use has it.
-
-    Not ``recommended``, which stays where it is unless another setting is proved to be better: a
-    cure is measured before it is believed.
-    """
-    values, rate = np.array(found.axes[0].values), found.rate
-    if rate[found.axes[0].values.index(found.used)] >= rate.max():
-        return None
-    equal = np.flatnonzero(rate == rate.max())
-    rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)
-    longest = max(rows, key=lambda row: float(values[row[-1]] - values[row[0]]))
-    middle = 0.5 * (values[longest[0]] + values[longest[-1]])
-    return float(values[longest[int(np.argmin(np.abs(values[longest] - middle)))]])
-
-
-def _with_margins(
-    branch: Branch,
-    rows: Sequence[Sequence[Way]],
-    seed: int,
-    book: Book,
-    jobs: int,
-    progress: Callable[[], None],
-) -> tuple[tuple[Way, ...], ...]:
-    """The ways with their margins; those that are trimmed have none."""
-    made = branch.made
-    asked_for = [w for row in rows for w in row if w.kind != "trim"]
+    progress: Callable[[], None] = lambda: None,
+) -> Picture:
+    """The same with margins of these ways (response, way)."""
+    if not which:
+        return seen
+    made = seen.branch.made
     circuit = made.design.circuit
     spread = Spread.of(made.modelfile, circuit, made.catalog)
-    by = []
-    for w in asked_for:
-        plan = StudyPlan(circuit, spread, seed, SAMPLES, (w.question,))
-        letters = "".join(book.block(plan, block, None, jobs)[0] for block in plan.blocks(BLOCK))
-        by.append([_answer(sample, letter) for sample, letter in enumerate(letters)])
+    boards = draw_many(circuit, spread, seen.seed, range(SAMPLES))
+    questions = [seen.ways[r][w].question for r, w in which]
+    answers = []
+    for question in questions:
+        answers.append(foretold(boards, question, jobs))
         progress()
-    boards = draw_many(circuit, spread, seed, range(SAMPLES))
     found = margins.margins(
-        circuit,
-        [w.question for w in asked_for],
-        boards,
-        by,
-        count=CROSSINGS,
-        jobs=jobs,
-        progress=progress,
+        circuit, questions, boards, answers, count=CROSSINGS, jobs=jobs, progress=progress
     )
-    known = {
-        id(w): replace(w, margin=m, rate=count(row).rate)
-        for w, m, row in zip(asked_for, found, by, strict=True)
-    }
-    return tuple(tuple(known.get(id(w), w) for w in row) for row in rows)
+    known = dict(zip(which, found, strict=True))
+    ways = tuple(
+        tuple(
+            replace(way, margin=known[r, w]) if (r, w) in known else way
+            for w, way in enumerate(row)
+        )
+        for r, row in enumerate(seen.ways)
+    )
+    return replace(seen, ways=ways)
 
 
-def _answer(sample: int, letter: str) -> Answer:
-    """As much of an answer as margins need."""
-    nan = float("nan")
-    return Answer(sample, 0, VERDICTS[letter], "", "", nan, nan, nan, nan, 0)
+def finest(parts: Sequence[PartSlot], catalog: Catalog) -> list[int]:
+    """The option of each slot whose parts vary least."""
+    out = []
+    for p in parts:
+        grades = p.grades or tuple(catalog.reference(name).grade for name in p.models)
+        out.append(int(np.argmin(grades)) if grades else len(p.slot.options) - 1)
+    return out
 
 
 def _ratios(

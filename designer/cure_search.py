@@ -15,12 +15,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from designer.api import Synthesis
-from designer.boards import Boards
-from designer.cure_branch import Branch, Refused, applied, branches
-from designer.cure_picture import Picture, Way, picture
+from designer.cure_branch import Branch, Refused, branches
+from designer.cure_learning import cut, shown
+from designer.cure_picture import Picture, finest, picture, pictured
 from designer.cure_program import Program, cheapest
-from designer.cure_study import Book, Measured, asked, fresh, measure, measure_together, plan_of
-from designer.cure_trial import Cure, Trial, measured_none
+from designer.cure_study import (
+    FIRST,
+    MOST,
+    Book,
+    Measured,
+    asked,
+    fresh,
+    measure,
+    measure_together,
+    plan_of,
+)
+from designer.cure_trial import Cure, Trial
 from designer.limiting import limiting, together
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
@@ -36,15 +46,10 @@ ROUNDS = 10
 """Choices that are measured before the search gives up."""
 TRIES = 16
 """Programs that are solved for one choice: each takes the quantiles of the one before."""
-TIGHTER = 0.95
-"""Of a demand's room: the least by which it is tightened where a promise was not kept."""
 FRONT_TARGETS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 FRONT_POINTS = 5
 """Points of the front that are measured beside those of the rounds."""
 FRONT_BOARDS = 500
-LARGEST_STEP = 2.0
-"""The factor by which a measurement brings a loss nearer than the picture has it, at most: one that
-is so wrong says little about by how much."""
 
 
 def find_cure(
@@ -210,15 +215,18 @@ class _Search:
         """The cheapest choice on one branch that its picture promises to be enough."""
         seen = self.pictures[which]
         base = tuple(0 for _ in seen.slots)
-        z = seen.quantiles(target, seen.boards(base))
         shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
         spoiled = frozenset((r, w) for k, r, w in self.spoiled if k == which)
         spoiled |= {
             (r, w)
             for r, row in enumerate(seen.ways)
             for w, way in enumerate(row)
-            if way.margin is None and way.rate < target
+            if (way.margin is None and way.rate < target)
+            or (way.hopeless and target >= self.target)
         }
+        if any(all((r, w) in spoiled for w in range(len(row))) for r, row in enumerate(seen.ways)):
+            return None
+        z = seen.quantiles(target, seen.boards(base))
         enough: dict[tuple[int, ...], tuple[float, ...]] = {}
         tried: set[tuple[int, ...]] = set()
         for _ in range(TRIES):
@@ -235,7 +243,7 @@ class _Search:
             if short:
                 for r in short:
                     key = r, pick[len(seen.parts) + r]
-                    shrink[key] = shrink.get(key, 1.0) * _cut(program, pick, key, len(seen.parts))
+                    shrink[key] = shrink.get(key, 1.0) * cut(program, pick, key, len(seen.parts))
             else:
                 enough[pick] = promised
             z = seen.quantiles(target, boards)
@@ -268,24 +276,25 @@ class _Search:
         cost = self._price(which, pick)
         step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
         upgrades = seen.upgrades(pick)
-        made = applied(seen.branch, upgrades)
-        plans = list[tuple[StudyPlan, float | None] | None]()
-        for way, question in zip(seen.taken(pick), asked(made, made.found), strict=True):
-            plan = None if question is None else plan_of(made, question, fresh(self.seed, number))
-            trim = upgrades.trim if way.kind == "trim" else None
-            plans.append(None if plan is None else (plan, trim))
+        circuit, spread = seen.spread(pick)
+        drawn = fresh(self.seed, number)
+        plans = [
+            (
+                StudyPlan(circuit, spread, drawn, MOST, (way.question,)),
+                upgrades.trim if way.kind == "trim" else None,
+            )
+            for way in seen.taken(pick)
+        ]
         found: tuple[Measured, ...]
         if boards is None:
             found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         else:
             found = tuple(
-                measured_none(self.target)
-                if asked_for is None
-                else measure(
-                    asked_for[0], self.target, self.book,
-                    trim=asked_for[1], least=boards, most=boards, jobs=self.jobs, progress=step,
+                measure(
+                    plan, self.target, self.book, trim=trim, least=boards, most=boards,
+                    first=FIRST, jobs=self.jobs, progress=step,
                 )
-                for asked_for in plans
+                for plan, trim in plans
             )  # fmt: skip
         return Trial(seen.branch.name, upgrades, cost, predicted, found, self.target)
 
@@ -303,12 +312,17 @@ class _Search:
             if r not in short:
                 continue
             w = pick[len(seen.parts) + r]
+            if way.certain and way.margin is None:  # not one of the boards seen so far was lost
+                step = self.said.stage(f"linear picture, {seen.branch.name}: response {r + 1}")
+                seen = pictured(seen, [(r, w)], self.jobs, step)
+                self.pictures[which] = seen
+                way = seen.ways[r][w]
             if way.margin is None or not way.margin.limits:
                 self.spoiled.add((which, r, w))
                 continue
             # The upper end of what the measurement allows: the cheapest is come upon from below.
             key, rate = (which, r, w), m.counts.interval[1]
-            self.shrink[key] = min(self.shrink.get(key, 1.0), _shown(way, boards, rate))
+            self.shrink[key] = min(self.shrink.get(key, 1.0), shown(way, boards, rate))
 
     def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
         limits = tuple(self._limit(r) for r in range(len(self.base.found)))
@@ -330,13 +344,15 @@ class _Search:
         """Which responses no choice of upgrades is enough for, as the pictures are known now."""
         best = np.zeros(len(self.base.found))
         for which, seen in enumerate(self.pictures):
-            finest = [len(p.slot.options) - 1 for p in seen.parts]
-            boards = seen.boards(finest + [0] * len(seen.ways))
+            best_parts = finest(seen.parts, seen.branch.made.catalog)
+            boards = seen.boards(best_parts)
             shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
             for r, row in enumerate(seen.ways):
-                for w in range(len(row)):
-                    if (which, r, w) not in self.spoiled:
-                        pick = [*finest, *(w if k == r else 0 for k in range(len(seen.ways)))]
+                for w, way in enumerate(row):
+                    if way.hopeless:
+                        best[r] = max(best[r], way.most)
+                    elif (which, r, w) not in self.spoiled:
+                        pick = [*best_parts, *(w if k == r else 0 for k in range(len(seen.ways)))]
                         best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
         short = [
             f"response {r + 1} ({share:.3f} at most)"
@@ -386,24 +402,3 @@ class _Search:
             if not front or t.worst.rate > front[-1].worst.rate:
                 front.append(t)
         return tuple(front) if before in front else (before, *front)
-
-
-def _cut(program: Program, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
-    """A factor on a way's room under which this choice no longer keeps its demands."""
-    r, w = key
-    own = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]
-    shares = [d.variance(pick) / d.room for d in own]
-    return min(TIGHTER, 0.999 * max(shares, default=1.0))
-
-
-def _shown(way: Way, boards: Boards, rate: float) -> float:
-    """By which factor the room of a way's demands is to shrink for the picture to promise what was
-    measured: the square of the ratio of the distances at which that share of boards is lost; 1
-    where more are ok than was promised."""
-    assert way.margin is not None
-    form = way.margin.of(boards)
-    middle = float(np.median(form))
-    shown = middle - float(np.quantile(form, min(1.0 - rate, 0.5)))
-    if middle <= 0.0 or shown >= middle:
-        return 1.0
-    return max((shown / middle) ** 2, 1.0 / LARGEST_STEP**2)

@@ -9,7 +9,6 @@ from designer.cure_branch import Refused
 from designer.cure_picture import Picture
 from designer.cure_study import Measured
 from designer.upgrade import Upgrades
-from designer.verdict import Yield
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,3 @@ class Cure:
         if self.reached:
             return self.rounds[-1] if self.rounds else self.before
         return max((self.before, *self.rounds), key=lambda t: (t.worst.rate, -t.price))
-
-
-def measured_none(target: float) -> Measured:
-    """What is known of a response that was not asked."""
-    return Measured(Yield(0, 0, 0, 0), target)

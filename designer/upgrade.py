@@ -9,7 +9,7 @@ and a DC offset that is trimmed on each board is the band of ``[tuning]``.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -141,8 +141,13 @@ def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
     )
 
 
-def with_parts_kept(base: Synthesis, modelfile: ModelFile) -> Synthesis:
+def with_parts_kept(
+    base: Synthesis, modelfile: ModelFile, loaded: Sequence[int] | None = None
+) -> Synthesis:
     """The base's parts in a design for another model file, verified afresh.
+
+    loaded : numbers of the responses of which the op-amps' loads are asked; None: all. Those that
+    stayed where they were load a circuit of the same values as before.
 
     The file differs in what ``Upgrades`` changes but for the dead zone. Its design's ``checks`` say
     whether the side conditions still hold.
@@ -170,7 +175,8 @@ def with_parts_kept(base: Synthesis, modelfile: ModelFile) -> Synthesis:
     amplitudes = [design.amplitude(r.b) for r in found] or [design.amplitude()]
     needed = None
     if found and kept & {"swing", "load"}:
-        needed = loads.design_loads(design, Reduction(circuit, nominal_board(circuit)), found)
+        loading = found if loaded is None else [found[number] for number in loaded]
+        needed = loads.design_loads(design, Reduction(circuit, nominal_board(circuit)), loading)
     checks = conditions.verify(design, kept, catalog.opamp(circuit.opamp), held, amplitudes, needed)
     stated = {c.quantity: c.limit for c in base.design.checks}
     numbers = {k: v for k, v in base.design.conditions.items() if k not in stated}

@@ -179,6 +179,7 @@ def yield_map(
     grades: Sequence[float] = GRADES,
     samples: int = SAMPLES,
     points: int = POINTS,
+    quick: bool = False,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> YieldMap:
@@ -186,7 +187,8 @@ def yield_map(
 
     b : the clearance that the question's amplitude stands for. values : of ω or b; by default
     ``points`` across the nominal circuit's window and the setting in use. samples : boards at each
-    point. progress : called once an attractor.
+    point. quick : a forecast, in which what ``Ensemble.quick`` leaves open is lost.
+    progress : called once an attractor.
 
     Raises
     ------
@@ -223,7 +225,8 @@ def yield_map(
         tasks = [(i, k) for k in range(samples) for i, o in enumerate(orbits) if o is not None]
         starts = {i: o.start for i, o in enumerate(orbits) if o is not None}
         drives = [walk.drive(value) for value in settings]
-        found = ensemble.settle(
+        ask: Callable[..., Sequence[Orbit | None]] = ensemble.quick if quick else ensemble.settle
+        found = ask(
             [k for _, k in tasks],
             [drives[i] for i, _ in tasks],
             np.array([starts[i] for i, _ in tasks]),
@@ -231,7 +234,10 @@ def yield_map(
             progress=progress,
         )
         for (i, _), orbit in zip(tasks, found, strict=True):
-            counts[str(judge(orbit, question.spec, question.start)[0])][i, column] += 1
+            verdict = Verdict.LOST
+            if orbit is not None:
+                verdict = judge(orbit, question.spec, question.start)[0]
+            counts[str(verdict)][i, column] += 1
         walk.spent += len(tasks)
     there = np.tile(np.array([[o is not None] for o in orbits]), (1, len(chosen)))
     axes: tuple[Axis, ...] = (Axis("b" if over == "b" else "omega", tuple(settings)),)

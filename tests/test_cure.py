@@ -22,13 +22,14 @@ from designer.catalog import load_catalog
 from designer.cure import CURE, STUDIES, cure
 from designer.cure_branch import Branch
 from designer.cure_json import cure_json
-from designer.cure_picture import Picture, Way, best_place
+from designer.cure_picture import Picture
 from designer.cure_plots import front_chart
 from designer.cure_search import find_cure
 from designer.cure_slots import part_slots
 from designer.cure_study import Book, Measured, measure, measure_together
 from designer.cure_table import text
 from designer.cure_trial import Cure
+from designer.cure_ways import Way, best_place
 from designer.errors import InputError
 from designer.job import synthesise_into
 from designer.margins import Limit, Margin

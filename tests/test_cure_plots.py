@@ -28,7 +28,7 @@ def cured(before: Trial, rounds: Sequence[Trial], front: Sequence[Trial]) -> Cur
 def points(found: Cure) -> np.ndarray:
     """(k, 2) of what was measured, as it is drawn."""
     axes = front_chart(found).axes[0]
-    (drawn,) = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    (drawn,) = [np.array(line.get_xydata()) for line in axes.lines if line.get_marker() == "o"]
     low, high = axes.get_xlim()
     assert ((drawn[:, 0] > low) & (drawn[:, 0] < high)).all()
     return np.asarray(drawn)
