@@ -35,7 +35,8 @@ Row = Mapping[str, Any]
 
 def measure(folder: Path) -> dict[str, list[dict[str, Any]]]:
     """All pieces; those that are in the folder already are taken as they are."""
-    store = CaseStore(folder, KEY, FILES, resume=(folder / "cases").is_dir())
+    store = CaseStore(folder, FILES, resume=(folder / "cases").is_dir())
+    store.expect(KEY)
     flow = [
         store.piece(s.name, lambda s=s: plain(stability_flow.measure(s)))  # type: ignore[misc]
         for s in stability_flow.scenes()
@@ -346,7 +347,8 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
             "Designs of the tool itself, E12 resistors and E6 capacitors, side conditions of swing "
             "and load; one response each on the nominal board, from the exact circuit's orbit, "
             f"behind the numerics gate with at most {stability_spice.LEVELS} step sizes. "
-            "The axis k0 has one stop, ζ = 0.2, b = 0.5 and ω = 0.9, where every stiffness shows 1-1-0. *Strobes differ* and *RMS* "
+            "The axis k0 has one stop, ζ = 0.2, b = 0.5 and ω = 0.9, where every stiffness shows "
+            "1-1-0. *Strobes differ* and *RMS* "
             "are of the peak of each state, RMS against the exact circuit; on `dynamic` and `full` "
             "part of it is the op-amps' bandwidth, which the exact circuit does not have."
         ),
