@@ -30,6 +30,14 @@ KEY = "1"
 """Of the pieces: another one where scenes or measures change."""
 ROUNDING = 2.0**-53
 STROBE = 1e-8
+SHOWN = {
+    "zeta": "ζ",
+    "omega": "ω",
+    "omega, high": "ω, high",
+    "off critical": "off critical damping",
+    "impacts": "slow and stiff, 1/(ω (1 − k0))",
+}
+"""Axes by the names that are printed, where those differ."""
 Row = Mapping[str, Any]
 
 
@@ -88,7 +96,7 @@ def flow_summary(rows: Sequence[Row]) -> Iterator[list[str]]:
         first = next((r for r in of if not trusted(r)), None)
         largest = max((r["error"] for r in fine if r.get("error") is not None), default=None)
         yield [
-            f"exact flow, {axis}",
+            f"exact flow, {SHOWN.get(axis, axis)}",
             f"{fine[-1]['value']:.1g}" if fine else "nowhere",
             "the end of what was tried" if first is None else f"{first['value']:.1g}: rounding",
             "–" if largest is None else f"state right to {largest:.0e}",
@@ -104,7 +112,7 @@ def flow_table(rows: Sequence[Row]) -> list[str]:
         known = row.get("first_error") and row["bound"]
         body.append(
             [
-                row["axis"],
+                SHOWN.get(row["axis"], row["axis"]),
                 f"{row['value']:.2g}",
                 row["kernel"],
                 _text(row.get("impacts"), "d"),
@@ -139,7 +147,7 @@ def flow_picture(rows: Sequence[Row]) -> Figure:
         ax.axhline(1.0, color="#555555", lw=0.8, ls="--")
         ax.set_yscale("log")
         ax.set_xticks(at, [f"{r['value']:.0e}" for r in of], fontsize=7, rotation=45)
-        ax.set_title(axis, fontsize=10)
+        ax.set_title(SHOWN.get(axis, axis), fontsize=10)
         ax.grid(visible=True, axis="y", lw=0.4, alpha=0.6)
     for ax in grid[len(axes_of) :]:
         ax.set_axis_off()
@@ -300,8 +308,8 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
         "",
         _filled(
             "Made by `python -m benchmarks stability`; pieces that stand in `cases/` are taken as "
-            "they are. What *not to be trusted here* means, and how it is found out, is in "
-            "[docs/stability.md](../../docs/stability.md)."
+            "they are, so take them away to measure anew. What *not to be trusted here* "
+            "means, and how it is found out, is in [docs/stability.md](../../docs/stability.md)."
         ),
         "",
         f"- Commit: {commit()}",
@@ -339,7 +347,10 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
         "",
         *flow_table(flow),
         "",
-        *(f"- {r['axis']} {r['value']:.2g}: {r.get('trust') or r['said']}" for r in doubted),
+        *(
+            f"- {SHOWN.get(r['axis'], r['axis'])} {r['value']:.2g}: {r.get('trust') or r['said']}"
+            for r in doubted
+        ),
         "",
         "## ngspice",
         "",
@@ -348,9 +359,9 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
             "and load; one response each on the nominal board, from the exact circuit's orbit, "
             f"behind the numerics gate with at most {stability_spice.LEVELS} step sizes. "
             "The axis k0 has one stop, ζ = 0.2, b = 0.5 and ω = 0.9, where every stiffness shows "
-            "1-1-0. *Strobes differ* and *RMS* "
-            "are of the peak of each state, RMS against the exact circuit; on `dynamic` and `full` "
-            "part of it is the op-amps' bandwidth, which the exact circuit does not have."
+            "1-1-0. *Strobes differ* and *RMS* are of the peak of each state, RMS against "
+            "the exact circuit; on `dynamic` and `full` part of it is the op-amps' "
+            "bandwidth, which the exact circuit does not have."
         ),
         "",
         "![Distance from the exact circuit](ngspice.png)",

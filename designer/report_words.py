@@ -27,13 +27,16 @@ def orbit(met: Orbit) -> str:
 
 
 def problem(c: Checked) -> str:
-    """What is wrong with a response, in words; "" where it was found and all engines agree."""
+    """What is wrong with a response, in words; "" where it was found, all engines agree, and the
+    exact ones can be trusted."""
     said = []
     ngspice, without = c.ngspice, replace(c, gate=None)
     if not c.model.found:
         said.append(f"the model shows {orbit(c.model.orbit)} instead")
     if not without.agrees:
         said.append(f"model {orbit(c.model.orbit)} and exact circuit {orbit(c.circuit)} differ")
+    exact = {"model": c.model_trust, "exact circuit": c.circuit_trust}
+    said += [f"{engine} {trust}" for engine, trust in exact.items() if not trust.trusted]
     if ngspice is not None and ngspice.status is OrbitStatus.FAILED:
         said.append(f"ngspice gave no answer: {ngspice.reason or 'no reason given'}")
     elif ngspice is not None and without.agrees and not c.agrees:

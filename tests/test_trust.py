@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from benchmarks.references import Problem, truth
-from designer import attractor, cli, pipeline, show, trust
+from designer import attractor, cli, pipeline, report_words, show, trust
 from designer.attractor import settle
 from designer.deck import Excitation, SolverSettings
 from designer.flow import Flow
@@ -127,6 +127,19 @@ def test_a_yield_that_boards_without_an_answer_could_move(counted: Yield, truste
 def test_a_yield_is_no_better_than_the_nominal_response() -> None:
     said = trust.of_yield(Yield(200, 0, 0, 0), Trust(reasons=("so it is",)))
     assert said.reasons == ("the nominal response: so it is",)
+
+
+@pytest.mark.parametrize("reasons", [(), ("rounding",)])
+def test_a_report_names_it_among_the_problems(reasons: tuple[str, ...]) -> None:
+    _, orbit = found(0.999)
+    response = ModelResponse(Response(0.9, Expect(1, 1, 0)), 0.5, orbit, (), True)
+    checked = pipeline.Checked(
+        response, orbit, Excitation(200.0, 4.0), None, circuit_trust=Trust(reasons=reasons)
+    )
+    assert checked.trusted is not bool(reasons)
+    said = report_words.problem(checked)
+    assert said.endswith("exact circuit not to be trusted here: rounding" if reasons else "")
+    assert bool(said) is bool(reasons)
 
 
 SETTINGS = SolverSettings("trap", 1e-5)
