@@ -12,6 +12,8 @@ from designer.cure_trial import Cure, Trial
 from designer.plots import GRID, INK, MUTED, new_figure, styled
 
 MEASURED, PREDICTED = "#0072b2", "#e69f00"
+FAR = 2.0
+"""Times the dearest point: a budget beyond is not drawn."""
 MOST_WORDS = 100
 """Letters of the upgrades in the list below the picture."""
 
@@ -37,9 +39,11 @@ def front_chart(found: Cure) -> Figure:
         top.set_xticks(along, ["as it is", *(f"round {k}" for k in range(1, len(front)))])
         top.set_xlabel("choices one after the other; none costs anything")
     else:
-        if found.budget is not None:
+        dearest = max(along)
+        if found.budget is not None and found.budget <= FAR * dearest:
             top.axvline(found.budget, color=MUTED, lw=0.8, ls=":", label="budget")
-        top.set_xlim(left=-0.04 * max(along), right=1.1 * max(along))
+            dearest = max(dearest, found.budget)
+        top.set_xlim(left=-0.04 * dearest, right=1.1 * dearest)
         top.set_xlabel("price of the upgrades [euro, by the catalogue's price classes]")
     over = "round by round" if free else "against price"
     top.set_ylabel("yield of the worst response [%]")

@@ -20,6 +20,7 @@ from designer.cure_branch import PLACE, TRIM, Branch
 from designer.cure_study import Book, asked, measure, plan_of
 from designer.ensemble import Ensemble
 from designer.margins import Margin
+from designer.orbit import Orbit
 from designer.spread import Spread, draw_many
 from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
 from designer.verdict import Answer, Question, StudyPlan, Verdict, count, judge
@@ -35,6 +36,8 @@ FAINT = 0.5
 """Share of boards below which the best place is sought with the best parts instead."""
 RARE = 1e-3
 """Chance of as many lost boards under the target at which a way is hopeless."""
+DOUBTED = 10
+"""Boards left open by the forecast that are settled before a way is called hopeless."""
 
 
 @dataclass(frozen=True)
@@ -62,24 +65,30 @@ class Way:
         return self.rate == 1.0
 
 
-def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
-    """As much of an answer as a margin needs, for each board."""
+def forecast(boards: Boards, question: Question, jobs: int) -> list[Orbit | None]:
+    """The orbit of each board; None where the compiled way leaves it open."""
     size = len(boards)
-    found = Ensemble(boards, jobs=jobs).quick(
+    return Ensemble(boards, jobs=jobs).quick(
         range(size),
         [question.excitation.drive] * size,
         np.tile(question.start.start, (size, 1)),
         jobs=jobs,
     )
+
+
+def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
+    """As much of an answer as a margin needs, for each board; what is open is lost."""
     nan = float("nan")
     return [
-        Answer(
-            sample, 0,
-            Verdict.LOST if orbit is None else judge(orbit, question.spec, question.start)[0],
-            "", "", nan, nan, nan, nan, 0,
-        )
-        for sample, orbit in enumerate(found)
-    ]  # fmt: skip
+        Answer(sample, 0, _verdict(orbit, question), "", "", nan, nan, nan, nan, 0)
+        for sample, orbit in enumerate(forecast(boards, question, jobs))
+    ]
+
+
+def _verdict(orbit: Orbit | None, question: Question) -> Verdict:
+    if orbit is None:
+        return Verdict.LOST
+    return judge(orbit, question.spec, question.start)[0]
 
 
 @dataclass(frozen=True)
@@ -120,14 +129,30 @@ class Looker:
         lost = total = 0
         for first in (0, FEW):
             boards = self.finest.take(range(first, first + FEW))
-            found = foretold(boards, way.question, self.jobs)
-            lost += sum(a.verdict is not Verdict.OK for a in found)
+            found = forecast(boards, way.question, self.jobs)
+            lost += sum(_verdict(orbit, way.question) is not Verdict.OK for orbit in found)
             total += FEW
             hopeless = bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
-            if hopeless or lost == 0:
+            if hopeless:
+                unsettled = [k for k, orbit in enumerate(found) if orbit is None][:DOUBTED]
+                if unsettled:
+                    hopeless = not self._any_settles(boards.take(unsettled), way.question)
+                break
+            if lost == 0:
                 break
         self.progress()
         return replace(way, most=1.0 - lost / total, hopeless=hopeless)
+
+    def _any_settles(self, boards: Boards, question: Question) -> bool:
+        """Whether one of these boards shows the response after all, given all the time there is."""
+        size = len(boards)
+        found = Ensemble(boards).settle(
+            range(size),
+            [question.excitation.drive] * size,
+            np.tile(question.start.start, (size, 1)),
+            jobs=self.jobs,
+        )
+        return any(_verdict(orbit, question) is Verdict.OK for orbit in found)
 
     def ways(self, first: Way) -> list[Way]:
         """A response's ways, ``first`` the one as it is. What asks more of people is looked for

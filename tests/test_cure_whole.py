@@ -4,17 +4,27 @@ itself on boards of another seed."""
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
+from typing import cast
 
+import numpy as np
 import pytest
 
+from designer import cure_picture, cure_search, cure_study
 from designer.api import Synthesis, synthesise
-from designer.cure_branch import KINDS, cured
+from designer.cure_branch import KINDS, Branch, cured
 from designer.cure_search import find_cure
+from designer.cure_slots import part_slots
 from designer.cure_study import Book, Measured, asked, measure, plan_of
 from designer.cure_trial import Cure
+from designer.cure_ways import Way
+from designer.margins import Limit, Margin
 from designer.modelfile import parse_model_file
-from designer.upgrade import Upgrades, price
+from designer.quantities import quantities
+from designer.spread import Spread, draw_many
+from designer.upgrade import Place, Upgrades, price
+from designer.verdict import Question, StudyPlan, Yield
 
 BAND = 0.05
 OTHER_SEED = 4242
@@ -61,6 +71,69 @@ def agrees(found: Cure, options: Iterable[Upgrades]) -> None:
     if least is not None:
         assert found.best.price == pytest.approx(least, abs=1e-9)
         assert measured(found.base, found.best.upgrades, found.target).reached
+
+
+@pytest.mark.slow
+def test_the_other_dead_zone_is_taken_where_it_is_enough() -> None:
+    base = design(6, 0.284, "saturation")
+    found = only("dead zone", base, 0.9)
+    agrees(found, [Upgrades(), Upgrades(dead_zone="rectifier")])
+    assert found.best.upgrades == Upgrades(dead_zone="rectifier")
+
+
+@pytest.mark.slow
+def test_another_clearance_is_taken_where_no_frequency_is_enough() -> None:
+    """At b = 0.25 the last of eight impacts nearly grazes, at any frequency of the window."""
+    base = design(8, 0.215, "rectifier")
+    found = only("place", base, 0.97)
+    elsewhere = [Place(0.215, b) for b in (0.27, 0.283)] + [Place(w, 0.25) for w in (0.213, 0.217)]
+    agrees(found, [Upgrades(), *(Upgrades(places={0: place}) for place in elsewhere)])
+    (place,) = found.best.upgrades.places.values()
+    assert place.omega == 0.215
+    assert place.b > 0.25
+
+
+def test_the_references_are_taken_where_they_move_the_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With a limit that is known, so that each option's yield is the share of drawn boards."""
+    base, target = design(8, 0.215, "rectifier"), 0.97
+    circuit = base.design.circuit
+    boards = draw_many(circuit, Spread.of(base.modelfile, circuit, base.catalog), 3, range(4000))
+    differing = quantities(circuit, boards)
+    slopes = np.array([2.0 * (q.group == "reference") + (q.part == "R4") for q in differing])
+    assert np.count_nonzero(slopes) == 3
+    limit = Limit("x", "contact", 3.5, 1.0, slopes)
+    sigma = float(Margin(differing, (limit,)).each(boards).std())
+    margin = Margin(differing, (replace(limit, sigma=sigma),))
+
+    def counted(plan: StudyPlan, target: float, book: Book, **_: object) -> Measured:
+        drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
+        ok = int((margin.of(drawn) > 0.0).sum())
+        return Measured(Yield(ok, 8000 - ok, 0, 0), target)
+
+    slots = part_slots(base, frozenset(KINDS) - {"reference"})
+    (slot,) = slots
+    branch = Branch(Upgrades(), base, 0.0)
+    way = Way(0, "as it is", cast(Question, None), None, margin, 0.5)
+    ratios = cure_picture._ratios(branch, slots, 5)
+    seen = cure_picture.Picture(branch, slots, ((way,),), ratios, 0.0, 5)
+    monkeypatch.setattr(cure_search, "picture", lambda *_, **__: seen)
+    monkeypatch.setattr(cure_search, "measure", counted)
+    monkeypatch.setattr(cure_study, "measure", counted)
+    found = only("reference", base, target)
+    enough = {}
+    for k, model in enumerate(slot.models):
+        made = cured(base, Upgrades(reference=model) if k else Upgrades())
+        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        drawn = draw_many(made.design.circuit, spread, OTHER_SEED, range(8000))
+        if (margin.of(drawn) > 0.0).mean() >= target:
+            enough[model] = price(made) - price(base)
+    assert slot.models[0] not in enough
+    assert enough
+    assert found.reached, found.why
+    assert found.best.upgrades.reference in enough
+    assert found.best.price == pytest.approx(min(enough.values()))
 
 
 @pytest.mark.slow
