@@ -262,6 +262,7 @@ def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
             axes.set_ylabel(_AXES[key])
         if i + columns >= len(truths):
             axes.set_xlabel("CPU seconds of a drive period")
+            axes.tick_params(labelbottom=True)  # also where the row below is not full
     used = [r for r in RUNGS if any(row["rung"] == r for row in shown)]
     handles = [_mark(*_LOOKS[r], TITLES[r]) for r in used]
     if any(not row["right"][BOARD] for row in shown):
