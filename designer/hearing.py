@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from designer.orbit import Orbit, OrbitStatus
+from designer.responsespec import Response
 from designer.verdict import Answer, Question, Verdict
 
 OWN_SAMPLES = 40
@@ -85,7 +86,7 @@ class Hearing:
     @property
     def decided(self) -> bool:
         """Whether ngspice gave an answer."""
-        return self.response not in ("", OrbitStatus.FAILED, UNDECIDED)
+        return is_answer(self.response)
 
     def agrees(self, answer: Answer) -> bool | None:
         """Whether ngspice names the response that the exact rung names; None without an answer."""
@@ -95,16 +96,26 @@ class Hearing:
         """Whether the board shows the wanted response in ngspice; None without an answer."""
         if not self.decided:
             return None
-        parts = self.response.split("-")
-        if len(parts) != 3 or not all(part.isdigit() for part in parts):
-            return False
-        n, p, q = (int(part) for part in parts)
-        spec, nominal = question.spec, question.start
-        if spec.expect is not None:
-            wanted = spec.accepts(n, p, q)
-        else:
-            wanted = n == nominal.n and {p, q} == {nominal.p, nominal.q}
-        return wanted and (self.symmetric or not spec.symmetric)
+        return shows(question.spec, question.start, self.response, symmetric=self.symmetric)
+
+
+def is_answer(response: str) -> bool:
+    """Whether what ngspice said is a response or a status of one: "" is no answer, nor is a run
+    that failed or two that differ."""
+    return response not in ("", OrbitStatus.FAILED, UNDECIDED)
+
+
+def shows(spec: Response, nominal: Orbit, response: str, *, symmetric: bool) -> bool:
+    """Whether n-p-q as text is the wanted response, or the nominal orbit's where none is."""
+    parts = response.split("-")
+    if len(parts) != 3 or not all(part.isdigit() for part in parts):
+        return False
+    n, p, q = (int(part) for part in parts)
+    if spec.expect is not None:
+        wanted = spec.accepts(n, p, q)
+    else:
+        wanted = n == nominal.n and {p, q} == {nominal.p, nominal.q}
+    return wanted and (symmetric or not spec.symmetric)
 
 
 def distance(answer: Answer, nominal: Orbit) -> float:

@@ -5,8 +5,9 @@ Over all wanted responses, in this order: the smallest of their distances from b
 as far as the boards of a search can tell, the product of the predicted yields. One lever after the
 other is moved, from the match design on: op-amp and dead zone first, then the places of the
 responses, the other op-amps and dead zones at those, then what the synthesis aims at. A lever stays
-where it is unless something is gained. At the end ngspice is asked whether it bears the design out,
-and where it does not, slower ones.
+where it is unless something is gained. At the end ngspice is asked whether it bears the design out;
+where it does not, slower ones are made, and the one is taken of whose worst response ngspice keeps
+the most boards.
 
 Nothing of the chain (model, match, circuit, predictions) imports a module of the search.
 """
@@ -38,8 +39,7 @@ from designer.search_candidate import (
     better,
 )
 from designer.search_distance import Stretched
-from designer.search_heard import BOARDS as HEARD
-from designer.search_heard import RUNG, Heard, Listen
+from designer.search_heard import LISTENED, RUNG, Agreement, Listen
 from designer.search_levers import LEVERS, PLACES, TOPOLOGY, Choice, slower, topologies, variants
 from designer.search_memory import Memory
 from designer.search_places import MANY, places, room_of, score
@@ -217,9 +217,10 @@ class _Hunt:
         """The design, or the same with a slower time scale where ngspice loses boards of it."""
         if self.listen is None:
             return best
-        tried: list[tuple[Candidate, float, tuple[Heard, ...]]] = []
+        tried: list[tuple[Candidate, float, tuple[Agreement, ...]]] = []
         frequency = best.design.errors.scales.frequency(1.0)
-        for choice in (best.choice, *slower(best.choice, frequency)):
+        low, _ = self.modelfile.circuit.frequency
+        for choice in (best.choice, *slower(best.choice, frequency, low)):
             made: Candidate | None = best
             if choice != best.choice:
                 made = self._candidate(choice, best.found, f"time scale {_shown(choice.frequency)}")
@@ -228,17 +229,15 @@ class _Hunt:
                 continue
             at = made.design.errors.scales.frequency(1.0)
             step = self.said.stage(f"ngspice, rung {RUNG}, {at:.4g} Hz at ω = 1", len(made.found))
-            bench = self._bench(made.choice, made.found, made.design, HEARD)
+            bench = self._bench(made.choice, made.found, made.design, LISTENED)
             heard = self.listen(bench, [s.stand for s in made.scored], step)
             tried.append((made, at, heard))
             if all(h.borne_out for h in heard):
                 break
-        kept = max(
-            tried, key=lambda t: (all(h.borne_out for h in t[2]), min(h.share for h in t[2]))
-        )[0]
+        kept = max(tried, key=lambda t: min(h.ngspice for h in t[2]))[0]
         for made, at, heard in tried:
             self.heard.append(Listened(at, heard, made is kept))
-            said = ", ".join(f"{h.ngspice}/{h.exact}" for h in heard)
+            said = ", ".join(str(h) for h in heard)
             self.said.note(f"  {at:.4g} Hz: boards that ngspice keeps, by response: {said}")
             if made is not best:
                 self._note("time scale", _shown(made.choice.frequency), made, made is kept)
@@ -297,6 +296,7 @@ class _Hunt:
                     self._rank(final.choice, start.found),
                 )
             )
+        slowed = bool(self.heard) and not self.heard[0].kept
         for lever in LEVERS:
             before, after = start.choice.get(lever), final.choice.get(lever)
             if before != after:
@@ -307,6 +307,7 @@ class _Hunt:
                         _shown(after),
                         self._rank(start.choice.with_lever(lever, after), start.found),
                         self._rank(final.choice.with_lever(lever, before), final.found),
+                        "ngspice" if slowed and lever == "time scale" else "exact",
                     )
                 )
         return tuple(out)

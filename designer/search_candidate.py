@@ -10,7 +10,7 @@ from designer.api import Synthesis
 from designer.design import Design
 from designer.modelfile import Response
 from designer.responses import ModelResponse
-from designer.search_heard import Heard
+from designer.search_heard import Agreement
 from designer.search_levers import Choice
 from designer.search_places import Scored
 from designer.search_windows import Stretch
@@ -27,7 +27,7 @@ GAIN = 1e-3
 class Candidate:
     """A design with its responses at their places, and what boards of it showed.
 
-    scored : by response. tried : places that were asked on its boards.
+    scored : by response.
     """
 
     choice: Choice
@@ -67,13 +67,15 @@ class Step:
 @dataclass(frozen=True)
 class Contribution:
     """What a lever is worth. alone : rank of the match design with this lever moved; without : of
-    the final design with it moved back; None where there is no such design."""
+    the final design with it moved back; None where there is no such design. by : who moved it:
+    the ``exact`` circuit's boards, or ``ngspice``, whose reason no exact distance shows."""
 
     lever: str
     start: str
     final: str
     alone: tuple[float, float] | None
     without: tuple[float, float] | None
+    by: str = "exact"
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class Listened:
     design was taken."""
 
     frequency: float
-    heard: tuple[Heard, ...]
+    agreements: tuple[Agreement, ...]
     kept: bool
 
 
@@ -93,7 +95,7 @@ class Searched:
     made : the design with its resolved model file. start : the match design with every response
     in the middle of its widest stretch. final : what was found, as it was predicted. heard : of
     ngspice, about it and slower ones; empty where none was asked.
-    candidates : designs; places : that were asked. asked : answers of boards to questions.
+    candidates : designs; places : that were asked.
     """
 
     made: Synthesis

@@ -17,38 +17,45 @@ from functools import partial
 from designer import gate
 from designer.confirmation import Query, confirm, way_to_rung
 from designer.gate import Subject
+from designer.hearing import is_answer, shows
 from designer.opamp_model import Rung
 from designer.search_distance import Stand, Stretched
 from designer.search_memory import Memory
 from designer.workers import SpicePool
 
 RUNG: Rung = "dynamic"
-STRETCH, BOARDS = 2.0, 16
+STRETCH, LISTENED = 2.0, 16
 """Stretch of the spread, and boards of each response."""
-FEWER = 1
-"""Boards of a response that ngspice may lose."""
+FEWER, LEAST = 1, 8
+"""Boards of a response that ngspice may lose, and those that it has to keep at least."""
 REFINEMENTS = 1
 """How often the step is halved where ngspice disagrees."""
 
 
 @dataclass(frozen=True)
-class Heard:
-    """Of one response: boards that show it on the exact circuit, and those of them that show it in
-    ngspice as well."""
+class Agreement:
+    """Of ``LISTENED`` boards of one response: those that show it on the exact circuit, those of
+    them that show it in ngspice as well, and those that ngspice has no answer to: runs that failed,
+    step sizes that differ, all of them where the numerics gate does not pass."""
 
     exact: int
     ngspice: int
+    unanswered: int = 0
+
+    def __str__(self) -> str:
+        open_ = f" ({self.unanswered} without an answer)" if self.unanswered else ""
+        return f"{self.ngspice}/{self.exact}{open_}"
+
+    @property
+    def lost(self) -> int:
+        return self.exact - self.ngspice - self.unanswered
 
     @property
     def borne_out(self) -> bool:
-        return self.exact > 0 and self.ngspice >= self.exact - FEWER
-
-    @property
-    def share(self) -> float:
-        return self.ngspice / self.exact if self.exact else 0.0
+        return self.lost <= FEWER and self.ngspice >= LEAST
 
 
-Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple[Heard, ...]]
+Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple[Agreement, ...]]
 """Of the boards of a design and its responses' stands; the last is called once a response."""
 
 
@@ -63,30 +70,33 @@ class Listener:
         bench: Stretched,
         stands: Sequence[Stand | None],
         progress: Callable[[], None] = lambda: None,
-    ) -> tuple[Heard, ...]:
-        """For each response. A design whose numerics gate does not pass has nothing to show."""
+    ) -> tuple[Agreement, ...]:
+        """For each response; where the nominal board does not show it there is nothing to ask."""
         out = []
         for stand in stands:
-            heard = Heard(0, 0)
+            found = Agreement(0, 0)
             if stand is not None:
-                said = [RUNG, FEWER, REFINEMENTS, bench.said(stand, range(BOARDS), (STRETCH,))]
+                said = [RUNG, REFINEMENTS, bench.said(stand, range(LISTENED), (STRETCH,))]
                 (known,) = self._memory.get_all([said], partial(self._ask, bench, stand))
-                heard = Heard(*known)
-            out.append(heard)
+                found = Agreement(*known)
+            out.append(found)
             progress()
         return tuple(out)
 
     def _ask(self, bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
         (nominal,) = gate.check(self._pool, [replace(bench.nominal(stand), rung=RUNG)])
-        there = bench.subjects(stand, range(BOARDS), STRETCH)
+        there = bench.subjects(stand, range(LISTENED), STRETCH)
         if not nominal.passed:
-            return [(len(there), 0)]
+            return [(len(there), 0, len(there))]
         queries = [
-            Query(_started(subject), nominal.settings, str(stand.spec.expect), REFINEMENTS)
+            Query(_started(subject), nominal.settings, subject.orbit.response, REFINEMENTS)
             for subject in there
         ]
-        heard = confirm(self._pool, queries)
-        return [(len(there), sum(h.response == str(stand.spec.expect) for h in heard))]
+        answers = [h for h in confirm(self._pool, queries) if is_answer(h.response)]
+        kept = [
+            h for h in answers if shows(stand.spec, stand.orbit, h.response, symmetric=h.symmetric)
+        ]
+        return [(len(there), len(kept), len(there) - len(answers))]
 
 
 def _started(subject: Subject) -> Subject:

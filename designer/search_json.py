@@ -51,10 +51,7 @@ def search_json(found: Searched) -> dict[str, Any]:
                 {
                     "frequency_hz": row.frequency,
                     "kept": row.kept,
-                    "responses": [
-                        {"exact": h.exact, "ngspice": h.ngspice, "borne_out": h.borne_out}
-                        for h in row.heard
-                    ],
+                    "responses": [{**h.__dict__, "borne_out": h.borne_out} for h in row.agreements],
                 }
                 for row in found.heard
             ],
@@ -148,6 +145,7 @@ def _contribution(c: Contribution) -> dict[str, Any]:
         "lever": c.lever,
         "from": c.start,
         "to": c.final,
+        "by": c.by,
         "alone": _rank(c.alone),
         "without": _rank(c.without),
     }

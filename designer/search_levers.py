@@ -108,9 +108,8 @@ def variants(choice: Choice, lever: str) -> Iterator[Choice]:
             yield choice.with_lever(lever, value)
 
 
-def slower(choice: Choice, frequency: float) -> Iterator[Choice]:
-    """The same at half of a frequency for ω = 1 [Hz], a quarter, and so on inside its band."""
-    low, _ = choice.frequency
+def slower(choice: Choice, frequency: float, low: float) -> Iterator[Choice]:
+    """The same at half of a frequency for ω = 1 [Hz], a quarter, and so on, not below ``low``."""
     high = frequency / 2.0
     while high > low * math.sqrt(2.0):
         yield replace(choice, frequency=(high / math.sqrt(2.0), high))

@@ -141,6 +141,8 @@ def _searched(
         made.modelfile, made.design, asked, made.catalog, samples=options.samples, seed=options.seed
     )
     row = _as_built(plan, made.modelfile.circuit, made.catalog, jobs, said)
+    powered = place / "powered-up"
+    powered.mkdir(exist_ok=True)
     for boards in (short, MORE * short):
         study = tolerance(
             made,
@@ -152,7 +154,7 @@ def _searched(
             seed=options.seed,
             jobs=jobs,
             checked=checked,
-            stores=FolderStores(place / "powered-up", lambda: None),
+            stores=FolderStores(powered, lambda: None),
             progress=said,
         )
         if _decided(study, len(checked), tuned=tuned):
@@ -173,6 +175,7 @@ def _searched(
 def _decided(study: Study, responses: int, *, tuned: bool) -> bool:
     """Whether the intervals of tuned and reached yields have the target outside, all of them."""
     counted = [count(study.reached_of(i)) for i in range(responses)]
+    counted += [study.all_reached] if study.all_reached is not None else []
     if tuned:
         counted += [count(study.tuned_of(i)) for i in range(responses)]
         counted += [study.all_tuned] if study.all_tuned is not None else []

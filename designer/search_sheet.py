@@ -19,14 +19,14 @@ GOAL = 0.99
 @styled
 def yield_chart(cases: Sequence[Case]) -> Figure:
     """Yield as built of every response, a bar for each circuit, with 95 % intervals."""
-    expects = [r["expect"] for r in cases[-2]["responses"]]
+    columns = list(_by_response(cases[-2]))
     figure = new_figure(9.0, 3.6)
     axes = figure.subplots()
     width = 0.85 / len(cases)
     for k, case in enumerate(cases):
-        known = {r["expect"]: r["as built"] for r in case["responses"]}
-        at = [i for i, expect in enumerate(expects) if expect in known]
-        rows = [known[expects[i]] for i in at]
+        known = {name: row["as built"] for name, row in _by_response(case).items()}
+        at = [i for i, name in enumerate(columns) if name in known]
+        rows = [known[columns[i]] for i in at]
         rates = np.array([100.0 * r["rate"] for r in rows])
         below = rates - [100.0 * r["low"] for r in rows]
         above = np.array([100.0 * r["high"] for r in rows]) - rates
@@ -35,7 +35,7 @@ def yield_chart(cases: Sequence[Case]) -> Figure:
         errors = np.maximum(np.stack([below, above]), 0.0)
         axes.errorbar(places, rates, errors, fmt="none", ecolor=INK, elinewidth=0.7)
     axes.axhline(100.0 * GOAL, color=MUTED, linewidth=0.7, linestyle="--")
-    axes.set_xticks(range(len(expects)), expects)
+    axes.set_xticks(range(len(columns)), columns)
     axes.set_ylim(0.0, 105.0)
     axes.set_xlabel("response n-p-q; dashed: 99 %")
     axes.set_ylabel("yield as built [%]")
@@ -85,25 +85,26 @@ def readme(cases: Sequence[Case], command: str, model: str) -> str:
         "",
         "Per cent, with the two-sided 95 % interval. The goal is reached where the lower end is at",
         "99 % or above, missed where the upper end is below, else undecided. Tuned and powered-up",
-        "boards are more where the first ones left it undecided.",
+        "boards are more where the first ones left it undecided; such a second look has a chance",
+        "of its own to be wrong.",
         "",
     ]
     for kind in KINDS:
         shown = [c for c in cases if any(kind in r for r in c["responses"])]
         if not shown:
             continue
-        expects = [r["expect"] for r in shown[-1]["responses"]]
+        columns = list(_by_response(shown[-1]))
         out += [
-            f"| {kind} | boards | {' | '.join(expects)} | all on one | goal 99 % |",
-            "|" + "---|" * (len(expects) + 4),
+            f"| {kind} | boards | {' | '.join(columns)} | all on one | goal 99 % |",
+            "|" + "---|" * (len(columns) + 4),
         ]
         for case in shown:
-            known = {r["expect"]: r.get(kind) for r in case["responses"]}
-            cells = [_cell(known.get(expect)) for expect in expects]
+            rows = _by_response(case)
+            known = {name: rows[name].get(kind) if name in rows else None for name in columns}
             whole = case["all_on_one"].get(kind)
-            goal = _goal({name: known.get(name) for name in expects} | {"all on one": whole})
-            row = [case["name"], str(_boards(case, kind)), *cells, _cell(whole), goal]
-            out.append(f"| {' | '.join(row)} |")
+            cells = [str(_boards(case, kind)), *(_cell(known[name]) for name in columns)]
+            goal = _goal(known | {"all on one": whole})
+            out.append(f"| {' | '.join([case['name'], *cells, _cell(whole), goal])} |")
         out.append("")
     out += _confirmations(cases)
     out += ["## Places", ""]
@@ -156,11 +157,23 @@ def readme(cases: Sequence[Case], command: str, model: str) -> str:
                 ends = [lever[k]["smallest_distance"] for k in ("alone", "without")]
                 shown_ends = ["no such design" if d is None else f"{d:.2f} σ" for d in ends]
                 out.append(
-                    f"| {lever['lever']} | {lever['from']} | {lever['to']} | {shown_ends[0]} "
+                    f"| {_lever(lever)} | {lever['from']} | {lever['to']} | {shown_ends[0]} "
                     f"| {shown_ends[1]} |"
                 )
             out.append("")
     return "\n".join(out).rstrip() + "\n"
+
+
+def _by_response(case: Case) -> dict[str, Mapping[str, Any]]:
+    """Its rows by n-p-q; of two responses with the same one the later has its number behind it."""
+    out: dict[str, Mapping[str, Any]] = {}
+    for row in case["responses"]:
+        name, count = str(row["expect"]), 1
+        while name in out:
+            count += 1
+            name = f"{row['expect']} ({count})"
+        out[name] = row
+    return out
 
 
 def _confirmations(cases: Sequence[Case]) -> list[str]:
@@ -182,6 +195,12 @@ def _confirmations(cases: Sequence[Case]) -> list[str]:
 def _boards(case: Mapping[str, Any], kind: str) -> int:
     counted = next(r[kind] for r in case["responses"] if kind in r)
     return sum(int(counted[name]) for name in ("ok", "lost", "grazing", "failed"))
+
+
+def _lever(lever: Mapping[str, Any]) -> str:
+    """Its name; a lever that ngspice moved costs distance on the exact circuit, if anything."""
+    name = str(lever["lever"])
+    return f"{name} (for ngspice)" if lever.get("by") == "ngspice" else name
 
 
 def _words(lever: Mapping[str, Any]) -> str:

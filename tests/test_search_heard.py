@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from designer.confirmation import Heard, Query
+from designer.hearing import UNDECIDED
+from designer.orbit import OrbitStatus
 from designer.quantities import between
 from designer.reduction import Reduction
 from designer.search_distance import STREAM, Stand, Stretched
-from designer.search_heard import BOARDS, FEWER, STRETCH, Heard, Listener
+from designer.search_heard import FEWER, LISTENED, STRETCH, Agreement, Listener
 from designer.search_memory import Memory
 from designer.search_windows import Place
 from designer.spread import draw_many
@@ -21,7 +25,7 @@ from tests.search_cases import made, spread
 
 
 def bench(memory: Memory | None = None) -> tuple[Stretched, Stand]:
-    found = Stretched(made().design, spread(), 1, BOARDS, memory=memory)
+    found = Stretched(made().design, spread(), 1, LISTENED, memory=memory)
     (response,) = made().found
     place = Place(response.omega, response.b, response.orbit.start)
     (stand,) = found.stands([(response.spec, place)])
@@ -30,11 +34,63 @@ def bench(memory: Memory | None = None) -> tuple[Stretched, Stand]:
 
 
 @pytest.mark.parametrize(
-    ("exact", "ngspice", "held"),
-    [(16, 16, True), (16, 16 - FEWER, True), (16, 15 - FEWER, False), (0, 0, False)],
+    ("exact", "ngspice", "unanswered", "held"),
+    [
+        (16, 16, 0, True),
+        (16, 16 - FEWER, 0, True),
+        (16, 15 - FEWER, 0, False),
+        (16, 15 - FEWER, 1, True),  # no answer is no loss
+        (16, 7, 9, False),  # nor does it bear anything out
+        (0, 0, 0, False),
+        (1, 0, 0, False),
+        (2, 1, 0, False),
+    ],
 )
-def test_what_counts_as_borne_out(exact: int, ngspice: int, held: bool) -> None:
-    assert Heard(exact, ngspice).borne_out is held
+def test_what_counts_as_borne_out(exact: int, ngspice: int, unanswered: int, held: bool) -> None:
+    assert Agreement(exact, ngspice, unanswered).borne_out is held
+
+
+@dataclass(frozen=True)
+class Gate:
+    passed: bool
+    settings: None = None
+
+
+@pytest.mark.parametrize(
+    ("spec", "answers", "found"),
+    [
+        ({}, ("1-2-2",) * 16, Agreement(16, 16)),
+        ({"expect": None}, ("1-2-2",) * 16, Agreement(16, 16)),
+        ({}, ("1-2-2",) * 12 + ("2-4-4", "chaos", "1-3-2", "not settled"), Agreement(16, 12)),
+        ({}, ("1-2-2",) * 13 + (OrbitStatus.FAILED, UNDECIDED, "1-1-1"), Agreement(16, 13, 2)),
+    ],
+)
+def test_what_ngspice_says_is_counted(
+    spec: dict[str, Any],
+    answers: Sequence[str],
+    found: Agreement,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """ngspice is played: these answers."""
+
+    def confirm(_: object, queries: Sequence[Query]) -> list[Heard]:
+        assert all(q.subject.rung == "dynamic" for q in queries)
+        assert {q.expected for q in queries} == {"1-2-2"}
+        return [Heard(a) for a in answers]
+
+    boards, stand = bench()
+    wanted = replace(stand, spec=replace(stand.spec, **spec))
+    monkeypatch.setattr("designer.search_heard.gate.check", lambda *_: [Gate(passed=True)])
+    monkeypatch.setattr("designer.search_heard.confirm", confirm)
+    assert Listener(None, Memory())(boards, [wanted]) == (found,)  # type: ignore[arg-type]
+
+
+def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    boards, stand = bench()
+    monkeypatch.setattr("designer.search_heard.gate.check", lambda *_: [Gate(passed=False)])
+    (found,) = Listener(None, Memory())(boards, [stand])  # type: ignore[arg-type]
+    assert found == Agreement(LISTENED, 0, LISTENED)
+    assert not found.borne_out
 
 
 def test_the_boards_are_those_of_the_prediction() -> None:
@@ -60,9 +116,9 @@ def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with SpicePool(2) as pool:
         (heard,) = Listener(pool, memory)(boards, [stand], lambda: calls.append(1))
         nothing = Listener(pool, memory)(boards, [None])
-    assert heard == Heard(BOARDS, BOARDS)
+    assert heard == Agreement(LISTENED, LISTENED)
     assert calls == [1]
-    assert nothing == (Heard(0, 0),)
+    assert nothing == (Agreement(0, 0),)
 
     # What is known is not asked again.
     def never(*_: object) -> Sequence[Any]:

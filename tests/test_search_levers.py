@@ -15,7 +15,7 @@ from designer.progress import Progress
 from designer.search import BOARDS, look, search
 from designer.search_candidate import ALIKE, GAIN, Candidate, Listened, better
 from designer.search_distance import Stand, Stretched
-from designer.search_heard import Heard
+from designer.search_heard import Agreement
 from designer.search_levers import LEVERS, Choice, slower, topologies, variants
 from designer.search_places import Scored, score
 from designer.search_windows import Place, Stretch
@@ -167,10 +167,10 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     def asked(limit: float) -> list[Listened]:
         def listen(
             bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
-        ) -> tuple[Heard, ...]:
+        ) -> tuple[Agreement, ...]:
             fast = bench.design.errors.scales.frequency(1.0) > limit
             assert all(s is not None for s in stands)
-            return (Heard(16, 8 if fast else 15),) * len(stands)
+            return (Agreement(16, 8 if fast else 15),) * len(stands)
 
         found = search(wanted, catalog(), listen=listen)
         (kept,) = [h for h in found.heard if h.kept]
@@ -189,11 +189,32 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     assert len(never) > len(slower) - 1
 
 
-def test_slower_bands_stay_inside_the_band() -> None:
+def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """ngspice bears the slower one out, but few of its boards show the response at all."""
+    monkeypatch.setattr("designer.search.LEVERS", ("opamp", "dead zone"))
+
+    def listen(
+        bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
+    ) -> tuple[Agreement, ...]:
+        first = bench.design.errors.scales.frequency(1.0) == pytest.approx(fastest[0])
+        return (Agreement(16, 13) if first else Agreement(10, 10),) * len(stands)
+
+    wanted = file(PLACE)
+    fastest = [search(wanted, catalog()).made.design.errors.scales.frequency(1.0)]
+    found = search(wanted, catalog(), listen=listen)
+    assert [h.kept for h in found.heard] == [True, False]
+
+
+def test_slower_bands_stay_inside_the_file_s_band() -> None:
     own = Choice.of(BOTH.circuit)
     low, high = own.frequency
-    found = list(slower(own, high))
+    found = list(slower(own, high, low))
     for before, after in itertools.pairwise((high, *(c.frequency[1] for c in found))):
         assert after == before / 2.0
     assert all(low < c.frequency[0] < c.frequency[1] for c in found)
-    assert list(slower(own, low)) == []
+    assert list(slower(own, low, low)) == []
+    # A lever that has gone to the upper third leaves the way down open.
+    third = replace(own, frequency=(0.7 * high, high))
+    assert list(slower(third, high, low)) == found

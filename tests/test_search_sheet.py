@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import io
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from designer.modelfile import parse_model_file
 from designer.plots import to_png
-from designer.search_report import at_model_clearance
+from designer.search_report import _decided, at_model_clearance
 from designer.search_sheet import lever_chart, readme, yield_chart
-from designer.verdict import Yield
+from designer.verdict import Verdict, Yield
 from tests.search_cases import asked
 
 
@@ -132,3 +133,32 @@ def test_the_model_s_clearance_is_everybody_s() -> None:
     assert [r.b for r in fixed.responses] == [None]
     assert [r.expect for r in fixed.responses] == [r.expect for r in file.responses]
     assert fixed.circuit == file.circuit
+
+
+@pytest.mark.parametrize(
+    ("layer", "ok", "decided"),
+    [("reached", 500, True), ("reached", 495, False), ("reached", 480, True), ("all", 495, False),
+     ("tuned", 495, False)],
+)  # fmt: skip
+def test_a_second_look_where_the_first_decides_nothing(layer: str, ok: int, decided: bool) -> None:
+    def rows(count: int) -> list[SimpleNamespace]:
+        return [
+            SimpleNamespace(verdict=Verdict.OK if i < count else Verdict.LOST) for i in range(500)
+        ]
+
+    study = SimpleNamespace(
+        reached_of=lambda _: rows(ok if layer == "reached" else 500),
+        tuned_of=lambda _: rows(ok if layer == "tuned" else 500),
+        all_reached=Yield(ok if layer == "all" else 500, 500 - ok if layer == "all" else 0, 0, 0),
+        all_tuned=None,
+    )
+    assert _decided(study, 1, tuned=layer == "tuned") is decided  # type: ignore[arg-type]
+
+
+def test_two_responses_with_one_n_p_q_have_a_column_each() -> None:
+    twice = case("searched", response("1-1-1", 4000), response("1-1-1", 3000), search=SEARCH)
+    text = readme([twice], "make it", "robust.toml")
+    assert "| 1-1-1 | 1-1-1 (2) |" in text
+    assert table(text, "as built")["searched"][1:3] == [
+        "100.00 (99.90 to 100.00)", "75.00 (73.63 to 76.32)",
+    ]  # fmt: skip
