@@ -108,7 +108,8 @@ def spice_summary(rows: Sequence[Row]) -> Iterator[list[str]]:
             asked = [row for row in of if rung in row.get("rungs", {})]
             fine = [row for row in asked if row["rungs"][rung]["passed"]]
             bad = [row for row in asked if not row["rungs"][rung]["passed"]]
-            worst = max((row["rungs"][rung]["rms"] or 0.0 for row in fine), default=None)
+            waves = [row["rungs"][rung]["rms"] for row in fine]
+            worst = max((wave for wave in waves if wave is not None), default=None)
             yield [
                 f"ngspice {rung}, {axis}",
                 ", ".join(f"{row['value']:g}" for row in fine) or "nowhere",
@@ -237,7 +238,8 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
             f"{ratios[-1]:.0f}. Impacts are counted as in 40 digits in {agree} of "
             f"{sum('counts_agree' in r for r in flow)} scenes. The bound that the tool states is "
             f"{min(bounds):.2g} to {max(bounds):.2g} times the true error of the first period. "
-            f"{len(doubted)} of {len(flow)} scenes are called not to be trusted. *From rest* is "
+            f"{len(doubted)} of {len(flow)} scenes are called not to be trusted. Where there is no "
+            f"error the reference gave up after {stability_flow.MOST} mode changes. *From rest* is "
             "what the start from rest leads to; it is not asked where that takes minutes."
         ),
         "",
