@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,15 @@ PERIODS = 3
 MOST = 1500
 """Mode changes that the reference follows."""
 ROUNDING = 2.0**-53
+SHOWN = {
+    "zeta": "ζ",
+    "omega": "ω",
+    "omega, high": "ω, high",
+    "off critical": "off critical damping",
+    "impacts": "slow and stiff, 1/(ω (1 − k0))",
+}
+"""Axes by the names that are printed, where those differ."""
+Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -149,3 +158,27 @@ def _error(reached: Array, exact: Array, peak: Array) -> float:
 
 def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
+
+
+# ---------------------------------------------------------------------------------------------
+# What is made of the rows
+
+
+def ratio(row: Row, key: str = "error") -> float | None:
+    """Error over magnification and rounding: near 1 is as good as double precision allows."""
+    if row.get(key) is None or not row.get("magnification"):
+        return None
+    return float(row[key]) / (float(row["magnification"]) * ROUNDING)
+
+
+def trusted(row: Row) -> bool:
+    """Whether the tool says of one period, and of what is reached from rest, that it can be."""
+    return not row["said"] and not row.get("trust")
+
+
+def by_axis(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """In order of appearance, from the paper's case outwards."""
+    out: dict[str, list[Row]] = {}
+    for row in rows:
+        out.setdefault(row["axis"], []).append(row)
+    return out

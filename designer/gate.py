@@ -92,7 +92,10 @@ class GateResult:
                 f"the wave is {self.wave:.1g} of the peak off the exact circuit's, bound "
                 f"{self.wave_bound:.1g}"
             )
-        return ", ".join(said) or "its runs do not all show the exact circuit's response"
+        shown = self.read.orbit.response
+        return ", ".join(said) or (
+            f"its runs do not all show the exact circuit's response (the coarsest shows {shown})"
+        )
 
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""

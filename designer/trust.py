@@ -101,7 +101,7 @@ def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
     if runs[0].counts.any():  # all runs may have found the stop with the same last digit
         rounding = max(rounding, ROUNDING * _kick(flow, peak) * magnification)
     error = MARGIN * rounding * (_carried(laps[0]) if orbit.n else 1.0)
-    reasons = _reasons_of_lap(runs, error)
+    reasons = _reasons_of_lap(runs, error, counted=not _at_strobe(orbit, n * flow.drive.period))
     if orbit.n == 0:
         return Trust(rounding, magnification, error, reasons=reasons)
     open_by = MARGIN * float(np.ptp([_radius(lap) for lap in laps]))
@@ -163,7 +163,13 @@ def _carried(lap: Array) -> float:
     return max(1.0, 1.0 / smallest) if smallest > 0.0 else math.inf
 
 
-def _reasons_of_lap(runs: list[FlowResult], error: float) -> tuple[str, ...]:
+def _at_strobe(orbit: Orbit, span: float) -> bool:
+    """Whether an impact falls on the strobe, and so into one lap or the next by its last digit."""
+    times = orbit.impact_times
+    return bool((np.minimum(times, np.abs(span - times)) < STROBE_TOLERANCE * span).any())
+
+
+def _reasons_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[str, ...]:
     reasons = []
     if not error <= STROBE_TOLERANCE:
         reasons.append(
@@ -171,7 +177,7 @@ def _reasons_of_lap(runs: list[FlowResult], error: float) -> tuple[str, ...]:
             f"its peak, and to call a response periodic asks for {STROBE_TOLERANCE:.0e}"
         )
     counts = {tuple(int(c) for c in run.counts.sum(axis=(0, 1))) for run in runs}
-    if len(counts) > 1:
+    if counted and len(counts) > 1:
         said = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
         reasons.append(f"computed with other steps a lap has {said} impacts")
     return tuple(reasons)

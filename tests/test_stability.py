@@ -43,20 +43,20 @@ def test_an_error_is_rounding_as_the_flow_magnifies_it(scene: Scene) -> None:
     row = stability_flow.measure(scene)
     assert row["counts_agree"]
     assert row["impacts"] > 0
-    own = bench_stability.ratio(row)
+    own = stability_flow.ratio(row)
     assert own is not None
     assert own < 1e3
     assert row["first_error"] <= row["bound"] < 1e-8
-    assert bench_stability.trusted(row)
+    assert stability_flow.trusted(row)
 
 
 def test_a_scene_that_is_called_not_to_be_trusted() -> None:
     row = stability_flow.measure(
         Scene("1 - k0", 2.0**-52, replace(BASE, k0=1.0 - 2.0**-52), settled=False)
     )
-    assert not bench_stability.trusted(row)
+    assert not stability_flow.trusted(row)
     assert row["first_error"] <= row["bound"]
-    assert bench_stability.ratio(row) < 100.0  # type: ignore[operator]
+    assert stability_flow.ratio(row) < 100.0  # type: ignore[operator]
 
 
 def test_each_piece_has_a_name_of_its_own() -> None:

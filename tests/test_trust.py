@@ -94,6 +94,20 @@ def test_a_multiplier_that_cannot_be_told_from_one(zeta: float, trusted: bool) -
     assert [("cannot be told from 1" in r) for r in said.reasons] == ([] if trusted else [True])
 
 
+def test_an_impact_on_the_strobe_is_not_two() -> None:
+    """It falls into one lap or the next by its last digit, so counts that differ say nothing."""
+    flow, orbit = found(0.999)
+    late = float(orbit.impact_times[0])
+    at = replace(orbit, impact_times=np.array([flow.drive.period]))
+    assert 0.1 < late < flow.drive.period - 0.1
+    runs = [flow.run(orbit.start, 1), flow.run(np.zeros(4), 1)]
+    assert len({int(run.counts.sum()) for run in runs}) == 2
+    assert trust._reasons_of_lap(runs, 0.0, counted=True)
+    assert not trust._reasons_of_lap(runs, 0.0, counted=False)
+    assert trust._at_strobe(at, flow.drive.period)
+    assert not trust._at_strobe(orbit, flow.drive.period)
+
+
 def test_a_motion_without_a_period_is_judged_by_one_lap() -> None:
     flow, _ = found(0.999)
     start = np.array([0.1, 0.0, 0.0, 0.0])
