@@ -1,9 +1,8 @@
-"""Whole cures of one response with one kind of upgrade left, each against every option measured by
-itself on boards of another seed."""
+"""The references as the one kind of upgrade left, against every option judged by itself on boards
+of another seed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from typing import cast
@@ -16,14 +15,14 @@ from designer.api import Synthesis, synthesise
 from designer.cure_branch import KINDS, Branch, cured
 from designer.cure_search import find_cure
 from designer.cure_slots import part_slots
-from designer.cure_study import Book, Measured, asked, measure, plan_of
+from designer.cure_study import Book, Measured
 from designer.cure_trial import Cure
 from designer.cure_ways import Way
 from designer.margins import Limit, Margin
 from designer.modelfile import parse_model_file
 from designer.quantities import quantities
 from designer.spread import Spread, draw_many
-from designer.upgrade import Place, Upgrades, price
+from designer.upgrade import Upgrades, price
 from designer.verdict import Question, StudyPlan, Yield
 
 BAND = 0.05
@@ -45,52 +44,6 @@ def design(p: int, omega: float, zone: str) -> Synthesis:
 
 def only(kind: str, base: Synthesis, target: float) -> Cure:
     return find_cure(base, target, trim=BAND, without=frozenset(KINDS) - {kind}, seed=3, jobs=1)
-
-
-def measured(base: Synthesis, upgrades: Upgrades, target: float) -> Measured:
-    """The yield of a choice on boards that the cure has not seen."""
-    made = cured(base, upgrades)
-    (question,) = asked(made, made.found)
-    assert question is not None
-    plan = plan_of(made, question, OTHER_SEED)
-    return measure(plan, target, Book(), trim=upgrades.trim, least=1000, most=1000)
-
-
-def cheapest(base: Synthesis, options: Iterable[Upgrades], target: float) -> float | None:
-    """The least price of the options that reach the target; None where none does."""
-    prices = [
-        price(cured(base, u)) - price(base) for u in options if measured(base, u, target).reached
-    ]
-    return min(prices, default=None)
-
-
-def agrees(found: Cure, options: Iterable[Upgrades]) -> None:
-    """The cure is the cheapest of all options, each measured by itself."""
-    least = cheapest(found.base, options, found.target)
-    assert found.reached == (least is not None), found.why
-    if least is not None:
-        assert found.best.price == pytest.approx(least, abs=1e-9)
-        assert measured(found.base, found.best.upgrades, found.target).reached
-
-
-@pytest.mark.slow
-def test_the_other_dead_zone_is_taken_where_it_is_enough() -> None:
-    base = design(6, 0.284, "saturation")
-    found = only("dead zone", base, 0.9)
-    agrees(found, [Upgrades(), Upgrades(dead_zone="rectifier")])
-    assert found.best.upgrades == Upgrades(dead_zone="rectifier")
-
-
-@pytest.mark.slow
-def test_another_clearance_is_taken_where_no_frequency_is_enough() -> None:
-    """At b = 0.25 the last of eight impacts nearly grazes, at any frequency of the window."""
-    base = design(8, 0.215, "rectifier")
-    found = only("place", base, 0.97)
-    elsewhere = [Place(0.215, b) for b in (0.27, 0.283)] + [Place(w, 0.25) for w in (0.213, 0.217)]
-    agrees(found, [Upgrades(), *(Upgrades(places={0: place}) for place in elsewhere)])
-    (place,) = found.best.upgrades.places.values()
-    assert place.omega == 0.215
-    assert place.b > 0.25
 
 
 def test_the_references_are_taken_where_they_move_the_limit(
@@ -134,19 +87,3 @@ def test_the_references_are_taken_where_they_move_the_limit(
     assert found.reached, found.why
     assert found.best.upgrades.reference in enough
     assert found.best.price == pytest.approx(min(enough.values()))
-
-
-@pytest.mark.slow
-def test_a_trim_is_taken_where_it_is_enough() -> None:
-    base = design(5, 0.337, "saturation")
-    found = only("trim", base, 0.97)
-    agrees(found, [Upgrades(), Upgrades(trim=BAND)])
-    assert found.best.upgrades == Upgrades(trim=BAND)
-
-
-@pytest.mark.slow
-def test_a_trim_that_is_not_enough_is_told() -> None:
-    base = design(6, 0.284, "saturation")
-    found = only("trim", base, 0.97)
-    agrees(found, [Upgrades(), Upgrades(trim=BAND)])
-    assert not found.reached
