@@ -232,9 +232,10 @@ class _Hunt:
             bench = self._bench(made.choice, made.found, made.design, LISTENED)
             heard = self.listen(bench, [s.stand for s in made.scored], step)
             tried.append((made, at, heard))
-            if all(h.borne_out for h in heard):
+            if not any(h.borne_out is False for h in heard):
                 break
-        kept = max(tried, key=lambda t: min(h.ngspice for h in t[2]))[0]
+        told = [r for r, h in enumerate(tried[0][2]) if h.borne_out is not None]
+        kept = max(tried, key=lambda t: min((t[2][r].ngspice for r in told), default=0))[0]
         for made, at, heard in tried:
             self.heard.append(Listened(at, heard, made is kept))
             said = ", ".join(str(h) for h in heard)

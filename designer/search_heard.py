@@ -27,7 +27,9 @@ RUNG: Rung = "dynamic"
 STRETCH, LISTENED = 2.0, 16
 """Stretch of the spread, and boards of each response."""
 FEWER, LEAST = 1, 8
-"""Boards of a response that ngspice may lose, and those that it has to keep at least."""
+"""Boards of a response that ngspice may lose, and answers that it takes to say so."""
+LONGEST = 60
+"""Drive periods: a board that is further from its orbit in ngspice is not asked."""
 REFINEMENTS = 1
 """How often the step is halved where ngspice disagrees."""
 
@@ -35,8 +37,8 @@ REFINEMENTS = 1
 @dataclass(frozen=True)
 class Agreement:
     """Of ``LISTENED`` boards of one response: those that show it on the exact circuit, those of
-    them that show it in ngspice as well, and those that ngspice has no answer to: runs that failed,
-    step sizes that differ, all of them where the numerics gate does not pass."""
+    them that show it in ngspice as well, and those without an answer: too long a way to be asked,
+    runs that failed, step sizes that differ, a numerics gate that does not pass."""
 
     exact: int
     ngspice: int
@@ -47,12 +49,10 @@ class Agreement:
         return f"{self.ngspice}/{self.exact}{open_}"
 
     @property
-    def lost(self) -> int:
-        return self.exact - self.ngspice - self.unanswered
-
-    @property
-    def borne_out(self) -> bool:
-        return self.lost <= FEWER and self.ngspice >= LEAST
+    def borne_out(self) -> bool | None:
+        """None where there are too few answers to tell."""
+        answers = self.exact - self.unanswered
+        return answers - self.ngspice <= FEWER if answers >= LEAST else None
 
 
 Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple[Agreement, ...]]
@@ -76,7 +76,7 @@ class Listener:
         for stand in stands:
             found = Agreement(0, 0)
             if stand is not None:
-                said = [RUNG, REFINEMENTS, bench.said(stand, range(LISTENED), (STRETCH,))]
+                said = [RUNG, REFINEMENTS, LONGEST, bench.said(stand, range(LISTENED), (STRETCH,))]
                 (known,) = self._memory.get_all([said], partial(self._ask, bench, stand))
                 found = Agreement(*known)
             out.append(found)
@@ -84,14 +84,14 @@ class Listener:
         return tuple(out)
 
     def _ask(self, bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
-        (nominal,) = gate.check(self._pool, [replace(bench.nominal(stand), rung=RUNG)])
         there = bench.subjects(stand, range(LISTENED), STRETCH)
+        near = [s for s in map(_started, there) if s.discard <= LONGEST]
+        if len(near) < LEAST:
+            return [(len(there), 0, len(there))]
+        (nominal,) = gate.check(self._pool, [replace(bench.nominal(stand), rung=RUNG)])
         if not nominal.passed:
             return [(len(there), 0, len(there))]
-        queries = [
-            Query(_started(subject), nominal.settings, subject.orbit.response, REFINEMENTS)
-            for subject in there
-        ]
+        queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]
         answers = [h for h in confirm(self._pool, queries) if is_answer(h.response)]
         kept = [
             h for h in answers if shows(stand.spec, stand.orbit, h.response, symmetric=h.symmetric)

@@ -16,7 +16,7 @@ from designer.orbit import OrbitStatus
 from designer.quantities import between
 from designer.reduction import Reduction
 from designer.search_distance import STREAM, Stand, Stretched
-from designer.search_heard import FEWER, LISTENED, STRETCH, Agreement, Listener
+from designer.search_heard import FEWER, LEAST, LISTENED, LONGEST, STRETCH, Agreement, Listener
 from designer.search_memory import Memory
 from designer.search_windows import Place
 from designer.spread import draw_many
@@ -40,13 +40,16 @@ def bench(memory: Memory | None = None) -> tuple[Stretched, Stand]:
         (16, 16 - FEWER, 0, True),
         (16, 15 - FEWER, 0, False),
         (16, 15 - FEWER, 1, True),  # no answer is no loss
-        (16, 7, 9, False),  # nor does it bear anything out
-        (0, 0, 0, False),
-        (1, 0, 0, False),
-        (2, 1, 0, False),
+        (16, 7, 9, None),  # nor does it bear anything out
+        (8, 8 - FEWER, 0, True),
+        (8, 7 - FEWER, 0, False),
+        (7, 7, 0, None),
+        (0, 0, 0, None),
     ],
 )
-def test_what_counts_as_borne_out(exact: int, ngspice: int, unanswered: int, held: bool) -> None:
+def test_what_counts_as_borne_out(
+    exact: int, ngspice: int, unanswered: int, held: bool | None
+) -> None:
     assert Agreement(exact, ngspice, unanswered).borne_out is held
 
 
@@ -90,7 +93,25 @@ def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.M
     monkeypatch.setattr("designer.search_heard.gate.check", lambda *_: [Gate(passed=False)])
     (found,) = Listener(None, Memory())(boards, [stand])  # type: ignore[arg-type]
     assert found == Agreement(LISTENED, 0, LISTENED)
-    assert not found.borne_out
+    assert found.borne_out is None
+
+
+def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where eight boards are left the others are unanswered, where fewer are nobody is asked."""
+
+    def confirm(_: object, queries: Sequence[Query]) -> list[Heard]:
+        return [Heard("1-2-2")] * len(queries)
+
+    boards, stand = bench()
+    monkeypatch.setattr("designer.search_heard.gate.check", lambda *_: [Gate(passed=True)])
+    monkeypatch.setattr("designer.search_heard.confirm", confirm)
+    for near, found in (
+        (LEAST, Agreement(16, LEAST, 16 - LEAST)),
+        (LEAST - 1, Agreement(16, 0, 16)),
+    ):
+        ways = iter([LONGEST] * near + [LONGEST + 1] * (16 - near))
+        monkeypatch.setattr("designer.search_heard.way_to_rung", lambda _, ways=ways: next(ways))
+        assert Listener(None, Memory())(boards, [stand]) == (found,)  # type: ignore[arg-type]
 
 
 def test_the_boards_are_those_of_the_prediction() -> None:
