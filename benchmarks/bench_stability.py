@@ -26,7 +26,7 @@ from designer.workers import SpicePool
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "stability"
-FILES = ("stability.md", "stability.json", "flow.png", "flow.svg", "ngspice.png", "ngspice.svg")
+FILES = ("README.md", "stability.json", "flow.png", "flow.svg", "ngspice.png", "ngspice.svg")
 KEY = "1"
 """Of the pieces: another one where scenes or measures change."""
 Row = Mapping[str, Any]
@@ -197,7 +197,7 @@ def edge_table(rows: Sequence[Row]) -> list[str]:
 
 
 def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
-    """stability.md."""
+    """README.md."""
     flow, spice, edges = (pieces[k] for k in ("flow", "spice", "edges"))
     first = [*flow_summary(flow), *spice_summary(spice), *edge_summary(edges)]
     ratios = sorted(r for row in flow if (r := ratio(row)))
@@ -296,9 +296,9 @@ def _filled(text: str) -> str:
 
 
 def write(folder: Path, pieces: Mapping[str, Sequence[Row]], seconds: float) -> None:
-    """stability.{md,json} and the pictures in a folder."""
+    """README.md, stability.json and the pictures in a folder."""
     text = report(pieces, seconds)
-    (folder / "stability.md").write_text(text, encoding="utf-8")
+    (folder / "README.md").write_text(text, encoding="utf-8")
     data = {"format": 1, "commit": commit(), "machine": machine(), **pieces}
     data["cost"] = {"seconds": seconds}
     (folder / "stability.json").write_text(dumps(data), encoding="utf-8")

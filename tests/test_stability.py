@@ -101,7 +101,7 @@ def test_report(tmp_path: Path) -> None:
         "edges": [{"axis": "edge b", "value": 1.0, "refused": "no", "cost": {"seconds": 1.0}}],
     }
     bench_stability.write(tmp_path, pieces, 1.0)
-    text = (tmp_path / "stability.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
     assert "| exact flow, 1 - k0" in text
     assert "2e-16: rounding" in text
     assert "9: so it is" in text

@@ -389,6 +389,8 @@ def test_the_exact_rung_needs_no_ngspice(
     assert response["ngspice"] is None
     assert response["combined"] is None
     assert answer["equation_check"] is None
+    fine = {"trusted": True, "reasons": []}
+    assert response["trust"] == {"model": fine, "circuit": fine, "yield": fine}
     assert answer["provenance"]["versions"]["ngspice"] is None
     words = _words(home, tmp_path / "other")
     assert cli.status([*words[:-1], "auto", "-q"]) == 3
