@@ -220,7 +220,10 @@ class Reference:
 
 @dataclass(frozen=True)
 class Trimmer:
-    """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper."""
+    """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper.
+
+    adjustability : how finely it can be set as a divider, ± as a fraction of the voltage across it.
+    """
 
     name: str
     manufacturer: str
@@ -234,6 +237,7 @@ class Trimmer:
     sources: tuple[str, ...]
     assumed: tuple[str, ...] = ()
     cases: tuple[Case, ...] = ()
+    adjustability: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -347,6 +347,9 @@ class TrimmerTable(BaseModel):
     ]
     rating: RatingTable = Field(RatingTable(), description="a table of power and voltage")
     pins: Annotated[dict[str, str], _pins("low", "wiper", "high")]
+    adjustability: Annotated[
+        float, number("", "a fraction in [0, 0.1): 1e-4 is ± 0.01 %", lambda v: 0.0 <= v < 0.1)
+    ] = 0.0
     price: Annotated[int, _price()]
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]

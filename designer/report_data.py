@@ -74,6 +74,7 @@ class ReportData:
             board=circuit,
             layers=Layers(
                 tuned=result.study.tuned,
+                trimmed=result.study.trimmed,
                 reached=result.study.reached,
                 combined=result.study.combined,
                 recipes=result.study.recipes or (),
