@@ -63,6 +63,8 @@ def words(upgrades: Upgrades) -> list[str]:
         said.append(f"{100.0 * grade:g} % {' '.join(names)}")
     for number, place in sorted(upgrades.places.items()):
         said.append(f"response {number + 1} at ω = {place.omega:g}, b = {place.b:g}")
+    if upgrades.trimmer:
+        said.append("trimmer fitted, set once on each board")
     if upgrades.trim is not None:
         said.append(f"DC offset trimmed on each board, ± {100.0 * upgrades.trim:g} %")
     return said

@@ -17,9 +17,9 @@ import numpy as np
 
 from designer import margins
 from designer.boards import Boards
-from designer.cure_branch import PLACE, TRIM, Branch
+from designer.cure_branch import PLACE, TRIM, TRIMMER, Branch
 from designer.cure_program import Demand, Option, Program, Slot
-from designer.cure_slots import PartSlot, part_slots
+from designer.cure_slots import TRIMMED, PartSlot, part_slots, trimmer_slot
 from designer.cure_study import VERDICTS, Book, asked, measure, plan_of
 from designer.margins import Margin
 from designer.responses import ModelResponse
@@ -36,8 +36,8 @@ DRAWN = 4000
 CROSSINGS = 4
 """Lost boards of each response whose way to the loss is followed."""
 MAP_POINTS, MAP_BOARDS, TRIM_BOARDS = 7, 50, 100
-MOVED, TRIMMED = 1.0, 5.0
-"""Trouble of another setting of the generator, and of trimming each board."""
+MOVED = 1.0
+"""Trouble of another setting of the generator."""
 STREAM = "cure:"
 
 
@@ -45,8 +45,8 @@ STREAM = "cure:"
 class Way:
     """One way of showing a response.
 
-    response : its number. kind : "as it is", "omega", "b" or "trim". place : another than stated.
-    margin : None for trim, which has been measured instead: rate.
+    response : its number. kind : "as it is", "omega", "b", "trim" or "trimmer". place : another
+    than stated. margin : None for the last two, which have been measured instead: rate.
     """
 
     response: int
@@ -72,11 +72,11 @@ class Picture:
     @property
     def slots(self) -> tuple[Slot, ...]:
         """Of the program: parts, then one for each response."""
-        trouble = {"as it is": 0.0, "omega": MOVED, "b": MOVED, "trim": TRIMMED}
+        trouble = {"omega": MOVED, "b": MOVED, "trim": TRIMMED}
         ways = [
             Slot(
                 f"response {number + 1}",
-                tuple(Option(w.kind, 0.0, trouble[w.kind]) for w in row),
+                tuple(Option(w.kind, 0.0, trouble.get(w.kind, 0.0)) for w in row),
             )
             for number, row in enumerate(self.ways)
         ]
@@ -88,7 +88,7 @@ class Picture:
         for part, i in zip(self.parts, pick, strict=False):
             if i and part.grades:
                 grades[part.parts[0]] = part.grades[i]
-            elif i:
+            elif i and part.models:
                 reference = part.models[i]
         taken = self.taken(pick)
         return replace(
@@ -97,6 +97,9 @@ class Picture:
             grades=grades,
             places={w.response: w.place for w in taken if w.place is not None},
             trim=self.trim if any(w.kind == "trim" for w in taken) else None,
+            trimmer=any(
+                i and part.trim is not None for part, i in zip(self.parts, pick, strict=False)
+            ),
         )
 
     def taken(self, pick: Sequence[int]) -> tuple[Way, ...]:
@@ -107,7 +110,9 @@ class Picture:
     def boards(self, pick: Sequence[int]) -> Boards:
         """Boards of this choice, for its linear forms."""
         made = self.branch.made
-        upgrades = replace(self.upgrades(pick), places={}, opamp=None, dead_zone=None, trim=None)
+        upgrades = replace(
+            self.upgrades(pick), places={}, opamp=None, dead_zone=None, trim=None, trimmer=False
+        )
         modelfile = upgraded_file(made.modelfile, upgrades)
         circuit = made.design.circuit
         if upgrades.reference is not None:
@@ -180,7 +185,24 @@ class Picture:
                     rows[: len(shares)] = shares
                     name = f"response {r + 1}: {limit.what}"
                     demands.append(Demand(name, room - fixed, tuple(rows), when))
-        return Program(slots, tuple(demands))
+        return Program(slots, (*demands, *self._one_setting(none)))
+
+    def _one_setting(self, none: tuple[Array, ...]) -> list[Demand]:
+        """Couplings, in the form of demands: a trimmer that is set is set for every response, and
+        no response is shown trimmed by it where it is not."""
+        held = []
+        for k, part in enumerate(self.parts):
+            if part.trim is None:
+                continue
+            otherwise, unset = list(none), list(none)
+            unset[k] = np.array([1.0, 0.0])
+            for r, row in enumerate(self.ways, start=len(self.parts)):
+                otherwise[r] = np.array([float(w.kind != "trimmer") for w in row])
+                for w, way in enumerate(row):
+                    if way.kind == "trimmer":
+                        held.append(Demand("trimmer set", 0.5, tuple(unset), (r, w)))
+            held.append(Demand("trimmer for all", 0.5, tuple(otherwise), (k, 1)))
+        return held
 
     def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
         """What the options of each part add to a limit's variance, and what no upgrade changes, in
@@ -235,6 +257,7 @@ def picture(
     if len(questions) < len(made.found):
         return None
     rows: list[list[Way]] = []
+    short = False
     for r, question in enumerate(questions):
         row = [Way(r, "as it is", question)]
         rows.append(row)
@@ -243,6 +266,7 @@ def picture(
         progress()
         if seen.counts.rate >= target:
             continue
+        short = True
         if PLACE not in without:
             row += _moved(branch, r, made.found[r], plan, jobs, progress)
         if TRIM not in without and trim > 0.0:
@@ -251,6 +275,16 @@ def picture(
             )
             progress()
             row.append(Way(r, "trim", question, rate=few.counts.rate))
+    slot = trimmer_slot(made, without) if short else None
+    if slot is not None and slot.trim is not None:
+        parts = (*parts, slot)
+        for r, question in enumerate(questions):
+            plan = plan_of(made, question, seed)
+            few = measure(
+                plan, target, book, trim=slot.trim, least=TRIM_BOARDS, most=TRIM_BOARDS, jobs=jobs
+            )
+            progress()
+            rows[r].append(Way(r, TRIMMER, question, rate=few.counts.rate))
     ways = _with_margins(branch, rows, seed, book, jobs, progress)
     return Picture(branch, parts, ways, _ratios(branch, parts, seed), trim, seed)
 
@@ -316,7 +350,7 @@ def _with_margins(
 ) -> tuple[tuple[Way, ...], ...]:
     """The ways with their margins; those that are trimmed have none."""
     made = branch.made
-    asked_for = [w for row in rows for w in row if w.kind != "trim"]
+    asked_for = [w for row in rows for w in row if w.kind not in (TRIM, TRIMMER)]
     circuit = made.design.circuit
     spread = Spread.of(made.modelfile, circuit, made.catalog)
     by = []

@@ -24,6 +24,7 @@ from designer.cure_trial import Cure, Trial, measured_none
 from designer.limiting import limiting
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
+from designer.trimmer import DcTrim, dc_trim
 from designer.upgrade import Upgrades
 from designer.verdict import StudyPlan
 
@@ -129,7 +130,7 @@ class _Search:
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
         step = self.said.stage("the design as it is")
-        made, plans = self.base, list[tuple[StudyPlan, float | None] | None]()
+        made, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
         for number, question in enumerate(asked(made, made.found)):
             if question is None:
                 self.unseen.append(number)
@@ -268,11 +269,12 @@ class _Search:
         step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
         upgrades = seen.upgrades(pick)
         made = applied(seen.branch, upgrades)
-        plans = list[tuple[StudyPlan, float | None] | None]()
+        plans = list[tuple[StudyPlan, float | DcTrim | None] | None]()
         for way, question in zip(seen.taken(pick), asked(made, made.found), strict=True):
             plan = None if question is None else plan_of(made, question, fresh(self.seed, number))
             trim = upgrades.trim if way.kind == "trim" else None
-            plans.append(None if plan is None else (plan, trim))
+            setting = dc_trim(made) if way.kind == "trimmer" else trim
+            plans.append(None if plan is None else (plan, setting))
         found: tuple[Measured, ...]
         if boards is None:
             found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)

@@ -9,27 +9,33 @@ from designer.api import Synthesis
 from designer.catalog import Catalog
 from designer.catalogentry import Kind
 from designer.circuit import Capacitor, Resistor
-from designer.cure_branch import GRADE, REFERENCE
+from designer.cure_branch import GRADE, REFERENCE, TRIMMER
 from designer.cure_program import Option, Slot
-from designer.errors import Unreachable
+from designer.errors import InputError, Unreachable
 from designer.partgrades import bought
+from designer.trimmer import DcTrim, dc_trim
+from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 
+TRIMMED = 5.0
+"""Trouble of trimming each board once."""
 CHANGED = 0.01
 """Trouble of one part that is bought at another grade: of two free choices, the smaller change."""
 
 
 @dataclass(frozen=True)
 class PartSlot:
-    """One part, or all references together.
+    """One part, or all references together, or the board's trimmer.
 
     slot : its options. parts : those whose value it decides. grades, models : of each option, the
-    first as it is; grades of a part, models of the references.
+    first as it is; grades of a part, models of the references. trim : the trimmer that the second
+    option fits.
     """
 
     slot: Slot
     parts: tuple[str, ...]
     grades: tuple[float, ...] = ()
     models: tuple[str, ...] = ()
+    trim: DcTrim | None = None
 
 
 def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
@@ -62,13 +68,33 @@ def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[
     return tuple(out)
 
 
+def trimmer_slot(made: Synthesis, without: frozenset[str] = frozenset()) -> PartSlot | None:
+    """The trimmer on the board; None where it is not wanted or there is none.
+
+    Fitting it costs what it adds to the bill of materials, nothing where it is fitted already.
+    """
+    if TRIMMER in without:
+        return None
+    fitted = with_parts_kept(made, upgraded_file(made.modelfile, Upgrades(trimmer=True)))
+    try:
+        trim, extra = dc_trim(fitted), price(fitted) - price(made)
+    except (Unreachable, InputError):
+        return None
+    options = (Option("not set", 0.0), Option("set", extra, TRIMMED))
+    return None if trim is None else PartSlot(Slot(TRIMMER, options), (), trim=trim)
+
+
 def _grades(
     catalog: Catalog, kind: Kind, part: Resistor | Capacitor, now: float
 ) -> PartSlot | None:
     """The slot of one part; None where nothing better is sold. A dearer grade that is no better
     than a cheaper one is left out."""
     base = catalog.part(kind, part.value, now)
-    better = {f.grade for f in catalog.families if f.kind == kind and f.grade < now * (1.0 - 1e-9)}
+    better = {
+        f.grade
+        for f in catalog.families
+        if f.kind == kind and f.use == "signal" and f.grade < now * (1.0 - 1e-9)
+    }
     options, grades = [Option(f"{100.0 * now:g} %", 0.0)], [now]
     for grade in sorted(better):
         try:

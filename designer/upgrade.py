@@ -3,7 +3,8 @@
 Everything that an upgrade changes stands in the model file afterwards, so the upgraded design is a
 design like any other: parts of a better grade are ``[[spread.part]]``, parts that track
 ``[[spread.network]]``, a response at another place of its window has another ``omega`` or ``b``,
-and a DC offset that is trimmed on each board is the band of ``[tuning]``.
+a DC offset that is trimmed on each board is the band of ``[tuning]``, and a trimmer that is fitted
+is ``[board] dc_trim``.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ class Upgrades:
     """What is changed; None and empty: as it is.
 
     grades : fractions by part. places : by number of the response. trim : half-width of the band of
-    the generator's DC offset over its amplitude, within which each board is trimmed.
+    the generator's DC offset over its amplitude, within which each board is trimmed. trimmer :
+    whether the board's own is fitted, and set on each board.
     """
 
     opamp: str | None = None
@@ -52,6 +54,7 @@ class Upgrades:
     grades: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[int, Place] = field(default_factory=dict)
     trim: float | None = None
+    trimmer: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; responses are counted from 1."""
@@ -63,6 +66,7 @@ class Upgrades:
             "grades": dict(sorted(self.grades.items())),
             "places": places,
             "trim": self.trim,
+            "trimmer": self.trimmer,
         }
 
     @classmethod
@@ -75,6 +79,7 @@ class Upgrades:
             grades=dict(said["grades"]),
             places={p["response"] - 1: Place(p["omega"], p["b"]) for p in said["places"]},
             trim=said["trim"],
+            trimmer=said.get("trimmer", False),
         )
 
 
@@ -100,6 +105,8 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
         response |= {"omega": place.omega, "b": place.b}
     if upgrades.trim is not None:
         data["tuning"] = {"frequency": 0.0, "amplitude": 0.0, "offset": upgrades.trim}
+    if upgrades.trimmer:
+        data.setdefault("board", {})["dc_trim"] = "fitted"
     parts = data.setdefault("spread", {}).setdefault("part", [])
     for grade in sorted(set(upgrades.grades.values())):
         names = [name for name, own in upgrades.grades.items() if own == grade]

@@ -70,6 +70,7 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
         grades={"R50": 0.001, "R4": 0.001},
         places={1: Place(0.87, 0.26)},
         trim=0.03,
+        trimmer=True,
     )
     read = upgraded_file(base.modelfile, upgrades)
     assert Upgrades.of_dict(upgrades.as_dict()) == upgrades
@@ -79,6 +80,7 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
     assert read.responses[0] == base.modelfile.responses[0]
     assert read.tuning.as_dict() == {"frequency": 0.0, "amplitude": 0.0, "offset": 0.03}
     assert [(rule.names, rule.grade) for rule in read.spread.part] == [(("R50", "R4"), 0.001)]
+    assert read.board.dc_trim == "fitted"
     assert read.model == base.modelfile.model
     assert upgraded_file(base.modelfile, Upgrades()) is base.modelfile
 
