@@ -60,7 +60,14 @@ def _mounting(choice: BoardChoice, found: Sequence[Component]) -> str:
         "tht": "All parts are soldered through holes.",
     }[choice.spec.mounting]
     pads = [c.reference for c in found if c.bought is None]
-    bare = [c.reference for c in found if not c.fitted]
+    inside = {name for array in choice.arrays for name in array.parts}
+    bare = [c.reference for c in found if not c.fitted and c.reference not in inside]
+    for array in choice.arrays:
+        said += (
+            f" {array.name}, {array.bought.part_number}, takes the places of "
+            f"{', '.join(array.parts)}: the board has their single pads, and its elements are "
+            "wired to these."
+        )
     if pads:
         said += f" Bare pads: {', '.join(pads)}."
     if bare:

@@ -11,7 +11,7 @@ from designer.all_on_one import all_on_one
 from designer.board_parts import board_circuit
 from designer.bom import bill
 from designer.circuit import Circuit
-from designer.components import components
+from designer.components import components, to_buy
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
@@ -57,7 +57,7 @@ class ReportData:
     def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
         """The data of a finished run."""
         circuit, choice = board_circuit(result)
-        lines = bill(components(circuit, result.catalog, choice))
+        lines = bill(to_buy(components(circuit, result.catalog, choice), choice))
         return cls(
             modelfile=result.modelfile,
             design=result.design,

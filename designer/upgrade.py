@@ -23,7 +23,7 @@ from designer.bom import bill
 from designer.catalog import Catalog
 from designer.circuit import Circuit, nominal_board
 from designer.coefficients import coefficient_errors
-from designer.components import components
+from designer.components import components, to_buy
 from designer.design import Certificate, Design
 from designer.modelfile import ModelFile, parse_model_file
 from designer.reduction import Reduction
@@ -40,12 +40,21 @@ class Place:
 
 
 @dataclass(frozen=True)
+class PartNetwork:
+    """Parts that are bought as one array. family : of the catalogue's arrays."""
+
+    family: str
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Upgrades:
     """What is changed; None and empty: as it is.
 
     grades : fractions by part. places : by number of the response. trim : half-width of the band of
     the generator's DC offset over its amplitude, within which each board is trimmed. trimmer :
-    whether the board's own is fitted, and set on each board.
+    whether the board's own is fitted, and set on each board. networks : arrays in the places of
+    parts.
     """
 
     opamp: str | None = None
@@ -55,6 +64,7 @@ class Upgrades:
     places: Mapping[int, Place] = field(default_factory=dict)
     trim: float | None = None
     trimmer: bool = False
+    networks: tuple[PartNetwork, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; responses are counted from 1."""
@@ -67,6 +77,7 @@ class Upgrades:
             "places": places,
             "trim": self.trim,
             "trimmer": self.trimmer,
+            "networks": [asdict(n) for n in self.networks],
         }
 
     @classmethod
@@ -80,6 +91,9 @@ class Upgrades:
             places={p["response"] - 1: Place(p["omega"], p["b"]) for p in said["places"]},
             trim=said["trim"],
             trimmer=said.get("trimmer", False),
+            networks=tuple(
+                PartNetwork(n["family"], tuple(n["parts"])) for n in said.get("networks", ())
+            ),
         )
 
 
@@ -111,6 +125,9 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
     for grade in sorted(set(upgrades.grades.values())):
         names = [name for name, own in upgrades.grades.items() if own == grade]
         parts.append({"names": names, "grade": grade})
+    for network in upgrades.networks:
+        held = data["spread"].setdefault("network", [])
+        held.append({"parts": list(network.parts), "family": network.family})
     read = parse_model_file(toml_text(data), modelfile.source)
     return replace(read, title=modelfile.title, measured=modelfile.measured)
 
@@ -183,5 +200,5 @@ def _found(base: Synthesis, modelfile: ModelFile) -> tuple[ModelResponse, ...]:
 def price(made: Synthesis) -> float:
     """Of everything on its bill of materials, in euro, with the catalogue's price of each class."""
     circuit, choice = board_circuit(made)
-    lines = bill(components(circuit, made.catalog, choice))
+    lines = bill(to_buy(components(circuit, made.catalog, choice), choice))
     return float(np.sum([x.quantity * made.catalog.euro(x.price_class) for x in lines]))
