@@ -11,21 +11,22 @@ grades. z depends a little on the choice, so it is taken again of each choice th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from designer import margins
 from designer.boards import Boards
 from designer.cure_branch import PLACE, TRIM, TRIMMER, Branch
+from designer.cure_couplings import couplings
 from designer.cure_program import Demand, Option, Program, Slot
-from designer.cure_slots import TRIMMED, PartSlot, part_slots, trimmer_slot
+from designer.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
 from designer.cure_study import VERDICTS, Book, asked, measure, plan_of
 from designer.margins import Margin
 from designer.responses import ModelResponse
 from designer.spread import Spread, draw_many
 from designer.system import Array
-from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
+from designer.upgrade import PartNetwork, Place, Upgrades, upgraded_file, with_parts_kept
 from designer.verdict import BLOCK, Answer, Question, StudyPlan, count
 from designer.yield_maps import YieldMap, yield_map
 
@@ -60,7 +61,8 @@ class Way:
 @dataclass(frozen=True)
 class Picture:
     """branch, its slots part by part, the ways of each response, and the standard deviation of each
-    quantity by name under option j of its slot, over that as it is: ratios[j]."""
+    quantity by name under option j of its slot, over that as it is: ratios[j]. matched : by slot
+    and option of an array, the covariance (n, n) of its elements, in the same units."""
 
     branch: Branch
     parts: tuple[PartSlot, ...]
@@ -68,6 +70,7 @@ class Picture:
     ratios: tuple[Mapping[str, float], ...]
     trim: float
     seed: int
+    matched: Mapping[tuple[int, int], Array] = field(default_factory=dict)
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -84,10 +87,12 @@ class Picture:
 
     def upgrades(self, pick: Sequence[int]) -> Upgrades:
         """What a choice of options changes."""
-        grades, reference = {}, None
+        grades, reference, networks = {}, None, list[PartNetwork]()
         for part, i in zip(self.parts, pick, strict=False):
             if i and part.grades:
                 grades[part.parts[0]] = part.grades[i]
+            elif i and part.network:
+                networks.append(PartNetwork(part.models[i], part.network))
             elif i and part.models:
                 reference = part.models[i]
         taken = self.taken(pick)
@@ -97,6 +102,7 @@ class Picture:
             grades=grades,
             places={w.response: w.place for w in taken if w.place is not None},
             trim=self.trim if any(w.kind == "trim" for w in taken) else None,
+            networks=tuple(networks),
             trimmer=any(
                 i and part.trim is not None for part, i in zip(self.parts, pick, strict=False)
             ),
@@ -185,24 +191,8 @@ class Picture:
                     rows[: len(shares)] = shares
                     name = f"response {r + 1}: {limit.what}"
                     demands.append(Demand(name, room - fixed, tuple(rows), when))
-        return Program(slots, (*demands, *self._one_setting(none)))
-
-    def _one_setting(self, none: tuple[Array, ...]) -> list[Demand]:
-        """Couplings, in the form of demands: a trimmer that is set is set for every response, and
-        no response is shown trimmed by it where it is not."""
-        held = []
-        for k, part in enumerate(self.parts):
-            if part.trim is None:
-                continue
-            otherwise, unset = list(none), list(none)
-            unset[k] = np.array([1.0, 0.0])
-            for r, row in enumerate(self.ways, start=len(self.parts)):
-                otherwise[r] = np.array([float(w.kind != "trimmer") for w in row])
-                for w, way in enumerate(row):
-                    if way.kind == "trimmer":
-                        held.append(Demand("trimmer set", 0.5, tuple(unset), (r, w)))
-            held.append(Demand("trimmer for all", 0.5, tuple(otherwise), (k, 1)))
-        return held
+        kinds = [[w.kind for w in row] for row in self.ways]
+        return Program(slots, (*demands, *couplings(slots, self.parts, kinds)))
 
     def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
         """What the options of each part add to a limit's variance, and what no upgrade changes, in
@@ -220,6 +210,12 @@ class Picture:
                 continue
             for j in range(len(shares[slot])):
                 shares[slot][j] += base * self.ratios[j].get(q.name, 1.0) ** 2
+        slope_of = {q.name: s for q, s in zip(margin.quantities, limit.slopes / limit.sigma,
+                                              strict=True) if q.group == "values"}  # fmt: skip
+        for (k, j), together in self.matched.items():
+            slopes = np.array([slope_of.get(name, 0.0) for name in self.parts[k].network])
+            # Over what the parts are counted with as they are, one by one.
+            shares[k][j] = float(slopes @ together @ slopes - slopes @ slopes)
         # The limit's own variance is of drawn boards, on which parts that track vary together: what
         # that adds or takes stays in proportion.
         own = 1.0 / total if total > 0.0 else 1.0
@@ -252,7 +248,7 @@ def picture(
     progress : called once a piece of work.
     """
     made = branch.made
-    parts = part_slots(made, without)
+    parts = (*part_slots(made, without), *network_slots(made, without))
     questions = [q for q in asked(made, made.found) if q is not None]
     if len(questions) < len(made.found):
         return None
@@ -286,7 +282,8 @@ def picture(
             progress()
             rows[r].append(Way(r, TRIMMER, question, rate=few.counts.rate))
     ways = _with_margins(branch, rows, seed, book, jobs, progress)
-    return Picture(branch, parts, ways, _ratios(branch, parts, seed), trim, seed)
+    ratios, matched = _ratios(branch, parts, seed), _matched(branch, parts, seed)
+    return Picture(branch, parts, ways, ratios, trim, seed, matched)
 
 
 def _moved(
@@ -392,8 +389,25 @@ def _ratios(
     columns: list[dict[str, float]] = []
     names = [name for p in parts for name in p.parts]
     for j in range(most):
-        boards = bare.boards([min(j, len(p.slot.options) - 1) for p in parts])
+        boards = bare.boards([0 if p.network else min(j, len(p.slot.options) - 1) for p in parts])
         known = {**boards.values, **boards.reference}
         columns.append({name: float(np.std(known[name])) for name in names})
     base = columns[0]
     return tuple({n: c[n] / base[n] if base[n] > 0.0 else 1.0 for n in names} for c in columns)
+
+
+def _matched(
+    branch: Branch, parts: Sequence[PartSlot], seed: int
+) -> Mapping[tuple[int, int], Array]:
+    """By slot and option of an array, the covariance of its elements on drawn boards, in units of
+    each part's own standard deviation as it is."""
+    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    none = [0] * len(parts)
+    found = {}
+    plain = bare.boards(none).values if any(p.network for p in parts) else {}
+    for k, part in enumerate(parts):
+        for j in range(1, len(part.slot.options) if part.network else 1):
+            drawn = bare.boards([j if i == k else 0 for i in range(len(parts))]).values
+            off = [(drawn[n] - drawn[n].mean()) / float(np.std(plain[n])) for n in part.network]
+            found[k, j] = np.array([[float((a * b).mean()) for b in off] for a in off])
+    return found

@@ -17,6 +17,7 @@ import numpy as np
 from designer.api import Synthesis
 from designer.boards import Boards
 from designer.cure_branch import Branch, Refused, applied, branches
+from designer.cure_couplings import finest
 from designer.cure_picture import Picture, Way, picture
 from designer.cure_program import Program, cheapest
 from designer.cure_study import Book, Measured, asked, fresh, measure, measure_together, plan_of
@@ -331,14 +332,14 @@ class _Search:
         """Which responses no choice of upgrades is enough for, as the pictures are known now."""
         best = np.zeros(len(self.base.found))
         for which, seen in enumerate(self.pictures):
-            finest = [len(p.slot.options) - 1 for p in seen.parts]
-            boards = seen.boards(finest + [0] * len(seen.ways))
             shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
-            for r, row in enumerate(seen.ways):
-                for w in range(len(row)):
-                    if (which, r, w) not in self.spoiled:
-                        pick = [*finest, *(w if k == r else 0 for k in range(len(seen.ways)))]
-                        best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
+            for most in finest(seen.parts):
+                boards = seen.boards(most + [0] * len(seen.ways))
+                for r, row in enumerate(seen.ways):
+                    for w in range(len(row)):
+                        if (which, r, w) not in self.spoiled:
+                            pick = [*most, *(w if k == r else 0 for k in range(len(seen.ways)))]
+                            best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
         short = [
             f"response {r + 1} ({share:.3f} at most)"
             for r, share in enumerate(best)
