@@ -21,13 +21,15 @@ from designer.cure_branch import PLACE, TRIM, TRIMMER, Branch
 from designer.cure_couplings import couplings
 from designer.cure_program import Demand, Option, Program, Slot
 from designer.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
-from designer.cure_study import VERDICTS, Book, asked, measure, plan_of
+from designer.cure_study import Book, answers_of, asked, measure, plan_of
+from designer.cure_trimmed import trimmed_margins
 from designer.margins import Margin
 from designer.responses import ModelResponse
 from designer.spread import Spread, draw_many
 from designer.system import Array
+from designer.trimmer import DcTrim
 from designer.upgrade import PartNetwork, Place, Upgrades, upgraded_file, with_parts_kept
-from designer.verdict import BLOCK, Answer, Question, StudyPlan, count
+from designer.verdict import BLOCK, Question, StudyPlan, count
 from designer.yield_maps import YieldMap, yield_map
 
 SAMPLES = 250
@@ -47,7 +49,8 @@ class Way:
     """One way of showing a response.
 
     response : its number. kind : "as it is", "omega", "b", "trim" or "trimmer". place : another
-    than stated. margin : None for the last two, which have been measured instead: rate.
+    than stated. margin : None for trim, and for the trimmer where it is enough by itself, which
+    have been measured instead: rate.
     """
 
     response: int
@@ -271,19 +274,35 @@ def picture(
             )
             progress()
             row.append(Way(r, "trim", question, rate=few.counts.rate))
+    ways = _with_margins(branch, rows, seed, book, jobs, progress)
     slot = trimmer_slot(made, without) if short else None
     if slot is not None and slot.trim is not None:
         parts = (*parts, slot)
-        for r, question in enumerate(questions):
-            plan = plan_of(made, question, seed)
-            few = measure(
-                plan, target, book, trim=slot.trim, least=TRIM_BOARDS, most=TRIM_BOARDS, jobs=jobs
-            )
-            progress()
-            rows[r].append(Way(r, TRIMMER, question, rate=few.counts.rate))
-    ways = _with_margins(branch, rows, seed, book, jobs, progress)
+        more = _trimmed(branch, slot.trim, questions, target, seed, book, jobs, progress)
+        ways = tuple((*row, way) for row, way in zip(ways, more, strict=True))
     ratios, matched = _ratios(branch, parts, seed), _matched(branch, parts, seed)
     return Picture(branch, parts, ways, ratios, trim, seed, matched)
+
+
+def _trimmed(
+    branch: Branch,
+    trim: DcTrim,
+    questions: Sequence[Question],
+    target: float,
+    seed: int,
+    book: Book,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Way]:
+    """Every response on boards whose trimmers are set; with their margins where that alone is not
+    enough."""
+    plan = plan_of(branch.made, questions[0], seed, SAMPLES)
+    plan = replace(plan, questions=tuple(questions))
+    found = trimmed_margins(plan, trim, target, book, count=CROSSINGS, jobs=jobs, progress=progress)
+    return [
+        Way(r, TRIMMER, question, None, margin, rate)
+        for r, (question, (margin, rate)) in enumerate(zip(questions, found, strict=True))
+    ]
 
 
 def _moved(
@@ -347,14 +366,14 @@ def _with_margins(
 ) -> tuple[tuple[Way, ...], ...]:
     """The ways with their margins; those that are trimmed have none."""
     made = branch.made
-    asked_for = [w for row in rows for w in row if w.kind not in (TRIM, TRIMMER)]
+    asked_for = [w for row in rows for w in row if w.kind != TRIM]
     circuit = made.design.circuit
     spread = Spread.of(made.modelfile, circuit, made.catalog)
     by = []
     for w in asked_for:
         plan = StudyPlan(circuit, spread, seed, SAMPLES, (w.question,))
         letters = "".join(book.block(plan, block, None, jobs)[0] for block in plan.blocks(BLOCK))
-        by.append([_answer(sample, letter) for sample, letter in enumerate(letters)])
+        by.append(answers_of(letters))
         progress()
     boards = draw_many(circuit, spread, seed, range(SAMPLES))
     found = margins.margins(
@@ -371,12 +390,6 @@ def _with_margins(
         for w, m, row in zip(asked_for, found, by, strict=True)
     }
     return tuple(tuple(known.get(id(w), w) for w in row) for row in rows)
-
-
-def _answer(sample: int, letter: str) -> Answer:
-    """As much of an answer as margins need."""
-    nan = float("nan")
-    return Answer(sample, 0, VERDICTS[letter], "", "", nan, nan, nan, nan, 0)
 
 
 def _ratios(

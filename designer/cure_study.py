@@ -18,7 +18,7 @@ from designer.spread import Spread
 from designer.study_hash import study_hash
 from designer.trimmer import DcTrim, trimmed_answers
 from designer.tuning import benched_block
-from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
+from designer.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield
 
 MOST = 8000
 """Boards of a study at which it gives up."""
@@ -98,6 +98,15 @@ class Book:
         self._known.setdefault(study, {})[place] = letters
         self._save({"format": 1, "studies": self._known})
         return letters, True
+
+
+def answers_of(letters: str) -> list[Answer]:
+    """As much of each board's answer as margins need."""
+    nan = float("nan")
+    return [
+        Answer(sample, 0, VERDICTS[letter], "", "", nan, nan, nan, nan, 0)
+        for sample, letter in enumerate(letters)
+    ]
 
 
 @dataclass(frozen=True)
