@@ -7,7 +7,7 @@ from designer.api import Synthesis
 from designer.board_parts import board_circuit
 from designer.bom import bill, bill_csv
 from designer.bom_layouts import file_of, layouts
-from designer.components import components, pin_numbers
+from designer.components import components, pin_numbers, to_buy
 from designer.modelfile import ModelFile
 
 BILL, NOTES, DRAWING, PICTURE = "bom.csv", "board.md", "schematic.svg", "schematic.png"
@@ -30,7 +30,7 @@ def texts(made: Synthesis) -> dict[str, str]:
 
     circuit, choice = board_circuit(made)
     found = components(circuit, made.catalog, choice)
-    bought = bill(found)
+    bought = bill(to_buy(found, choice))
     others = layouts(made.modelfile.board.bom, made.catalog.folders)
     return {
         BILL: bill_csv(bought),

@@ -14,12 +14,14 @@ from designer.board_parts import (
     protection_offset,
     trim_reach,
 )
+from designer.boards import Boards
 from designer.boardspec import BoardChoice
 from designer.catalog import Catalog
-from designer.circuit import Circuit, Section
+from designer.circuit import Circuit, Section, nominal_board
 from designer.components import Component
 from designer.fittings import Connector, Trimmer
 from designer.quantity import format_quantity
+from designer.trimmer import at_rest
 from designer.views import View
 
 PROBE = 100e-12
@@ -58,7 +60,14 @@ def _mounting(choice: BoardChoice, found: Sequence[Component]) -> str:
         "tht": "All parts are soldered through holes.",
     }[choice.spec.mounting]
     pads = [c.reference for c in found if c.bought is None]
-    bare = [c.reference for c in found if not c.fitted]
+    inside = {name for array in choice.arrays for name in array.parts}
+    bare = [c.reference for c in found if not c.fitted and c.reference not in inside]
+    for array in choice.arrays:
+        said += (
+            f" {array.name}, {array.bought.part_number}, takes the places of "
+            f"{', '.join(array.parts)}: the board has their single pads, and its elements are "
+            "wired to these."
+        )
     if pads:
         said += f" Bare pads: {', '.join(pads)}."
     if bare:
@@ -143,12 +152,12 @@ def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
     )
     steps = [
         f"Turn {name} until its wiper, net `trim`, is at 0 V.",
-        "Start the board as `setup.csv` says, and wait until nothing changes any more.",
-        "Read the two voltages of `v1` at which `fv` leaves zero, and the highest and the lowest "
-        "value of `v1`. What goes past each stop is its excess.",
-        f"Turn {name} until both excesses are equal. A stop on one side has no second excess: turn "
-        "until the rest point of `v1`, read without the generator, is where it was calculated.",
-        "Wait for 100 periods after each turn. If the wanted response is there, leave it.",
+        "Start the board as the first line of `setup.csv` says. On the X-Y display, `v1` against "
+        "`fv`, read where `fv` leaves zero.",
+        "Switch the generator off, leave it connected, and wait until `v1` rests.",
+        f"Turn the scale of `v1` up ten times, and {name} until {_centred(circuit)}. If {name} "
+        "comes to its end first, leave it there.",
+        "This one setting is for all responses.",
     ]
     head = (
         f"{name} and {series.name} add to the summing node what a DC of up to ± {_q(reach, 'V')} "
@@ -157,6 +166,15 @@ def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
     )
     numbered = "\n".join(f"{i}. {step}" for i, step in enumerate(steps, start=1))
     return ["## DC trim", f"{head} {fit}", numbered]
+
+
+def _centred(circuit: Circuit) -> str:
+    """Where v1 is to rest."""
+    rest, stops = at_rest(Boards.of(circuit, [nominal_board(circuit)]))
+    if len(stops) == 2:
+        return "`v1` rests in the middle of the two voltages"
+    away = [f"{_q(abs(float(rest[0] - v[0])), 'V', 4)} from that voltage" for v in stops.values()]
+    return f"`v1` rests {away[0] if away else 'at ' + _q(float(rest[0]), 'V', 3)}"
 
 
 def _spare(circuit: Circuit) -> list[str]:

@@ -29,7 +29,7 @@ from designer.diode_model import THERMAL, diode_model
 from designer.errors import Unreachable
 from designer.fittings import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.modelfile import ModelFile
-from designer.partgrades import bought
+from designer.partgrades import arrays, bought
 from designer.responses import ModelResponse
 from designer.views import View
 
@@ -86,7 +86,8 @@ def board_circuit(made: Synthesis | RunResult) -> tuple[Circuit, BoardChoice]:
     """The circuit of a design with its fittings, and the choices that they were made by."""
     choice = board_choice(made.modelfile, made.design, made.found)
     grades = bought(made.modelfile, made.design.circuit, made.catalog)
-    choice = replace(choice, grades=grades)
+    inside = arrays(made.modelfile, made.design.circuit, made.catalog)
+    choice = replace(choice, grades=grades, arrays=inside)
     return fitted(made.design.circuit, choice, made.catalog), choice
 
 

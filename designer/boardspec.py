@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel
 
 from designer.catalogentry import Mounting
 from designer.circuitspec import CircuitSpec
 from designer.schema import STRICT, Accepts, choice, flag, number, physical
+
+if TYPE_CHECKING:
+    from designer.partgrades import PartArray
 
 Trim = Literal["none", "unfitted", "fitted"]
 
@@ -42,9 +45,9 @@ class BoardChoice:
     """A board for one design: what the model file says, and the figures that it depends on.
 
     resistor_grade, capacitor_grade : of what is bought, fractions; grades : of the parts that are
-    bought at another one, by name. diode : the protection's, by
-    its name in the catalogue. trim : largest DC [V] that the trim stands for, as if the generator
-    had it.
+    bought at another one, by name; arrays : that take the places of single parts. diode : the
+    protection's, by its name in the catalogue. trim : largest DC [V] that the trim stands for, as
+    if the generator had it.
     """
 
     spec: BoardSpec = BoardSpec()
@@ -53,6 +56,7 @@ class BoardChoice:
     diode: str = "1N4148"
     trim: float = 0.25
     grades: Mapping[str, float] = field(default_factory=dict)
+    arrays: tuple[PartArray, ...] = ()
 
     @classmethod
     def of(cls, circuit: CircuitSpec, board: BoardSpec | None = None) -> BoardChoice:

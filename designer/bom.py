@@ -26,6 +26,7 @@ COLUMNS = (
 )
 KINDS = (
     "resistor",
+    "array",
     "capacitor",
     "diode",
     "reference",

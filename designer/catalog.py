@@ -77,7 +77,7 @@ ENVIRONMENT = "DESIGNER_CATALOGS"
 LAYOUTS = "bom-layouts"
 """Folder of layouts beside the catalogue's files (``designer.bom_layouts``)."""
 _SAME = 1e-9  # relative; values and grades closer than this are the same
-_NamedT = TypeVar("_NamedT", OpAmp, Diode, Reference)
+_NamedT = TypeVar("_NamedT", OpAmp, Diode, Reference, PartFamily)
 _CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
 
 
@@ -162,6 +162,27 @@ class Catalog:
                 else f"a grade that can be bought: {self._best_grade(kind)}",
             )
         return _choice(*min(found, key=lambda each: (each[0].price, each[0].grade)))
+
+    def array(self, name: str, value: float) -> PartChoice:
+        """The array of this family with parts of this value.
+
+        Raises
+        ------
+        InputError : no such family of arrays, or not in a case that the board takes.
+        Unreachable : it has no such value.
+        """
+        arrays = [f for f in self.families if f.use == "array"]
+        family = _named(arrays, name, "array")
+        if self.mounting not in ("mixed", family.mounting):
+            expected = f'"{family.mounting}" or "mixed": {name} is sold in no other case'
+            raise InputError(None, "board.mounting", self.mounting, expected)
+        found = self._holding([family], value)
+        if not found:
+            low, high = (format_quantity(v, UNITS[family.kind]) for v in family.range)
+            spelled = format_quantity(value, UNITS[family.kind])
+            said = f"a value that {name} is sold in: {' '.join(family.series)}, {low} to {high}"
+            raise Unreachable(None, "array", spelled, said)
+        return _choice(*found[0])
 
     def substitute(self, part: PartChoice, grade: float) -> PartChoice | None:
         """Another maker's part of the same value, grade or better, use and footprint; the cheapest,

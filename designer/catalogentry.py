@@ -11,7 +11,7 @@ from designer.quantity import decode_value, encode_value
 from designer.vendor_model import VendorModel
 
 Kind = Literal["resistor", "capacitor"]
-Use = Literal["signal", "supply"]
+Use = Literal["signal", "supply", "array"]
 """What a family is for: "supply" is for decoupling alone, where the value need not be kept."""
 Mounting = Literal["mixed", "smd", "tht"]
 """Which cases a board takes: any, the first that the catalogue names; or one kind alone."""
@@ -220,7 +220,10 @@ class Reference:
 
 @dataclass(frozen=True)
 class Trimmer:
-    """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper."""
+    """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper.
+
+    adjustability : how finely it can be set as a divider, ± as a fraction of the voltage across it.
+    """
 
     name: str
     manufacturer: str
@@ -234,6 +237,7 @@ class Trimmer:
     sources: tuple[str, ...]
     assumed: tuple[str, ...] = ()
     cases: tuple[Case, ...] = ()
+    adjustability: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -260,9 +264,14 @@ class Header:
         return self.footprint.format(ways=ways)
 
 
+AGAIN = "{value}"
+"""Stands in a part number's suffix for the value once more."""
+
+
 @dataclass(frozen=True)
 class PartNumber:
-    """A rule: prefix, the value in a named code (``quantity.VALUE_CODES``), suffix."""
+    """A rule: prefix, the value in a named code (``quantity.VALUE_CODES``), suffix; in the suffix
+    ``{value}`` stands for the value once more."""
 
     prefix: str
     code: str
@@ -270,13 +279,18 @@ class PartNumber:
 
     def of(self, value: float) -> str:
         """The part number of a value; ValueError for a value that the code cannot spell."""
-        return f"{self.prefix}{encode_value(self.code, value)}{self.suffix}"
+        spelled = encode_value(self.code, value)
+        return f"{self.prefix}{spelled}{self.suffix.replace(AGAIN, spelled)}"
 
     def value(self, number: str) -> float:
         """The value [Ω or F] of a part number; ValueError for one that is not of this rule."""
-        if not (number.startswith(self.prefix) and number.endswith(self.suffix)):
+        first = len(self.prefix)
+        fixed = first + len(self.suffix.replace(AGAIN, ""))
+        length = (len(number) - fixed) // (1 + self.suffix.count(AGAIN))
+        spelled = number[first : first + max(length, 0)]
+        if number != f"{self.prefix}{spelled}{self.suffix.replace(AGAIN, spelled)}":
             raise ValueError(f"not a part number {self.prefix}…{self.suffix}")
-        return decode_value(self.code, number[len(self.prefix) : len(number) - len(self.suffix)])
+        return decode_value(self.code, spelled)
 
 
 @dataclass(frozen=True)
@@ -286,7 +300,8 @@ class PartFamily:
     ``values`` [Ω or F] are those that can be bought, ascending; temperature_coefficient [1/K] is a
     magnitude; ``assumed`` says in words what could not be compared with a data sheet. drift : most
     that a value changes in the data sheet's endurance test, a fraction; None where not known.
-    use : "supply" for families that no signal goes through.
+    use : "supply" for families that no signal goes through, "array" for several parts of one value
+    in one case: elements of them, whose values differ by ``matching`` at most, a fraction.
     """
 
     name: str
@@ -306,6 +321,15 @@ class PartFamily:
     values: tuple[float, ...] = field(repr=False)
     drift: float | None = None
     use: Use = "signal"
+    elements: int = 1
+    matching: float | None = None
+
+    @property
+    def share(self) -> float:
+        """Of a deviation within the grade, what an array's parts have in common: two of them then
+        differ by ``matching`` at most (``spread.Group``)."""
+        assert self.matching is not None
+        return 1.0 - min(0.5 * self.matching / self.grade, 1.0)
 
     @property
     def mounting(self) -> Literal["smd", "tht"]:

@@ -117,9 +117,9 @@ def _cell(key: str, cell: str) -> object:
         return cell.split()
     if key in ("rating", "part_number", "example"):
         return {word.partition("=")[0]: word.partition("=")[2] for word in cell.split()}
-    if key == "price":
+    if key in ("price", "elements"):
         return int(cell) if cell.isdecimal() and cell.isascii() else cell
-    if key in ("grade", "temperature_coefficient", "drift"):
+    if key in ("grade", "temperature_coefficient", "drift", "matching"):
         try:
             return parse_quantity(cell, "")
         except ValueError:
@@ -138,6 +138,10 @@ def _family(table: FamilyTable, file: str, place: str) -> PartFamily:
         raise refuse(error.field, error.found, error.expected) from None
     except ValueError as error:
         raise refuse("range", str(error), f"quantities in {unit}, ascending") from None
+    for key, stated in (("elements", table.elements), ("matching", table.matching)):
+        if (stated is not None) is not (table.use == "array"):
+            expected = f'{key} with use = "array", and only there'
+            raise refuse(key, "nothing" if stated is None else stated, expected)
     if not values:
         raise refuse("values", "nothing", "values, or series and a range that holds some")
     rule = PartNumber(table.part_number.prefix, table.part_number.code, table.part_number.suffix)
@@ -174,6 +178,8 @@ def _family(table: FamilyTable, file: str, place: str) -> PartFamily:
         values=values,
         drift=table.drift,
         use=table.use,
+        elements=table.elements or 1,
+        matching=table.matching,
     )
 
 

@@ -151,6 +151,15 @@ def _ways() -> Accepts:
     return Accepts("two whole numbers, the fewest and the most ways, up to 99", check)
 
 
+def _elements() -> Accepts:
+    def check(value: object) -> int:
+        if type(value) is not int or not 2 <= value <= 16:
+            raise ValueError
+        return value
+
+    return Accepts("a whole number from 2 to 16", check)
+
+
 def _with_ways(expected: str) -> Accepts:
     """Text in which "{ways}" or "{ways:02}" stands for the number of ways."""
 
@@ -226,7 +235,11 @@ class FamilyTable(BaseModel):
     example: ExampleTable | None = Field(None, description="a table of value, part_number")
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]
     assumed: Annotated[tuple[str, ...], lines("a list of what was not checked")] = ()
-    use: Annotated[Use, choice("signal", "supply")] = "signal"
+    use: Annotated[Use, choice("signal", "supply", "array")] = "signal"
+    elements: Annotated[int | None, _elements()] = None
+    matching: Annotated[
+        float | None, number("", "a fraction in (0, 1): 0.001 is 0.1 %", lambda v: 0.0 < v < 1.0)
+    ] = None
 
 
 class CaseTable(BaseModel):
@@ -347,6 +360,9 @@ class TrimmerTable(BaseModel):
     ]
     rating: RatingTable = Field(RatingTable(), description="a table of power and voltage")
     pins: Annotated[dict[str, str], _pins("low", "wiper", "high")]
+    adjustability: Annotated[
+        float, number("", "a fraction in [0, 0.1): 1e-4 is ± 0.01 %", lambda v: 0.0 <= v < 0.1)
+    ] = 0.0
     price: Annotated[int, _price()]
     footprint: Annotated[str, _footprint()]
     sources: Annotated[tuple[str, ...], lines(_SOURCES)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.boardspec import BoardChoice
 from designer.catalog import Catalog, Kind, Use
@@ -116,6 +116,44 @@ def pin_numbers(found: Iterable[Component]) -> Numbers:
     return out
 
 
+def to_buy(found: Iterable[Component], choice: BoardChoice) -> tuple[Component, ...]:
+    """These components with the arrays that take the places of some of them: what a bill is of.
+
+    An array stands on the bill alone: the board keeps the single parts' pads.
+    """
+    out = list(found)
+    for array in choice.arrays:
+        family, sold = array.bought.family, array.bought
+        unit = "Ω" if family.kind == "resistor" else "F"
+        said = f"{family.elements} {family.dielectric} {family.kind}s, "
+        said += f"{100 * family.grade:g} %, matched to {100 * (family.matching or 0.0):g} %"
+        part = Bought(
+            manufacturer=sold.manufacturer,
+            part_number=sold.part_number,
+            rating=rated(sold.rating),
+            price_class=sold.price,
+            grade=family.grade,
+            dielectric=family.dielectric,
+        )
+        out.append(
+            Component(
+                reference=array.name,
+                kind="array",
+                value=format_quantity(sold.value, unit),
+                quantity=sold.value,
+                footprint=sold.footprint,
+                pins=(),
+                role=f"in the places of {' '.join(array.parts)}",
+                stage=SUPPLY,
+                views=View.BOM,
+                description=said,
+                bought=part,
+                parts=array.parts,
+            )
+        )
+    return tuple(out)
+
+
 def joined(found: Iterable[Component]) -> dict[str, tuple[tuple[str, str], ...]]:
     """What each net joins: (reference, pad) in natural order, nets sorted. Pads without a net are
     left out."""
@@ -136,8 +174,11 @@ class _Lister:
     def __init__(self, circuit: Circuit, catalog: Catalog, choice: BoardChoice) -> None:
         self.circuit, self.catalog, self.choice = circuit, catalog, choice
         self.stages: Mapping[str, str] = stage_names(circuit)
+        self.inside = {name for array in choice.arrays for name in array.parts}
 
     def one(self, part: Fitting) -> Component:
+        if isinstance(part, Resistor | Capacitor) and part.name in self.inside:
+            part = replace(part, views=part.views & ~View.BOM)
         if isinstance(part, Resistor):
             grade = self.choice.grades.get(part.name, self.choice.resistor_grade)
             return self.passive(part, "resistor", "Ω", grade, "signal")

@@ -17,8 +17,8 @@ from designer.errors import InputError
 from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 
 OPAMP, DEAD_ZONE, REFERENCE = "op-amp", "dead zone", "reference"
-GRADE, PLACE, TRIM = "grade", "place", "trim"
-KINDS = (GRADE, REFERENCE, OPAMP, DEAD_ZONE, PLACE, TRIM)
+GRADE, NETWORK, PLACE, TRIM, TRIMMER = "grade", "network", "place", "trim", "trimmer"
+KINDS = (GRADE, NETWORK, REFERENCE, TRIMMER, OPAMP, DEAD_ZONE, PLACE, TRIM)
 """Kinds of upgrades, by the names that leave them out; for a space a hyphen may stand."""
 
 

@@ -61,8 +61,11 @@ def words(upgrades: Upgrades) -> list[str]:
     for grade in sorted(set(upgrades.grades.values())):
         names = [name for name, own in upgrades.grades.items() if own == grade]
         said.append(f"{100.0 * grade:g} % {' '.join(names)}")
+    said += [f"array {n.family} for {' '.join(n.parts)}" for n in upgrades.networks]
     for number, place in sorted(upgrades.places.items()):
         said.append(f"response {number + 1} at ω = {place.omega:g}, b = {place.b:g}")
+    if upgrades.trimmer:
+        said.append("trimmer fitted, set once on each board")
     if upgrades.trim is not None:
         said.append(f"DC offset trimmed on each board, ± {100.0 * upgrades.trim:g} %")
     return said

@@ -12,22 +12,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
 from designer import margins
 from designer.boards import Boards
-from designer.catalog import Catalog
 from designer.circuit import Circuit
-from designer.cure_branch import Branch
+from designer.cure_branch import TRIM, TRIMMER, Branch
+from designer.cure_couplings import couplings, finest
 from designer.cure_program import Demand, Option, Program, Slot
-from designer.cure_slots import PartSlot, part_slots
+from designer.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
 from designer.cure_study import Book, asked
+from designer.cure_trimmed import trimmed_margins, trimmer_ways
 from designer.cure_ways import SAMPLES, Looker, Way, foretold
 from designer.margins import Margin
 from designer.spread import Spread, draw_many
 from designer.system import Array
-from designer.upgrade import Upgrades, rebuilt, upgraded_file
+from designer.trimmer import DcTrim
+from designer.upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
 from designer.verdict import StudyPlan
 
 DRAWN = 4000
@@ -36,15 +39,16 @@ KEPT = 8
 """Choices whose boards are kept."""
 CROSSINGS = 4
 """Lost boards of each response whose way to the loss is followed."""
-MOVED, TRIMMED = 1.0, 5.0
-"""Trouble of another setting of the generator, and of trimming each board."""
+MOVED = 1.0
+"""Trouble of another setting of the generator."""
 STREAM = "cure:"
 
 
 @dataclass(frozen=True)
 class Picture:
     """branch, its slots part by part, the ways of each response, and the standard deviation of each
-    quantity by name under option j of its slot, over that as it is: ratios[j]."""
+    quantity by name under option j of its slot, over that as it is: ratios[j]. matched : by slot
+    and option of an array, the covariance (n, n) of its elements, in the same units."""
 
     branch: Branch
     parts: tuple[PartSlot, ...]
@@ -52,16 +56,17 @@ class Picture:
     ratios: tuple[Mapping[str, float], ...]
     trim: float
     seed: int
+    matched: Mapping[tuple[int, int], Array] = field(default_factory=dict)
     _drawn: dict[tuple[int, ...], Boards] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def slots(self) -> tuple[Slot, ...]:
         """Of the program: parts, then one for each response."""
-        trouble = {"as it is": 0.0, "omega": MOVED, "b": MOVED, "trim": TRIMMED}
+        trouble = {"omega": MOVED, "b": MOVED, TRIM: TRIMMED}
         ways = [
             Slot(
                 f"response {number + 1}",
-                tuple(Option(w.kind, 0.0, trouble[w.kind]) for w in row),
+                tuple(Option(w.kind, 0.0, trouble.get(w.kind, 0.0)) for w in row),
             )
             for number, row in enumerate(self.ways)
         ]
@@ -69,11 +74,13 @@ class Picture:
 
     def upgrades(self, pick: Sequence[int]) -> Upgrades:
         """What a choice of options changes."""
-        grades, reference = {}, None
+        grades, reference, networks = {}, None, list[PartNetwork]()
         for part, i in zip(self.parts, pick, strict=False):
             if i and part.grades:
                 grades[part.parts[0]] = part.grades[i]
-            elif i:
+            elif i and part.network:
+                networks.append(PartNetwork(part.models[i], part.network))
+            elif i and part.models:
                 reference = part.models[i]
         taken = self.taken(pick)
         return replace(
@@ -81,7 +88,11 @@ class Picture:
             reference=reference,
             grades=grades,
             places={w.response: w.place for w in taken if w.place is not None},
-            trim=self.trim if any(w.kind == "trim" for w in taken) else None,
+            trim=self.trim if any(w.kind == TRIM for w in taken) else None,
+            networks=tuple(networks),
+            trimmer=any(
+                i and part.trim is not None for part, i in zip(self.parts, pick, strict=False)
+            ),
         )
 
     def taken(self, pick: Sequence[int]) -> tuple[Way, ...]:
@@ -89,11 +100,16 @@ class Picture:
         chosen = pick[len(self.parts) :]
         return tuple(row[i] for row, i in zip(self.ways, chosen, strict=True))
 
+    @property
+    def trimmer(self) -> DcTrim | None:
+        """The board's, of the branch's circuit, where setting it is among the options."""
+        return next((p.trim for p in self.parts if p.trim is not None), None)
+
     def spread(self, pick: Sequence[int]) -> tuple[Circuit, Spread]:
         """The circuit and the spread of this choice, each response where it was."""
         made = self.branch.made
         chosen = replace(self, ways=()).upgrades(pick[: len(self.parts)])
-        upgrades = replace(chosen, opamp=None, dead_zone=None)
+        upgrades = replace(chosen, opamp=None, dead_zone=None, trimmer=False)
         modelfile = upgraded_file(made.modelfile, upgrades)
         circuit = made.design.circuit
         if upgrades.reference is not None:
@@ -175,7 +191,8 @@ class Picture:
                     rows[: len(shares)] = shares
                     name = f"response {r + 1}: {limit.what}"
                     demands.append(Demand(name, room - fixed, tuple(rows), when))
-        return Program(slots, tuple(demands))
+        kinds = [[w.kind for w in row] for row in self.ways]
+        return Program(slots, (*demands, *couplings(slots, self.parts, kinds)))
 
     def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
         """What the options of each part add to a limit's variance, and what no upgrade changes, in
@@ -193,6 +210,12 @@ class Picture:
                 continue
             for j in range(len(shares[slot])):
                 shares[slot][j] += base * self.ratios[j].get(q.name, 1.0) ** 2
+        slope_of = {q.name: s for q, s in zip(margin.quantities, limit.slopes / limit.sigma,
+                                              strict=True) if q.group == "values"}  # fmt: skip
+        for (k, j), together in self.matched.items():
+            slopes = np.array([slope_of.get(name, 0.0) for name in self.parts[k].network])
+            # Over what the parts are counted with as they are, one by one.
+            shares[k][j] = float(slopes @ together @ slopes - slopes @ slopes)
         # The limit's own variance is of drawn boards, on which parts that track vary together: what
         # that adds or takes stays in proportion.
         own = 1.0 / total if total > 0.0 else 1.0
@@ -226,38 +249,60 @@ def picture(
     without : kinds of upgrades that are not wanted. progress : called once a piece of work.
     """
     made = branch.made
-    parts = part_slots(made, without)
+    parts = (*part_slots(made, without), *network_slots(made, without))
     questions = [q for q in asked(made, made.found) if q is not None]
     if len(questions) < len(made.found):
         return None
     bare = Picture(branch, parts, (), (), trim, seed)
-    pick = finest(parts, made.catalog)
-    circuit, spread = bare.spread(pick)
-    looker = Looker(
-        branch, target, seed, book, trim, without, bare.boards(pick),
-        StudyPlan(circuit, spread, seed, SAMPLES, ()), jobs, progress,
-    )  # fmt: skip
+    best = tuple(
+        StudyPlan(*bare.spread(pick), seed, SAMPLES, ()) for pick in finest(parts, made.catalog)
+    )
+    looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress)
     rows = [[looker.seen(Way(r, "as it is", question))] for r, question in enumerate(questions)]
+    order = sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r))
+    firsts = [rows[r][0] for r in order]
+
+    @cache
+    def fitted() -> tuple[PartSlot, list[Way]] | None:
+        slot = trimmer_slot(made, without)
+        found = (
+            None if slot is None or slot.trim is None else trimmer_ways(looker, slot.trim, firsts)
+        )
+        return None if slot is None or found is None else (slot, found)
+
     out = False
-    for r in sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r)):
+    for r in order:
         rows[r] = looker.ways(rows[r][0])
-        out = all(way.hopeless for way in rows[r])
+        out = all(way.hopeless for way in rows[r]) and fitted() is None
         if out:
             break
-    bare = replace(
-        bare, ways=tuple(map(tuple, rows)), ratios=() if out else _ratios(branch, parts, seed)
-    )
+    enough = [row[0].rate >= target or any(way.certain for way in row) for row in rows]
+    if not out and not all(enough) and (trimmer := fitted()) is not None:
+        parts = (*parts, trimmer[0])
+        for way in trimmer[1]:
+            rows[way.response].append(way)
+    bare = replace(bare, parts=parts, ways=tuple(map(tuple, rows)))
     # What limits the design as it is is told in any case.
     told = branch.upgrades == Upgrades()
-    open_ways = [
+    if told or not out:
+        ratios, matched = _ratios(branch, parts, seed), _matched(branch, parts, seed)
+        bare = replace(bare, ratios=ratios, matched=matched)
+    which = [
         (r, w)
         for r, row in enumerate(rows)
         for w, way in enumerate(row)
-        if (told and w == 0) or not (out or way.certain or way.hopeless or way.kind == "trim")
+        if (told and w == 0) or not (out or _needs_no_picture(way, rows, target))
     ]
-    if told and out:
-        bare = replace(bare, ratios=_ratios(branch, parts, seed))
-    return pictured(bare, open_ways, jobs, progress)
+    return pictured(bare, which, jobs, progress)
+
+
+def _needs_no_picture(way: Way, rows: Sequence[Sequence[Way]], target: float) -> bool:
+    """Whether a way is taken as it was seen, or not at all. The trimmer is, where it is enough for
+    every response."""
+    if way.kind == TRIMMER:
+        every = [w.rate for row in rows for w in row if w.kind == TRIMMER]
+        return min(every) >= target
+    return way.certain or way.hopeless or way.kind == TRIM
 
 
 def pictured(
@@ -267,21 +312,39 @@ def pictured(
     progress: Callable[[], None] = lambda: None,
 ) -> Picture:
     """The same with margins of these ways (response, way)."""
-    if not which:
-        return seen
     made = seen.branch.made
     circuit = made.design.circuit
     spread = Spread.of(made.modelfile, circuit, made.catalog)
-    boards = draw_many(circuit, spread, seen.seed, range(SAMPLES))
-    questions = [seen.ways[r][w].question for r, w in which]
-    answers = []
-    for question in questions:
-        answers.append(foretold(boards, question, jobs))
-        progress()
-    found = margins.margins(
-        circuit, questions, boards, answers, count=CROSSINGS, jobs=jobs, progress=progress
-    )
-    known = dict(zip(which, found, strict=True))
+    known = dict[tuple[int, int], Margin]()
+    trimmed = [(r, w) for r, w in which if seen.ways[r][w].kind == TRIMMER]
+    for some in ([key for key in which if key not in trimmed], trimmed):
+        if not some:
+            continue
+        questions = tuple(seen.ways[r][w].question for r, w in some)
+        if some is trimmed:
+            assert seen.trimmer is not None
+            plan = StudyPlan(circuit, spread, seen.seed, SAMPLES, questions)
+            found = trimmed_margins(
+                plan, seen.trimmer, count=CROSSINGS, jobs=jobs, progress=progress
+            )
+        else:
+            boards = draw_many(circuit, spread, seen.seed, range(SAMPLES))
+            answers = []
+            for question in questions:
+                answers.append(foretold(boards, question, jobs))
+                progress()
+            found = list(
+                margins.margins(
+                    circuit,
+                    questions,
+                    boards,
+                    answers,
+                    count=CROSSINGS,
+                    jobs=jobs,
+                    progress=progress,
+                )
+            )
+        known.update(zip(some, found, strict=True))
     ways = tuple(
         tuple(
             replace(way, margin=known[r, w]) if (r, w) in known else way
@@ -290,15 +353,6 @@ def pictured(
         for r, row in enumerate(seen.ways)
     )
     return replace(seen, ways=ways)
-
-
-def finest(parts: Sequence[PartSlot], catalog: Catalog) -> list[int]:
-    """The option of each slot whose parts vary least."""
-    out = []
-    for p in parts:
-        grades = p.grades or tuple(catalog.reference(name).grade for name in p.models)
-        out.append(int(np.argmin(grades)) if grades else len(p.slot.options) - 1)
-    return out
 
 
 def _ratios(
@@ -311,8 +365,25 @@ def _ratios(
     columns: list[dict[str, float]] = []
     names = [name for p in parts for name in p.parts]
     for j in range(most):
-        boards = bare.boards([min(j, len(p.slot.options) - 1) for p in parts])
+        boards = bare.boards([0 if p.network else min(j, len(p.slot.options) - 1) for p in parts])
         known = {**boards.values, **boards.reference}
         columns.append({name: float(np.std(known[name])) for name in names})
     base = columns[0]
     return tuple({n: c[n] / base[n] if base[n] > 0.0 else 1.0 for n in names} for c in columns)
+
+
+def _matched(
+    branch: Branch, parts: Sequence[PartSlot], seed: int
+) -> Mapping[tuple[int, int], Array]:
+    """By slot and option of an array, the covariance of its elements on drawn boards, in units of
+    each part's own standard deviation as it is."""
+    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    none = [0] * len(parts)
+    found = {}
+    plain = bare.boards(none).values if any(p.network for p in parts) else {}
+    for k, part in enumerate(parts):
+        for j in range(1, len(part.slot.options) if part.network else 1):
+            drawn = bare.boards([j if i == k else 0 for i in range(len(parts))]).values
+            off = [(drawn[n] - drawn[n].mean()) / float(np.std(plain[n])) for n in part.network]
+            found[k, j] = np.array([[float((a * b).mean()) for b in off] for a in off])
+    return found

@@ -15,9 +15,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from designer.api import Synthesis
-from designer.cure_branch import Branch, Refused, branches
+from designer.cure_branch import TRIMMER, Branch, Refused, branches
+from designer.cure_couplings import finest
 from designer.cure_learning import cut, shown
-from designer.cure_picture import Picture, finest, picture, pictured
+from designer.cure_picture import Picture, picture, pictured
 from designer.cure_program import Program, cheapest
 from designer.cure_study import (
     FIRST,
@@ -35,6 +36,7 @@ from designer.limiting import limiting, together
 from designer.preconditions import cores, need_responses
 from designer.progress import Progress
 from designer.spread import Spread
+from designer.trimmer import DcTrim
 from designer.upgrade import Upgrades
 from designer.verdict import StudyPlan
 
@@ -135,7 +137,7 @@ class _Search:
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
         step = self.said.stage("the design as it is")
-        made, plans = self.base, list[tuple[StudyPlan, float | None] | None]()
+        made, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
         for number, question in enumerate(asked(made, made.found)):
             if question is None:
                 self.unseen.append(number)
@@ -278,13 +280,12 @@ class _Search:
         upgrades = seen.upgrades(pick)
         circuit, spread = seen.spread(pick)
         drawn = fresh(self.seed, number)
-        plans = [
-            (
-                StudyPlan(circuit, spread, drawn, MOST, (way.question,)),
-                upgrades.trim if way.kind == "trim" else None,
-            )
-            for way in seen.taken(pick)
-        ]
+        plans = list[tuple[StudyPlan, float | DcTrim | None]]()
+        for way in seen.taken(pick):
+            setting: float | DcTrim | None = upgrades.trim if way.kind == "trim" else None
+            if way.kind == TRIMMER and seen.trimmer is not None:
+                setting = seen.trimmer.on(circuit)
+            plans.append((StudyPlan(circuit, spread, drawn, MOST, (way.question,)), setting))
         found: tuple[Measured, ...]
         if boards is None:
             found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
@@ -312,7 +313,7 @@ class _Search:
             if r not in short:
                 continue
             w = pick[len(seen.parts) + r]
-            if way.certain and way.margin is None:  # not one of the boards seen so far was lost
+            if way.margin is None and (way.certain or way.kind == TRIMMER):  # it seemed enough
                 step = self.said.stage(f"linear picture, {seen.branch.name}: response {r + 1}")
                 seen = pictured(seen, [(r, w)], self.jobs, step)
                 self.pictures[which] = seen
@@ -344,16 +345,16 @@ class _Search:
         """Which responses no choice of upgrades is enough for, as the pictures are known now."""
         best = np.zeros(len(self.base.found))
         for which, seen in enumerate(self.pictures):
-            best_parts = finest(seen.parts, seen.branch.made.catalog)
-            boards = seen.boards(best_parts)
             shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
-            for r, row in enumerate(seen.ways):
-                for w, way in enumerate(row):
-                    if way.hopeless:
-                        best[r] = max(best[r], way.most)
-                    elif (which, r, w) not in self.spoiled:
-                        pick = [*best_parts, *(w if k == r else 0 for k in range(len(seen.ways)))]
-                        best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
+            for most in finest(seen.parts, seen.branch.made.catalog):
+                boards = seen.boards(most)
+                for r, row in enumerate(seen.ways):
+                    for w, way in enumerate(row):
+                        if way.hopeless:
+                            best[r] = max(best[r], way.most)
+                        elif (which, r, w) not in self.spoiled:
+                            pick = [*most, *(w if k == r else 0 for k in range(len(seen.ways)))]
+                            best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
         short = [
             f"response {r + 1} ({share:.3f} at most)"
             for r, share in enumerate(best)

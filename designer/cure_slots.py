@@ -9,27 +9,35 @@ from designer.api import Synthesis
 from designer.catalog import Catalog
 from designer.catalogentry import Kind
 from designer.circuit import Capacitor, Resistor
-from designer.cure_branch import GRADE, REFERENCE
+from designer.cure_branch import GRADE, NETWORK, REFERENCE, TRIMMER
 from designer.cure_program import Option, Slot
-from designer.errors import Unreachable
+from designer.errors import InputError, Unreachable
 from designer.partgrades import bought
+from designer.spread import Spread
+from designer.trimmer import DcTrim, dc_trim
+from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 
+TRIMMED = 5.0
+"""Trouble of trimming each board once."""
 CHANGED = 0.01
 """Trouble of one part that is bought at another grade: of two free choices, the smaller change."""
 
 
 @dataclass(frozen=True)
 class PartSlot:
-    """One part, or all references together.
+    """One part, all references together, parts that an array may hold, or the board's trimmer.
 
     slot : its options. parts : those whose value it decides. grades, models : of each option, the
-    first as it is; grades of a part, models of the references.
+    first as it is; grades of a part, models of the references, families of an array. trim : the
+    trimmer that the second option fits. network : parts whose places an array may take.
     """
 
     slot: Slot
     parts: tuple[str, ...]
     grades: tuple[float, ...] = ()
     models: tuple[str, ...] = ()
+    trim: DcTrim | None = None
+    network: tuple[str, ...] = ()
 
 
 def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
@@ -62,13 +70,72 @@ def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[
     return tuple(out)
 
 
+def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
+    """Resistors of one value in sets that an array can hold, those at one summing node together.
+
+    Parts that were measured, that track already or have a grade of their own stay as they are.
+    """
+    if NETWORK in without:
+        return ()
+    spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
+    spread = Spread.of(made.modelfile, circuit, catalog)
+    measured = made.modelfile.measured
+    taken = {name for g in spread.groups if not g.reel for name in g.parts}
+    taken |= {*spread.grades, *spread.shapes, *(() if measured is None else measured.values)}
+    nodes = {s.inverting: k for k, s in enumerate(circuit.sections)}
+
+    def place(part: Resistor) -> int:
+        return min((nodes[net] for net in part.nets if net in nodes), default=len(nodes))
+
+    equal: dict[float, list[Resistor]] = {}
+    for part in sorted(circuit.resistors, key=place):
+        if part.name not in taken:
+            equal.setdefault(float(f"{part.value:.9g}"), []).append(part)
+    out = []
+    for family in (f for f in catalog.families if f.use == "array" and f.kind == "resistor"):
+        for value, same in equal.items():
+            try:
+                array = catalog.array(family.name, value)
+            except (InputError, Unreachable):
+                continue
+            single = catalog.euro(catalog.part("resistor", value, spec.resistor_grade).price)
+            for first in range(0, len(same), family.elements):
+                names = tuple(p.name for p in same[first : first + family.elements])
+                if len(names) > 1:
+                    extra = catalog.euro(array.price) - len(names) * single
+                    options = (Option("single parts", 0.0), Option(family.name, extra, CHANGED))
+                    slot = Slot(f"array {' '.join(names)}", options)
+                    out.append(PartSlot(slot, (), models=("", family.name), network=names))
+    return tuple(out)
+
+
+def trimmer_slot(made: Synthesis, without: frozenset[str] = frozenset()) -> PartSlot | None:
+    """The trimmer on the board; None where it is not wanted or there is none.
+
+    Fitting it costs what it adds to the bill of materials, nothing where it is fitted already.
+    """
+    if TRIMMER in without:
+        return None
+    fitted = with_parts_kept(made, upgraded_file(made.modelfile, Upgrades(trimmer=True)))
+    try:
+        trim, extra = dc_trim(fitted), price(fitted) - price(made)
+    except (Unreachable, InputError):
+        return None
+    options = (Option("not set", 0.0), Option("set", extra, TRIMMED))
+    return None if trim is None else PartSlot(Slot(TRIMMER, options), (), trim=trim)
+
+
 def _grades(
     catalog: Catalog, kind: Kind, part: Resistor | Capacitor, now: float
 ) -> PartSlot | None:
     """The slot of one part; None where nothing better is sold. A dearer grade that is no better
     than a cheaper one is left out."""
     base = catalog.part(kind, part.value, now)
-    better = {f.grade for f in catalog.families if f.kind == kind and f.grade < now * (1.0 - 1e-9)}
+    better = {
+        f.grade
+        for f in catalog.families
+        if f.kind == kind and f.use == "signal" and f.grade < now * (1.0 - 1e-9)
+    }
     options, grades = [Option(f"{100.0 * now:g} %", 0.0)], [now]
     for grade in sorted(better):
         try:

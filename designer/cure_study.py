@@ -16,6 +16,7 @@ from designer.orbit import OrbitStatus
 from designer.responses import ModelResponse
 from designer.spread import Spread
 from designer.study_hash import study_hash
+from designer.trimmer import DcTrim, trimmed_answers
 from designer.tuning import benched_block
 from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 
@@ -69,21 +70,27 @@ class Book:
         self._save = save
 
     def block(
-        self, plan: StudyPlan, indices: range, trim: float | None, jobs: int
+        self, plan: StudyPlan, indices: range, trim: float | DcTrim | None, jobs: int
     ) -> tuple[str, bool]:
         """The letters of these boards, and whether they had to be found.
 
-        trim : each board's DC offset is trimmed by the bench procedure within this band.
+        trim : each board's DC offset is trimmed by the bench procedure within this band, or its
+        own trimmer is set.
         """
-        bands = None if trim is None else Bands(0.0, 0.0, trim)
+        bands = Bands(0.0, 0.0, trim) if isinstance(trim, float) else None
         layer, more = "samples", dict[str, Any]()
         if bands is not None:
             layer, more = "tuned", {"bands": bands.as_dict()}
+        elif isinstance(trim, DcTrim):
+            layer, more = "trimmed", trim.as_dict()
         study, place = study_hash(plan, layer, more), str(indices.start)
         letters = self._known.get(study, {}).get(place, "")
         if len(letters) >= len(indices):
             return letters[: len(indices)], False
-        answers = exact.block(plan, indices, jobs)
+        if isinstance(trim, DcTrim):
+            answers, _ = trimmed_answers(trim, plan, indices, jobs)
+        else:
+            answers = exact.block(plan, indices, jobs)
         verdicts = [a.verdict for a in answers]
         if bands is not None:
             verdicts = benched_block(plan, indices, answers, bands, jobs)
@@ -141,7 +148,7 @@ def measure(
     target: float,
     book: Book,
     *,
-    trim: float | None = None,
+    trim: float | DcTrim | None = None,
     least: int = 2 * BLOCK,
     most: int = MOST,
     first: int | None = None,
@@ -170,7 +177,7 @@ def measure(
 
 
 def measure_together(
-    plans: Sequence[tuple[StudyPlan, float | None] | None],
+    plans: Sequence[tuple[StudyPlan, float | DcTrim | None] | None],
     target: float,
     book: Book,
     *,
@@ -182,8 +189,8 @@ def measure_together(
     One block of boards each. Once a response has missed the target the choice is out, whatever
     becomes of the others: only those that miss it are asked on more boards, for their share.
 
-    plans : each with the band within which its boards are trimmed, None: as built; None where there
-    is no response to ask for, which misses.
+    plans : each with what its boards are trimmed by (``Book.block``), None: as built; None where
+    there is no response to ask for, which misses.
     """
     found = [Measured(Yield(0, 0, 0, 0), target) for _ in plans]
     for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):

@@ -1,15 +1,16 @@
 """The ways in which a branch may show a response, as far as few boards tell: as it is, at another
 place in its window, trimmed.
 
-Everything here is foretold, not decided: a board without a period after the drive periods that the
-compiled way grants counts as lost. What is chosen is measured afterwards. A way is hopeless where
-even boards with the best parts that can be bought are lost too often for the target; no picture of
-it is needed then, nor of a branch all of whose ways to one response are.
+Everything here is foretold, not decided: of the boards without a period after the drive periods
+that the compiled way grants a few are settled, and only if none of them shows the response are the
+others taken for lost. What is chosen is measured afterwards. A way is hopeless where even of boards
+with the best parts that can be bought too many for the target are seen to be lost; no picture of it
+is needed then, nor of a branch all of whose ways to one response are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,6 @@ from designer.cure_branch import PLACE, TRIM, Branch
 from designer.cure_study import Book, asked, measure, plan_of
 from designer.ensemble import Ensemble
 from designer.margins import Margin
-from designer.orbit import Orbit
 from designer.spread import Spread, draw_many
 from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
 from designer.verdict import Answer, Question, StudyPlan, Verdict, count, judge
@@ -37,17 +37,17 @@ FAINT = 0.5
 RARE = 1e-3
 """Chance of as many lost boards under the target at which a way is hopeless."""
 DOUBTED = 10
-"""Boards left open by the forecast that are settled before a way is called hopeless."""
+"""Boards left open by the forecast that are settled before the others are taken for lost."""
 
 
 @dataclass(frozen=True)
 class Way:
     """One way of showing a response.
 
-    response : its number. kind : "as it is", "omega", "b" or "trim". place : another than stated.
-    margin : None where there is no picture of it. rate : share of boards that show the response,
-    parts as they are; 1 without a margin: no board of ``SAMPLES`` was lost. most : that share with
-    the best parts, where it was asked; hopeless : it is too small for the target.
+    response : its number. kind : "as it is", "omega", "b", "trim" or "trimmer". place : another
+    than stated. margin : None where there is no picture of it. rate : share of boards that show the
+    response, parts as they are; 1 without a margin: no board of ``SAMPLES`` was lost. most : that
+    share with the best parts, at most; hopeless : it is too small for the target.
     """
 
     response: int
@@ -65,38 +65,55 @@ class Way:
         return self.rate == 1.0
 
 
-def forecast(boards: Boards, question: Question, jobs: int) -> list[Orbit | None]:
-    """The orbit of each board; None where the compiled way leaves it open."""
+def forecast(boards: Boards, question: Question, jobs: int) -> list[Verdict | None]:
+    """The verdict of each board; None where the compiled way leaves it open."""
     size = len(boards)
-    return Ensemble(boards, jobs=jobs).quick(
+    found = Ensemble(boards, jobs=jobs).quick(
         range(size),
         [question.excitation.drive] * size,
         np.tile(question.start.start, (size, 1)),
         jobs=jobs,
     )
+    said = [None if o is None else judge(o, question.spec, question.start)[0] for o in found]
+    return [None if verdict is Verdict.FAILED else verdict for verdict in said]
+
+
+def settled(boards: Boards, question: Question, jobs: int) -> list[Verdict]:
+    """The verdict of each board, given all the time there is."""
+    size = len(boards)
+    found = Ensemble(boards).settle(
+        range(size),
+        [question.excitation.drive] * size,
+        np.tile(question.start.start, (size, 1)),
+        jobs=jobs,
+    )
+    return [judge(orbit, question.spec, question.start)[0] for orbit in found]
 
 
 def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
-    """As much of an answer as a margin needs, for each board; what is open is lost."""
+    """As much of an answer as a margin needs, for each board. What stays open is lost where a few
+    of the open ones have been settled and none shows the response."""
+    found = forecast(boards, question, jobs)
+    left = [k for k, verdict in enumerate(found) if verdict is None]
+    for some in (left[:DOUBTED], left[DOUBTED:]):
+        said = settled(boards.take(some), question, jobs) if some else []
+        for k, verdict in zip(some, said, strict=True):
+            found[k] = verdict
+        if Verdict.OK not in said:
+            break
     nan = float("nan")
     return [
-        Answer(sample, 0, _verdict(orbit, question), "", "", nan, nan, nan, nan, 0)
-        for sample, orbit in enumerate(forecast(boards, question, jobs))
+        Answer(sample, 0, verdict or Verdict.LOST, "", "", nan, nan, nan, nan, 0)
+        for sample, verdict in enumerate(found)
     ]
-
-
-def _verdict(orbit: Orbit | None, question: Question) -> Verdict:
-    if orbit is None:
-        return Verdict.LOST
-    return judge(orbit, question.spec, question.start)[0]
 
 
 @dataclass(frozen=True)
 class Looker:
     """Looks for the ways of a branch's responses.
 
-    target : yield wanted. finest : (DRAWN,) boards with the best part of every slot. plan : the
-    study of boards with these parts, of no question yet. trim : half-width of the DC offset's band.
+    target : yield wanted. trim : half-width of the DC offset's band. best : studies of boards with
+    the best parts that can be bought, of no question yet: single ones, then arrays.
     """
 
     branch: Branch
@@ -105,54 +122,67 @@ class Looker:
     book: Book
     trim: float
     without: frozenset[str]
-    finest: Boards
-    best_parts: StudyPlan
+    best: tuple[StudyPlan, ...]
     jobs: int
     progress: Callable[[], None]
 
-    def drawn(self) -> Boards:
-        """Boards with the parts as they are."""
+    @property
+    def plan(self) -> StudyPlan:
+        """The study of boards with the parts as they are, of no question yet."""
         made = self.branch.made
         spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
-        return draw_many(made.design.circuit, spread, self.seed, range(SAMPLES))
+        return StudyPlan(made.design.circuit, spread, self.seed, SAMPLES, ())
 
-    def seen(self, way: Way) -> Way:
-        """A way with the share of boards that show it."""
-        found = count(foretold(self.drawn(), way.question, self.jobs))
+    def seen(self, way: Way, boards: Boards | None = None) -> Way:
+        """A way with the share of boards that show it.
+
+        boards : that are asked; None: with the parts as they are.
+        """
+        boards = drawn(self.plan, SAMPLES) if boards is None else boards
+        found = count(foretold(boards, way.question, self.jobs))
         self.progress()
         return replace(way, rate=0.0 if np.isnan(found.rate) else found.rate)
 
-    def bounded(self, way: Way) -> Way:
-        """A way with what the best parts make of it."""
-        if way.certain or way.kind == "trim":
+    def bounded(self, way: Way, finest: Sequence[Boards] | None = None) -> Way:
+        """A way with what the best parts make of it.
+
+        finest : (2 ``FEW``,) boards with them; None: not trimmed.
+        """
+        if way.certain or way.kind == TRIM:
             return way
-        lost = total = 0
-        for first in (0, FEW):
-            boards = self.finest.take(range(first, first + FEW))
-            found = forecast(boards, way.question, self.jobs)
-            lost += sum(_verdict(orbit, way.question) is not Verdict.OK for orbit in found)
-            total += FEW
-            hopeless = bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
-            if hopeless:
-                unsettled = [k for k, orbit in enumerate(found) if orbit is None][:DOUBTED]
-                if unsettled:
-                    hopeless = not self._any_settles(boards.take(unsettled), way.question)
-                break
-            if lost == 0:
+        if finest is None:
+            finest = [drawn(plan, 2 * FEW) for plan in self.best]
+        shares = []
+        for boards in finest:
+            lost, total = self._lost(boards, way.question)
+            shares.append(1.0 - lost / total)
+            if not self._too_many(lost, total):
                 break
         self.progress()
-        return replace(way, most=1.0 - lost / total, hopeless=hopeless)
+        return replace(way, most=max(shares), hopeless=self._too_many(lost, total))
 
-    def _any_settles(self, boards: Boards, question: Question) -> bool:
-        """Whether one of these boards shows the response after all, given all the time there is."""
-        size = len(boards)
-        found = Ensemble(boards).settle(
-            range(size),
-            [question.excitation.drive] * size,
-            np.tile(question.start.start, (size, 1)),
-            jobs=self.jobs,
-        )
-        return any(_verdict(orbit, question) is Verdict.OK for orbit in found)
+    def _lost(self, boards: Boards, question: Question) -> tuple[int, int]:
+        """How many of how many boards are lost. More are asked while it is few; those left open are
+        settled as far as they decide whether it is too many."""
+        lost, left = 0, list[int]()
+        for total in (FEW, 2 * FEW):
+            some = range(total - FEW, total)
+            found = forecast(boards.take(some), question, self.jobs)
+            left += [k for k, verdict in zip(some, found, strict=True) if verdict is None]
+            lost += found.count(Verdict.LOST)
+            needed = next((n for n in range(total + 1) if self._too_many(n, total)), total + 1)
+            if needed <= lost + len(left):
+                missing = max(needed - lost, 0)
+                said = settled(boards.take(left[:missing]), question, self.jobs) if missing else []
+                lost, left = lost + said.count(Verdict.LOST), left[missing:]
+                if lost >= needed:  # those that were not settled are taken for lost too
+                    return lost + len(left), total
+            if not lost and not left:
+                break
+        return lost, total
+
+    def _too_many(self, lost: int, total: int) -> bool:
+        return bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
 
     def ways(self, first: Way) -> list[Way]:
         """A response's ways, ``first`` the one as it is. What asks more of people is looked for
@@ -196,7 +226,7 @@ class Looker:
 
         found = mapped(plan)
         if found.rate.max() < FAINT:
-            found = mapped(replace(self.best_parts, questions=plan.questions), found.axes[0].values)
+            found = mapped(replace(self.best[0], questions=plan.questions), found.axes[0].values)
         best = best_place(found)
         if best is None:
             return None
@@ -204,6 +234,11 @@ class Looker:
         place = Place(value, response.b) if over == "omega" else Place(response.omega, value)
         question = moved_question(self.branch, {number: place})
         return None if question is None else Way(number, over, question, place)
+
+
+def drawn(plan: StudyPlan, number: int) -> Boards:
+    """The first boards of a study."""
+    return draw_many(plan.circuit, plan.spread, plan.seed, range(number))
 
 
 def moved_question(branch: Branch, places: Mapping[int, Place]) -> Question | None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from designer.boards import Boards
 from designer.circuit import nominal_board
 from designer.circuit_kernel import POINTS
 from designer.ensemble import Ensemble, displacement
@@ -25,7 +26,19 @@ def block(
     progress: Callable[[], None] = lambda: None,
 ) -> list[Answer]:
     """An answer for every board and every question, in order; ``progress`` is called once each."""
-    return [answer for answer, _, _ in _asked(plan, indices, jobs, progress)]
+    boards = draw_many(plan.circuit, plan.spread, plan.seed, indices)
+    return of_boards(plan, boards, indices, jobs, progress)
+
+
+def of_boards(
+    plan: StudyPlan,
+    boards: Boards,
+    indices: range,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Answer]:
+    """``block`` of what the boards of these samples have become, by an adjustment on the board."""
+    return [answer for answer, _, _ in _asked(plan, boards, indices, jobs, progress)]
 
 
 def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, Subject | None]]:
@@ -37,15 +50,21 @@ def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, S
             if len(orbit.start)
             else None,
         )
-        for answer, orbit, boards in _asked(plan, indices, jobs, lambda: None)
+        for answer, orbit, boards in _asked(
+            plan,
+            draw_many(plan.circuit, plan.spread, plan.seed, indices),
+            indices,
+            jobs,
+            lambda: None,
+        )
         for excitation in [plan.questions[answer.question].excitation]
     ]
 
 
 def _asked(
-    plan: StudyPlan, indices: range, jobs: int, progress: Callable[[], None]
+    plan: StudyPlan, drawn: Boards, indices: range, jobs: int, progress: Callable[[], None]
 ) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
-    boards = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices), jobs=jobs)
+    boards = Ensemble(drawn, jobs=jobs)
     drives = [q.excitation.drive for q in plan.questions]
     asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
     found = boards.respond(

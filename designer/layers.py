@@ -1,7 +1,7 @@
 """The layers of a study, each a set of rows in blocks: who computes them, and what is on disk.
 
-``samples`` (the exact rung's answers), ``ngspice``, ``tuned``, ``reached``: each stands on the
-first alone, so a study can get another one later and keep what is there.
+``samples`` (the exact rung's answers), ``ngspice``, ``tuned``, ``trimmed``, ``reached``: each
+stands on the first alone, so a study can get another one later and keep what is there.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from designer.hearing import Ask, Hearing
 from designer.reached import Reached, reached_block
 from designer.recipe import Recipe
 from designer.threads import parallel
+from designer.trimmer import DcTrim, Trimmed, trimmed_block
 from designer.tuning import Tuned, tuned_block
 from designer.verdict import Answer, StudyPlan
 from designer.workers import SpicePool
@@ -70,6 +71,16 @@ class Tunings:
 
     def __call__(self, jobs: int, progress: Step) -> list[Tuned]:
         return tuned_block(self.plan, self.indices, self.answers, self.bands, jobs, progress)
+
+
+class Trimmings:
+    """Task of the trimmed layer."""
+
+    def __init__(self, plan: StudyPlan, trim: DcTrim, indices: range) -> None:
+        self.plan, self.trim, self.indices = plan, trim, indices
+
+    def __call__(self, jobs: int, progress: Step) -> list[Trimmed]:
+        return trimmed_block(self.trim, self.plan, self.indices, jobs, progress)
 
 
 class PowerUps:

@@ -19,7 +19,8 @@ MOST_SAMPLES = 1_000_000
 class Options:
     """Options of the verbs that write.
 
-    until, rung, tuned, reached, maps : as ``study.tolerance``. cluster : address of a Dask
+    until, rung, tuned, reached, maps : as ``study.tolerance``. trimmed : whether the model file has
+    a trimmer fitted, whose layer every study has. cluster : address of a Dask
     scheduler, or None.
     """
 
@@ -32,6 +33,7 @@ class Options:
     rung: RungName = "auto"
     tuned: bool = False
     reached: bool = False
+    trimmed: bool = False
     maps: tuple[Over, ...] = ()
     cluster: str | None = None
 

@@ -101,15 +101,16 @@ class Reduction:
     def _even(self) -> bool:
         """Whether x → -x, u → -u is a symmetry: no DC anywhere, and both stops alike.
 
-        Stops that one switch makes are alike where its limits are; others are compared by what
-        they do: the flow in contact, and where contact begins.
+        Stops that one switch makes are alike where its limits are; others, and those of a circuit
+        that is fed from a rail, are compared by what they do: the flow in contact, and where
+        contact begins.
         """
         if not self.board.mirror_symmetric:
             return False
         for stop in self.circuit.stops:
             if stop.upper is None or stop.lower is None:
                 return False
-            if not stop.shared and not self._alike(stop):
+            if (self.circuit.supplies or not stop.shared) and not self._alike(stop):
                 return False
         return True
 

@@ -11,7 +11,7 @@ from designer.all_on_one import all_on_one
 from designer.board_parts import board_circuit
 from designer.bom import bill
 from designer.circuit import Circuit
-from designer.components import Numbers, components, pin_numbers
+from designer.components import Numbers, components, pin_numbers, to_buy
 from designer.design import Design
 from designer.hearing import Hearing
 from designer.modelfile import ModelFile
@@ -66,7 +66,7 @@ class ReportData:
             yields=result.yields,
             answers=result.answers,
             plan=result.plan,
-            bom=[line.cells() for line in bill(found)],
+            bom=[line.cells() for line in bill(to_buy(found, choice))],
             provenance=result.provenance,
             command=command,
             equations=result.equations,
@@ -76,6 +76,7 @@ class ReportData:
             pins=pin_numbers(found),
             layers=Layers(
                 tuned=result.study.tuned,
+                trimmed=result.study.trimmed,
                 reached=result.study.reached,
                 combined=result.study.combined,
                 recipes=result.study.recipes or (),

@@ -82,6 +82,11 @@ _GLOSSARY = (
         "found among the settings tried the board counts as lost, though there may be one: the "
         "yield is a lower bound. On the bench: what the bench procedure finds works",
     ),
+    (
+        "trimmed",
+        "the trimmer on the board is set once, by the bench procedure, and every response is "
+        "judged at that setting with the generator as in setup.csv",
+    ),
     ("reached", "switched on by the recipe, from discharged capacitors, the board ends on it"),
     (
         "both engines together",

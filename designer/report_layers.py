@@ -87,10 +87,11 @@ class Start(Protocol):
 class Layers:
     """What a study has beside its answers as built; empty or None where it was not asked.
 
-    tuned, reached : rows of all questions. combined : by response. recipes : by question.
+    tuned, trimmed, reached : rows of all questions. combined : by response. recipes : by question.
     """
 
     tuned: Sequence[Benched] | None = None
+    trimmed: Sequence[Judged] | None = None
     reached: Sequence[Judged] | None = None
     combined: Sequence[Both | None] = ()
     recipes: Sequence[Start] = ()

@@ -47,7 +47,7 @@ def blame_of(data: ReportData, response: int) -> ResponseBlame | None:
 
 
 def _kinds(data: ReportData) -> Table | None:
-    """As built, tuned, reached and both engines together, side by side."""
+    """As built, tuned, trimmed, reached and both engines together, side by side."""
     layers = data.layers
     columns: list[tuple[str, Callable[[int], str]]] = []
     columns.append(("as built", lambda i: _share(data.yield_of(i))))
@@ -57,6 +57,9 @@ def _kinds(data: ReportData) -> Table | None:
         columns.append(
             ("tuned on the bench", lambda i: _share(_count(benched, data.question_of[i])))
         )
+    if layers.trimmed is not None:
+        trimmed = layers.trimmed
+        columns.append(("trimmed", lambda i: _share(_count(trimmed, data.question_of[i]))))
     if layers.reached is not None:
         reached = layers.reached
         columns.append(("reached", lambda i: _share(_count(reached, data.question_of[i]))))
@@ -103,6 +106,8 @@ def _whole(data: ReportData) -> dict[str, str]:
     if data.layers.tuned is not None:
         out["tuned"] = whole(data.layers.tuned)
         out["tuned on the bench"] = whole(_Bench(r) for r in data.layers.tuned)
+    if data.layers.trimmed is not None:
+        out["trimmed"] = whole(data.layers.trimmed)
     if data.layers.reached is not None:
         out["reached"] = whole(data.layers.reached)
     return out

@@ -111,6 +111,7 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
     kinds: dict[str, Callable[[Mapping[str, Any]], Any]] = {
         "tuned": lambda r: r.get("tuned"),
         "on the bench": lambda r: (r.get("tuned") or {}).get("bench"),
+        "trimmed": lambda r: r.get("trimmed"),
         "reached": lambda r: r.get("reached"),
     }
     shown = [k for k, of in kinds.items() if any(of(r) for r in answer["responses"])]

@@ -68,6 +68,7 @@ class _Rules:
             p.name: p for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)
         }
         self.own = dict(self._own())
+        self.own |= dict(self._of_arrays())
 
     def spread(self) -> Spread:
         rules, choice = self.rules, self.choice
@@ -119,6 +120,46 @@ class _Rules:
                 check_binned(shape, grade, f"spread.part[{number}].law", self.file)
                 found[name] = said
         yield from found.items()
+
+    def _of_arrays(self) -> Iterator[tuple[str, PartRule]]:
+        """What parts have as elements of arrays; a temperature coefficient and a drift of their own
+        go before the array's."""
+        for number, rule in enumerate(self.rules.network, start=1):
+            if rule.family is None:
+                continue
+            field = f"network[{number}].parts"
+            for name in self.named(rule.parts, field):
+                part, before = self.parts[name], self.own.get(name, PartRule((name,)))
+                if not isinstance(part, Resistor | Capacitor):
+                    raise self.refuse(field, name, "two or more resistors, or capacitors")
+                family = self.array(rule.family, name, number)
+                if before.grade is not None:
+                    expected = "parts without a grade of their own: the array has one"
+                    raise self.refuse(field, name, expected)
+                width = family.temperature_coefficient
+                ageing = before.ageing
+                if ageing is None and self.rules.ageing == "catalogue":
+                    if family.drift is None:
+                        said = f"{name}, {family.name}, of which the catalogue has no drift"
+                        expected = "a drift there, or an ageing in [[spread.part]]"
+                        raise self.refuse("ageing", said, expected)
+                    ageing = (-family.drift, family.drift)
+                tempco = (-width, width) if before.tempco is None else before.tempco
+                yield name, PartRule((name,), family.grade, before.law, tempco, ageing)
+
+    def array(self, family: str, name: str, number: int) -> PartFamily:
+        """The family of arrays that a part is an element of."""
+        part = self.parts[name]
+        assert isinstance(part, Resistor | Capacitor)
+        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
+        try:
+            sold = self.catalog.array(family, part.value).family
+        except InputError as error:
+            said = f"{name}, {error.found}" if isinstance(error, Unreachable) else error.found
+            raise self.refuse(f"network[{number}].family", said, error.expected) from None
+        if sold.kind != kind:
+            raise self.refuse(f"network[{number}].parts", name, f"{sold.kind}s, as {family} holds")
+        return sold
 
     def named(self, names: tuple[str, ...], field: str) -> Iterator[str]:
         """The parts that are meant: of a kind, both of a composite, or the one of that name."""
@@ -237,7 +278,16 @@ class _Rules:
                 if self.picked(name):
                     expected = "uniform or normal parts: a binned one is picked by itself"
                     raise self.refuse(field, f"{name}, binned", expected)
-            groups.append(Group(f"network:{number}", names, rule.share))
+            share = rule.share
+            if rule.family is not None:
+                family = self.array(rule.family, names[0], number)
+                share = family.share
+                same = {float(f"{_sold(self.parts[name]):.9g}") for name in names}
+                if len(same) > 1 or len(names) > family.elements:
+                    expected = f"up to {family.elements} parts of one value, as an array holds"
+                    raise self.refuse(field, ", ".join(names), expected)
+            assert share is not None
+            groups.append(Group(f"network:{number}", names, share))
         return tuple(groups)
 
     def reels(self) -> tuple[Group, ...]:
@@ -260,6 +310,12 @@ class _Rules:
     def picked(self, name: str) -> bool:
         """Whether a part's deviation is its own for having been measured: binned."""
         return self.shape(self.parts[name], self.own.get(name)).law == "binned"
+
+
+def _sold(part: Part) -> float:
+    """The value that a resistor or capacitor is sold for."""
+    assert isinstance(part, Resistor | Capacitor)
+    return part.value
 
 
 def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Law | None:

@@ -71,10 +71,12 @@ class PartRule:
 
 @dataclass(frozen=True)
 class NetworkRule:
-    """Parts of one network; ``share`` of a deviation is common to them."""
+    """Parts of one network; ``share`` of a deviation is common to them. family : of the catalogue's
+    arrays that they are bought as, which then says their share and their grade."""
 
     parts: tuple[str, ...]
-    share: float
+    share: float | None = None
+    family: str | None = None
 
 
 @dataclass(frozen=True)
@@ -240,7 +242,8 @@ class _PartTable(BaseModel):
 class _NetworkTable(BaseModel):
     model_config = STRICT
     parts: Annotated[tuple[str, ...], _names()]
-    share: Annotated[float, _share()]
+    share: Annotated[float | None, _share()] = None
+    family: Annotated[str | None, line("a family of arrays of the catalogue")] = None
 
 
 class SpreadTable(BaseModel):
@@ -277,8 +280,14 @@ class SpreadTable(BaseModel):
 
         Raises
         ------
-        InputError : what was picked out is not better than what was bought.
+        InputError : what was picked out is not better than what was bought; a network that says
+            both its share and its family, or neither.
         """
+        for number_, rule in enumerate(self.network, start=1):
+            if (rule.share is None) is (rule.family is None):
+                found = "nothing" if rule.share is None else "share and family"
+                expected = "a share, or the family of arrays that it is bought from"
+                raise InputError(file, f"spread.network[{number_}].share", found, expected)
         for key, shape, grade in (
             ("resistors", self.resistors, resistor_grade),
             ("capacitors", self.capacitors, capacitor_grade),

@@ -22,6 +22,7 @@ from designer.reached import Reached
 from designer.recipe import Recipe
 from designer.spread import NO_BANDWIDTH
 from designer.study_work import RUNGS, RungName, Stores, Work
+from designer.trimmer import Trimmed, dc_trim
 from designer.tuning import Tuned
 from designer.verdict import Answer, StudyPlan, Yield, count
 from designer.workers import SpicePool
@@ -41,7 +42,8 @@ class Study:
     asked : for each question of the plan, the index of its response. left_out : why a response
     is no question, by index. heard : what ngspice said. until : the width that was asked for;
     narrow : whether every interval is narrower (None where no width was asked for). tuned,
-    reached : their rows; None where they were not asked for. recipes : one for each question.
+    reached : their rows; None where they were not asked for. trimmed : likewise; None where no
+    trimmer is fitted. recipes : one for each question.
     blame, maps : by question, where they were asked for.
     """
 
@@ -54,6 +56,7 @@ class Study:
     until: float | None = None
     narrow: bool | None = None
     tuned: tuple[Tuned, ...] | None = None
+    trimmed: tuple[Trimmed, ...] | None = None
     reached: tuple[Reached, ...] | None = None
     recipes: tuple[Recipe, ...] | None = None
     blame: Blame | None = None
@@ -70,6 +73,10 @@ class Study:
     def tuned_of(self, index: int) -> tuple[Tuned, ...]:
         """The rows of the tuned layer of response number ``index``."""
         return tuple(t for t in self.tuned or () if self.asked[t.question] == index)
+
+    def trimmed_of(self, index: int) -> tuple[Trimmed, ...]:
+        """The rows of the trimmed layer of response number ``index``."""
+        return tuple(t for t in self.trimmed or () if self.asked[t.question] == index)
 
     def reached_of(self, index: int) -> tuple[Reached, ...]:
         """The rows of the reached layer of response number ``index``."""
@@ -106,11 +113,16 @@ class Study:
         return self._on_one(self.tuned)
 
     @property
+    def all_trimmed(self) -> Yield | None:
+        """The same with the trimmer at its one setting, the generator as built."""
+        return self._on_one(self.trimmed)
+
+    @property
     def all_reached(self) -> Yield | None:
         """The same from power-up by the recipes."""
         return self._on_one(self.reached)
 
-    def _on_one(self, rows: Sequence[Answer | Tuned | Reached] | None) -> Yield | None:
+    def _on_one(self, rows: Sequence[Answer | Tuned | Trimmed | Reached] | None) -> Yield | None:
         if not rows or len(self.asked) < max(len(self.checked), 2):
             return None
         return all_on_one(rows)
@@ -163,7 +175,8 @@ def tolerance(
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
     does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``designer.hearing`` says,
-    ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted.
+    ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted; a
+    fitted trimmer is always asked for.
     maps : settings over which the yield is wanted (``yield_maps.OVERS``).
     checked : of the same design, to save the time of the gate. pool : where ngspice runs; without
     one ngspice is not asked. stores : where rows are read from and written to. runner : who
@@ -203,6 +216,9 @@ def tolerance(
     study = work.grown(study) if until is not None else work.made(study)
     if tuned:
         study = work.tuned(study, synthesis.modelfile.tuning)
+    trim = dc_trim(synthesis)
+    if trim is not None:
+        study = work.trimmed(study, trim)
     if reached:
         study = work.reached(study)
     if blamed:

@@ -18,6 +18,7 @@ from designer.reached import Reached
 from designer.recipe import Recipe
 from designer.study import Stores, Study
 from designer.study_hash import blame_hash, study_hash
+from designer.trimmer import DcTrim, Trimmed
 from designer.tuning import MOST_TRIES, Tuned
 from designer.verdict import BLOCK, Answer, StudyPlan
 from designer.yield_maps import OVERS
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from designer.options import Options
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
-TUNED, REACHED = "tuned.parquet", "reached.parquet"
+TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
 MAPS, MAP = "maps.json", "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
 
@@ -40,6 +41,7 @@ def layers_of(options: Options) -> list[str]:
         names.add(ALL_IN_NGSPICE)
     names |= {f"{MAP}{over}" for over in options.maps}
     names |= {"tuned"} if options.tuned else set()
+    names |= {"trimmed"} if options.trimmed else set()
     names |= {"reached"} if options.reached else set()
     return sorted(names)
 
@@ -65,7 +67,8 @@ def study_files(options: Options, responses: int) -> list[str]:
     maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
     maps += [MAPS] if maps else []
     names = layers_of(options)
-    folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "reached": REACHED}
+    folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "trimmed": TRIMMED}
+    folders["reached"] = REACHED
     places = [f"{place}/" for name, place in folders.items() if name in names]
     return [TOLERANCE, *REPORTS, KEPT, *maps, *places]
 
@@ -93,6 +96,9 @@ class FolderStores(Stores):
     def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned]:
         more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
         return self._store(plan, TUNED, Tuned, "tuned", SEARCH, more)
+
+    def trimmed(self, plan: StudyPlan, trim: DcTrim) -> BlockStore[Trimmed]:
+        return self._store(plan, TRIMMED, Trimmed, "trimmed", BLOCK, trim.as_dict())
 
     def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached]:
         more = {"recipes": [r.as_dict() for r in recipes]}

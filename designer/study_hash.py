@@ -13,7 +13,15 @@ from designer.circuit import Part
 from designer.jsonout import plain
 from designer.verdict import StudyPlan, kept
 
-RULES = {"samples": 1, "ngspice": 2, "tuned": 3, "reached": 3, "blame": 1, "checks": 1}
+RULES = {
+    "samples": 1,
+    "ngspice": 2,
+    "tuned": 3,
+    "reached": 3,
+    "trimmed": 1,
+    "blame": 1,
+    "checks": 1,
+}
 """Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
 the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of
 the layer, so that rows of the old rules are not taken for rows of the new ones. So with the blame

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -227,6 +227,7 @@ def _study_wanted(
         "samples": options.samples,
         "until": options.until,
     }
+    options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     options = merged(folder, inputs, options)
     files = study_files(options, len(modelfile.responses))
     wanted["study"] = ({**inputs, "layers": layers_of(options)}, files)

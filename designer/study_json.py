@@ -16,6 +16,7 @@ from designer.jsonout import FORMAT
 from designer.pipeline import Checked
 from designer.reached import Reached
 from designer.study import Study
+from designer.trimmer import Trimmed
 from designer.trust import of_yield
 from designer.tuning import Tuned
 from designer.verdict import Answer, Verdict, Yield, count
@@ -41,6 +42,7 @@ def study_json(
         "all_on_one_board": {
             "built": _yield(study.all_on_one_board),
             "tuned": _yield(study.all_tuned),
+            "trimmed": _yield(study.all_trimmed),
             "reached": _yield(study.all_reached),
         },
         "equation_check": None if equations is None else equations.as_dict(),
@@ -73,6 +75,7 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "agreement": _agreement(answers, study.heard_of(index)),
         "combined": _combined(study.combined[index]),
         "tuned": tuned_json(study.tuned_of(index)),
+        "trimmed": trimmed_json(study.trimmed_of(index)),
         "reached": _reached(study, index),
         "blame": _blame(study, index),
         "trust": {
@@ -120,6 +123,17 @@ def tuned_json(rows: Sequence[Tuned]) -> dict[str, Any] | None:
             "steps": sum(r.bench_steps for r in rows),
             "seen_where_it_is_not": sum(r.bench_seen and r.bench_verdict != "ok" for r in rows),
         },
+    }
+
+
+def trimmed_json(rows: Sequence[Trimmed]) -> dict[str, Any] | None:
+    """What the boards show with their trimmers set; at_end : boards that would turn further."""
+    if not rows:
+        return None
+    return {
+        **_counted(count(rows)),
+        "reasons": _reasons(rows),
+        "at_end": sum(r.at_end for r in rows),
     }
 
 
@@ -207,7 +221,7 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
     }
 
 
-def _reasons(answers: Sequence[Answer | Tuned | Reached]) -> dict[str, int]:
+def _reasons(answers: Sequence[Answer | Tuned | Trimmed | Reached]) -> dict[str, int]:
     """Why boards do not show the response, most frequent first."""
     return _counted_reasons((a.verdict, a.reason) for a in answers)
 

@@ -20,6 +20,7 @@ from designer.progress import Progress
 from designer.reached import Reached
 from designer.recipe import Recipe
 from designer.recipe_search import find_recipes
+from designer.trimmer import DcTrim, Trimmed
 from designer.tuning import Tuned
 from designer.verdict import BLOCK, Answer, StudyPlan
 from designer.workers import SpicePool
@@ -49,6 +50,9 @@ class Stores:
         return None
 
     def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned] | None:
+        return None
+
+    def trimmed(self, plan: StudyPlan, trim: DcTrim) -> BlockStore[Trimmed] | None:
         return None
 
     def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached] | None:
@@ -144,6 +148,20 @@ class Work:
             step,
         )
         return replace(study, tuned=tuple(rows))
+
+    def trimmed(self, study: Study, trim: DcTrim) -> Study:
+        """With the trimmer of each board set once."""
+        plan = study.plan
+        step = self.said.stage("trimmed boards", len(study.answers))
+        rows = layers.fill(
+            plan,
+            self.stores.trimmed(plan, trim),
+            BLOCK,
+            partial(layers.Trimmings, plan, trim),
+            self.runner,
+            step,
+        )
+        return replace(study, trimmed=tuple(rows))
 
     def reached(self, study: Study) -> Study:
         """From power-up, by the recipes that the nominal circuit and a few boards suggest."""

@@ -3,7 +3,8 @@
 Everything that an upgrade changes stands in the model file afterwards, so the upgraded design is a
 design like any other: parts of a better grade are ``[[spread.part]]``, parts that track
 ``[[spread.network]]``, a response at another place of its window has another ``omega`` or ``b``,
-and a DC offset that is trimmed on each board is the band of ``[tuning]``.
+a DC offset that is trimmed on each board is the band of ``[tuning]``, and a trimmer that is fitted
+is ``[board] dc_trim``.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from designer.bom import bill
 from designer.catalog import Catalog
 from designer.circuit import Circuit, nominal_board
 from designer.coefficients import coefficient_errors
-from designer.components import components
+from designer.components import components, to_buy
 from designer.design import Certificate, Design
 from designer.modelfile import ModelFile, parse_model_file
 from designer.reduction import Reduction
@@ -39,11 +40,21 @@ class Place:
 
 
 @dataclass(frozen=True)
+class PartNetwork:
+    """Parts that are bought as one array. family : of the catalogue's arrays."""
+
+    family: str
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Upgrades:
     """What is changed; None and empty: as it is.
 
     grades : fractions by part. places : by number of the response. trim : half-width of the band of
-    the generator's DC offset over its amplitude, within which each board is trimmed.
+    the generator's DC offset over its amplitude, within which each board is trimmed. trimmer :
+    whether the board's own is fitted, and set on each board. networks : arrays in the places of
+    parts.
     """
 
     opamp: str | None = None
@@ -52,6 +63,8 @@ class Upgrades:
     grades: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[int, Place] = field(default_factory=dict)
     trim: float | None = None
+    trimmer: bool = False
+    networks: tuple[PartNetwork, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; responses are counted from 1."""
@@ -63,6 +76,8 @@ class Upgrades:
             "grades": dict(sorted(self.grades.items())),
             "places": places,
             "trim": self.trim,
+            "trimmer": self.trimmer,
+            "networks": [asdict(n) for n in self.networks],
         }
 
     @classmethod
@@ -75,6 +90,10 @@ class Upgrades:
             grades=dict(said["grades"]),
             places={p["response"] - 1: Place(p["omega"], p["b"]) for p in said["places"]},
             trim=said["trim"],
+            trimmer=said.get("trimmer", False),
+            networks=tuple(
+                PartNetwork(n["family"], tuple(n["parts"])) for n in said.get("networks", ())
+            ),
         )
 
 
@@ -100,6 +119,8 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
         response |= {"omega": place.omega, "b": place.b}
     if upgrades.trim is not None:
         data["tuning"] = {"frequency": 0.0, "amplitude": 0.0, "offset": upgrades.trim}
+    if upgrades.trimmer:
+        data.setdefault("board", {})["dc_trim"] = "fitted"
     parts = data.setdefault("spread", {}).setdefault("part", [])
     for grade in sorted(set(upgrades.grades.values())):
         names = [name for name, own in upgrades.grades.items() if own == grade]
@@ -107,6 +128,9 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
         others = [name for name in names if name not in picked]
         parts += [{"names": others, "grade": grade}] * bool(others)
         parts += [{"names": picked, "grade": grade, "law": "uniform"}] * bool(picked)
+    for network in upgrades.networks:
+        held = data["spread"].setdefault("network", [])
+        held.append({"parts": list(network.parts), "family": network.family})
     read = parse_model_file(toml_text(data), modelfile.source)
     return replace(read, title=modelfile.title, measured=modelfile.measured)
 
@@ -198,5 +222,5 @@ def _found(base: Synthesis, modelfile: ModelFile) -> tuple[ModelResponse, ...]:
 def price(made: Synthesis) -> float:
     """Of everything on its bill of materials, in euro, with the catalogue's price of each class."""
     circuit, choice = board_circuit(made)
-    lines = bill(components(circuit, made.catalog, choice))
+    lines = bill(to_buy(components(circuit, made.catalog, choice), choice))
     return float(np.sum([x.quantity * made.catalog.euro(x.price_class) for x in lines]))

@@ -21,11 +21,13 @@ from designer import cure_search, cure_study, exact, rung_choice
 from designer.catalog import load_catalog
 from designer.cure import CURE, STUDIES, cure
 from designer.cure_branch import Branch
+from designer.cure_couplings import finest
 from designer.cure_json import cure_json
 from designer.cure_picture import Picture
 from designer.cure_plots import front_chart
+from designer.cure_program import cheapest
 from designer.cure_search import find_cure
-from designer.cure_slots import part_slots
+from designer.cure_slots import network_slots, part_slots, trimmer_slot
 from designer.cure_study import Book, Measured, measure, measure_together
 from designer.cure_table import text
 from designer.cure_trial import Cure
@@ -40,7 +42,8 @@ from designer.progress import Progress
 from designer.quantities import quantities
 from designer.spread import Spread, draw_many
 from designer.study import RungName
-from designer.upgrade import Upgrades
+from designer.trimmer import trimmed_block
+from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yield_maps import Axis, YieldMap
 from tests import bench_plans, paper_cases
@@ -449,3 +452,205 @@ def test_a_design_is_cured_and_its_cure_is_a_design(design: Path, tmp_path: Path
         better = [row for row in csv.DictReader(bill) if row["grade"] == "0.001"]
     named = {name for row in better for name in row["designators"].split()}
     assert named == set(answer["upgrades"]["grades"])
+
+
+def with_trimmer(nominal: float, rate: float) -> Picture:
+    """The known picture, where a trimmer can be had as well: so many boards show it trimmed."""
+    seen = known_picture(nominal)
+    slot = trimmer_slot(branch().made)
+    assert slot is not None
+    rows = (*seen.ways[0], Way(0, "trimmer", cast(Question, None), None, None, rate))
+    parts = (*seen.parts, slot)
+    return replace(seen, parts=parts, ways=(rows,))
+
+
+def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
+    made = branch().made
+    slot = trimmer_slot(made)
+    assert slot is not None
+    assert slot.trim is not None
+    trimmer = CATALOG.trimmer(slot.trim.track)
+    series = slot.trim.circuit.values["R911"]
+    resistor = CATALOG.part("resistor", series, made.modelfile.circuit.resistor_grade)
+    extra = CATALOG.euro(trimmer.price) + CATALOG.euro(resistor.price)
+    assert [o.price for o in slot.slot.options] == [0.0, pytest.approx(extra)]
+    assert trimmer_slot(made, frozenset({"trimmer"})) is None
+    fitted = upgraded_file(made.modelfile, Upgrades(trimmer=True))
+    again = trimmer_slot(with_parts_kept(made, fitted))
+    assert again is not None
+    assert [o.price for o in again.slot.options] == [0.0, pytest.approx(0.0, abs=1e-12)]
+
+
+@pytest.mark.parametrize("nominal", [5.5, 6.5])
+def test_a_trimmer_is_chosen_where_it_is_the_cheapest(nominal: float) -> None:
+    """Against every choice; the trimmer's price is set so that it falls on either side."""
+    plain = by_hand(nominal)
+    for asked, taken in ((0.9 * plain, True), (1.1 * plain, False)):
+        seen = with_trimmer(nominal, 1.0)
+        options = tuple(
+            replace(o, price=asked * i) for i, o in enumerate(seen.parts[-1].slot.options)
+        )
+        slot = replace(seen.parts[-1], slot=replace(seen.parts[-1].slot, options=options))
+        seen = replace(seen, parts=(*seen.parts[:-1], slot))
+        z = seen.quantiles(TARGET, seen.boards((0,) * (len(seen.parts) + 1)))
+        program = seen.program(z, {})
+        pick = cheapest(program)
+        assert pick is not None
+        least = min((p for p in program.picks() if program.keeps(p)), key=program.cost)
+        assert program.cost(pick) == pytest.approx(program.cost(least))
+        # Set, and shown trimmed, or neither.
+        assert pick[-2] == pick[-1] == int(taken)
+        assert seen.upgrades(pick).trimmer is taken
+        assert bool(seen.upgrades(pick).grades) is not taken
+
+
+def test_a_trimmer_is_set_for_every_response_or_for_none() -> None:
+    seen = with_trimmer(6.5, 1.0)
+    rows = seen.ways[0]
+    seen = replace(seen, ways=(rows, (replace(rows[0], response=1, margin=Margin((), ())),)))
+    program = seen.program({(0, 0, 0): 1e-3}, {}, frozenset({(0, 0)}))
+    assert cheapest(program) is None  # the other response has no yield with it
+    other = (seen.ways[1][0], replace(rows[1], response=1))
+    program = replace(seen, ways=(rows, other)).program({(0, 0, 0): 1e-3}, {}, frozenset({(0, 0)}))
+    pick = cheapest(program)
+    assert pick is not None
+    assert pick[-3:] == (1, 1, 1)
+    assert program.cost(pick) == min(program.cost(p) for p in program.picks() if program.keeps(p))
+
+
+@pytest.mark.slow
+def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few boards promised what many do not show: the next choice is the cheapest of grades."""
+    real = truth(6.5)
+
+    def of(plan: StudyPlan, target: float, book: Book, **more: object) -> Measured:
+        if more.get("trim") is not None:
+            return Measured(Yield(7000, 1000, 0, 0), target)
+        return cast(Measured, real(plan, target, book))
+
+    seen = with_trimmer(6.5, 1.0)
+    free = replace(
+        seen.parts[-1].slot,
+        options=tuple(replace(o, price=0.0) for o in seen.parts[-1].slot.options),
+    )
+    seen = replace(seen, parts=(*seen.parts[:-1], replace(seen.parts[-1], slot=free)))
+    found = searched(monkeypatch, seen, of)
+    assert found.reached
+    assert found.rounds[0].upgrades.trimmer
+    assert not found.best.upgrades.trimmer
+    assert found.best.price == pytest.approx(by_hand(6.5))
+
+
+def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
+    """The book's verdicts are those of the trimmed boards, once found and then known."""
+    made = branch().made
+    slot = trimmer_slot(made)
+    assert slot is not None
+    assert slot.trim is not None
+    question = bench_plans.question(3)
+    circuit = made.design.circuit
+    plan = StudyPlan(circuit, Spread(0.01, 0.01, 3e-4, 1e-3), 7, 6, (question,))
+    book = Book()
+    letters, new = book.block(plan, range(6), slot.trim, 1)
+    assert new
+    rows = trimmed_block(slot.trim, plan, range(6), 1)
+    assert [cure_study.VERDICTS[letter] for letter in letters] == [r.verdict for r in rows]
+    assert book.block(plan, range(6), slot.trim, 1) == (letters, False)
+    assert book.block(plan, range(6), None, 1)[1]
+
+
+def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> Picture:
+    """A limit of the elements of one array alone, with slopes of these signs, and of R50."""
+    from designer import cure_picture
+
+    made = branch().made
+    network = network_slots(made)[0]
+    weights = dict(zip(network.network, signs, strict=False)) | {"R50": 1.0}
+    circuit = made.design.circuit
+    boards = draw_many(circuit, Spread.of(made.modelfile, circuit, CATALOG), 3, range(4000))
+    differing = quantities(circuit, boards)
+    slopes = np.array([weights.get(q.name, 0.0) if q.group == "values" else 0.0 for q in differing])
+    limit = Limit("x", "contact", nominal, 1.0, slopes)
+    sigma = float(Margin(differing, (limit,)).each(boards).std())
+    margin = Margin(differing, (replace(limit, sigma=sigma),))
+    names = {*network.network, "R50"}
+    parts = (*(p for p in part_slots(made) if p.slot.name in names), network)
+    way = Way(0, "as it is", cast(Question, None), None, margin, 0.5)
+    ratios = cure_picture._ratios(branch(), parts, 5)
+    matched = cure_picture._matched(branch(), parts, 5)
+    return Picture(branch(), parts, ((way,),), ratios, 0.0, 5, matched)
+
+
+@pytest.mark.parametrize("signs", [(2.0, -2.0, 2.0, -2.0), (2.0, 2.0, 2.0, 2.0), (3.0, -1.0)])
+def test_a_demand_holds_the_variance_of_drawn_arrays(signs: tuple[float, ...]) -> None:
+    """Of boards drawn with the array; what it takes is most where only ratios count."""
+    seen = matched_picture(signs)
+    margin = seen.ways[0][0].margin
+    assert margin is not None
+    z = seen.quantiles(TARGET, seen.boards([0] * (len(seen.parts) + 1)))
+    demand = seen.program(z, {}).demands[0]
+    fixed = (margin.limits[0].distance / z[0, 0, 0]) ** 2 - demand.room
+    singles = [int(p.slot.name == "R50") for p in seen.parts]
+    for pick in ([0] * len(singles), singles):
+        for array in (0, 1):
+            chosen = (*pick[:-1], array, 0)
+            each = margin.each(seen.boards(chosen))[:, 0]
+            # Known to 2 % of the draw each; the covariances of the array come on top.
+            assert demand.variance(chosen) + fixed == pytest.approx(each.var(), rel=0.08)
+
+
+def test_an_array_costs_what_it_changes_on_the_bill() -> None:
+    made = branch().made
+    slots = network_slots(made)
+    assert slots
+    assert network_slots(made, frozenset({"network"})) == ()
+    values = made.design.circuit.values
+    for slot in slots[::3]:
+        assert 2 <= len(slot.network) <= 4
+        assert len({values[name] for name in slot.network}) == 1
+        seen = Picture(branch(), (slot,), (), (), 0.0, 5)
+        upgrades = seen.upgrades((1,))
+        assert [n.parts for n in upgrades.networks] == [slot.network]
+        assert Upgrades.of_dict(json.loads(json.dumps(upgrades.as_dict()))) == upgrades
+        bought = replace(made, modelfile=upgraded_file(made.modelfile, upgrades))
+        assert slot.slot.options[1].price == pytest.approx(price(bought) - price(made))
+    held = [name for slot in slots for name in slot.network]
+    assert len(set(held)) == len(held)  # one family in the catalogue
+
+
+@pytest.mark.parametrize(
+    ("signs", "nominal", "taken"),
+    [((4.0, -4.0, 4.0, -4.0), 1.0, 1), ((4.0, -4.0, 4.0, -4.0), 12.0, 0), ((4.0,), 6.0, 0)],
+)
+def test_arrays_are_chosen_as_by_enumeration(
+    signs: tuple[float, ...], nominal: float, taken: int
+) -> None:
+    """An array where ratios of its elements count, a better grade where one part does; and no part
+    is both."""
+    seen = matched_picture(signs, nominal)
+    z = seen.quantiles(TARGET, seen.boards([0] * (len(seen.parts) + 1)))
+    program = seen.program(z, {})
+    least = min((p for p in program.picks() if program.keeps(p)), key=program.cost, default=None)
+    pick = cheapest(program)
+    assert least is not None
+    assert pick is not None
+    assert program.cost(pick) == pytest.approx(program.cost(least))
+    assert pick[len(seen.parts) - 1] == taken
+    network = seen.parts[-1].network
+    graded = {p.slot.name for p, i in zip(seen.parts, pick, strict=False) if i and p.grades}
+    assert not (taken and graded & {*network})
+    for choice in program.picks():
+        inside = choice[len(seen.parts) - 1] and any(
+            i and p.slot.name in network for p, i in zip(seen.parts, choice, strict=False)
+        )
+        held = all(d.holds(choice) for d in program.demands if d.name.endswith(" once"))
+        assert held is not bool(inside)
+
+
+def test_the_finest_choices_can_be_built() -> None:
+    parts = (*part_slots(branch().made), *network_slots(branch().made))
+    for most in finest(parts, CATALOG):
+        seen = Picture(branch(), parts, (), (), 0.0, 5)
+        file = upgraded_file(branch().made.modelfile, seen.upgrades(most))
+        Spread.of(file, branch().made.design.circuit, CATALOG)
+        assert any(most)

@@ -15,8 +15,8 @@ CATALOG = load_catalog()
 
 
 def catalogued() -> set[str]:
-    """Every footprint that the catalogue names, in whichever case."""
-    found = {family.footprint for family in CATALOG.families}
+    """Every footprint that the catalogue names, in whichever case; arrays stand on bills alone."""
+    found = {family.footprint for family in CATALOG.families if family.use != "array"}
     for entries in (CATALOG.opamps, CATALOG.diodes, CATALOG.references, CATALOG.trimmers):
         found |= {case.footprint for entry in entries for case in (entry, *entry.cases)}
     return found | {CATALOG.header(ways).place(ways) for ways in range(2, 8)}

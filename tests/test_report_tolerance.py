@@ -240,7 +240,7 @@ def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: Re
     page = Page(html)
     assert html == render_html(full)
     for heading in (
-        "As built, tuned, reached", "Where the engines differ", "How to reach a response",
+        "As built, tuned, trimmed, reached", "Where the engines differ", "How to reach a response",
         "Which part is to blame", "Losses avoided", "Worst corners", "Where to sit",
     ):  # fmt: skip
         assert len(re.findall(rf"<h[23]>{heading}</h[23]>", html)) == 1

@@ -27,7 +27,7 @@ from designer.modelfile import parse_model_file
 from designer.partgrades import bought
 from designer.spread import Spread, draw_many
 from designer.toml_text import toml_text
-from designer.upgrade import Place, Upgrades, price, upgraded_file, with_parts_kept
+from designer.upgrade import PartNetwork, Place, Upgrades, price, upgraded_file, with_parts_kept
 from tests import paper_cases
 
 CATALOG = load_catalog()
@@ -70,6 +70,8 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
         grades={"R50": 0.001, "R4": 0.001},
         places={1: Place(0.87, 0.26)},
         trim=0.03,
+        trimmer=True,
+        networks=(PartNetwork("Vishay ACAS 0612", ("R2", "R3")),),
     )
     read = upgraded_file(base.modelfile, upgrades)
     assert Upgrades.of_dict(upgrades.as_dict()) == upgrades
@@ -79,6 +81,10 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
     assert read.responses[0] == base.modelfile.responses[0]
     assert read.tuning.as_dict() == {"frequency": 0.0, "amplitude": 0.0, "offset": 0.03}
     assert [(rule.names, rule.grade) for rule in read.spread.part] == [(("R50", "R4"), 0.001)]
+    assert read.board.dc_trim == "fitted"
+    assert [(n.parts, n.family) for n in read.spread.network] == [
+        (("R2", "R3"), "Vishay ACAS 0612")
+    ]
     assert read.model == base.modelfile.model
     assert upgraded_file(base.modelfile, Upgrades()) is base.modelfile
 

@@ -1,0 +1,63 @@
+"""Margins of trimmed boards: the wiper's part against boards on which it was really set."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from designer import margins
+from designer.boards import Boards
+from designer.circuit import nominal_board
+from designer.cure_trimmed import trimmed_margins, without_wiper
+from designer.exact import block
+from designer.margins import Limit, Margin
+from designer.quantities import quantities
+from designer.spread import draw_many
+from designer.trimmer import at_rest, trimmed_answers, trimmed_boards
+from designer.verdict import Verdict
+from tests.bench_plans import plan
+from tests.test_trimmer import ROUGH, trim
+
+
+def test_what_the_trimmer_holds_still_depends_on_nothing() -> None:
+    """The rest point's distance from the middle of the stops, as a linear form of the parts: the
+    trimmer brings it to zero, so what is left of its variance is little."""
+    of = replace(plan(3, spread=ROUGH), samples=400)
+    boards, _ = trimmed_boards(trim(), of, range(400))
+    differing = quantities(trim().circuit, boards)
+    one = Boards.of(trim().circuit, [nominal_board(trim().circuit)])
+    nominal = margins._probes(one, differing).boards
+    rest, stops = at_rest(nominal)
+    away = rest - 0.5 * (stops[1] + stops[-1])
+    slopes = (away[1::2] - away[0::2]) / (2.0 * margins.STEP)
+    raw = Margin(differing, (Limit("x", "contact", 1.0, 1.0, slopes),))
+    found = without_wiper(raw, of, trim())
+    plain = draw_many(of.circuit, ROUGH, of.seed, range(400))
+    untouched = Margin(
+        found.quantities,
+        (replace(raw.limits[0], slopes=slopes[[q in found.quantities for q in differing]]),),
+    )
+    before = untouched.each(plain).std()
+    after = (found.each(plain) * found.limits[0].sigma).std()
+    assert after < 0.1 * before
+
+
+@pytest.mark.slow
+def test_the_margin_foretells_trimmed_boards() -> None:
+    """Chosen on some boards, its sign is held against the verdicts of others; the one as built
+    says nothing about them."""
+    of = replace(plan(6, spread=ROUGH), samples=120)
+    (margin,) = trimmed_margins(of, trim(), count=3, jobs=2)
+    assert {q.name for q in margin.quantities} <= {
+        q.name for q in quantities(of.circuit, draw_many(of.circuit, ROUGH, of.seed, range(120)))
+    }
+    fresh = range(200, 400)
+    answers, _ = trimmed_answers(trim(), of, fresh, 2)
+    boards = draw_many(of.circuit, ROUGH, of.seed, fresh)
+    ok = np.array([a.verdict is Verdict.OK for a in answers])
+    right = ((margin.of(boards) > 0.0) == ok).mean()
+    assert right > 0.8
+    built = [a.verdict is Verdict.OK for a in block(of, fresh, 2)]
+    assert np.mean(built) < ok.mean()
