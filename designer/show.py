@@ -100,6 +100,12 @@ def tolerance(answer: Mapping[str, Any]) -> None:
     for r in answer["responses"]:
         for doubt in doubts(r.get("trust") or {}):
             _line(console, f"ω = {r['omega']:g}: {doubt}")
+    if answer.get("equation_check") is not None:
+        from designer.equation_check import EquationCheck  # only here is it needed
+
+        problem = EquationCheck.read(answer["equation_check"]).problem
+        if problem:
+            _line(console, problem)
     if answer.get("until") is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
         _line(console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")

@@ -203,10 +203,7 @@ def _checks(
         if not any(finding.reason for finding in equations.findings):
             kept.put("equations", key, equations)
     if not equations.passed:
-        said = "the netlist does not compute the model's equation"
-        if equations.open:
-            said = "whether the netlist computes the model's equation is not to be trusted here"
-        progress.note(f"{said}: {equations.worst}")
+        progress.note(equations.problem)
     gates = kept.get("gates", key)
     checked = check(made, pool, progress, gates)
     met = tuple(c.gate for c in checked)
