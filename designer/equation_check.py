@@ -17,7 +17,7 @@ order in each, and by `FLOOR` beside it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -96,6 +96,30 @@ class EquationCheck:
     def worst(self) -> Finding:
         """The finding nearest to its bound, or past it; one without an answer first."""
         return max(self.findings, key=lambda f: np.inf if f.reason else f.deviation / f.bound)
+
+    @property
+    def problem(self) -> str:
+        """What did not pass, in words; empty where all did."""
+        if self.passed:
+            return ""
+        said = "the netlist does not compute the model's equation"
+        if self.open:
+            said = "whether the netlist computes the model's equation is not to be trusted here"
+        return f"{said}: {'; '.join(str(f) for f in self.findings if not f.passed)}"
+
+    @classmethod
+    def read(cls, said: Mapping[str, Any]) -> EquationCheck:
+        """From what `as_dict` made, in JSON."""
+
+        def number(value: float | None) -> float:
+            return float("nan") if value is None else value
+
+        return cls(
+            tuple(
+                Finding(f["name"], number(f["deviation"]), number(f["bound"]), f["reason"])
+                for f in said["findings"]
+            )
+        )
 
     def as_dict(self) -> dict[str, Any]:
         return {

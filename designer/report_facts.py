@@ -32,7 +32,7 @@ def facts(data: ReportData) -> dict[str, Any]:
         "mechanical_table": report_design.mechanical_table(data),
         "response_table": tables.response_table(data),
         "settings_table": tables.settings_table(data),
-        "problems": [w for c in data.checked for w in [words.problem(c)] if w],
+        "problems": _problems(data),
         "yield_table": tables.yield_table(data),
         "ngspice_table": tables.ngspice_table(data),
         "study_note": _study_note(data),
@@ -231,6 +231,14 @@ def _error_note(design: Design) -> str:
         f"voltage scales that suit it best. {said} The clearance and the force are set at the "
         "generator and do not count."
     )
+
+
+def _problems(data: ReportData) -> list[str]:
+    """Of each response, and of the netlist."""
+    said = [words.problem(c) for c in data.checked]
+    if data.equations is not None:
+        said.append(data.equations.problem)
+    return [problem for problem in said if problem]
 
 
 def _equation_note(data: ReportData) -> str:

@@ -14,15 +14,11 @@ from designer.errors import InputError
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.modelfile import Response
-from designer.orbit import Orbit, OrbitStatus
+from designer.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.system import Array, Drive, PiecewiseLinearSystem
 
 SLOWEST, FASTEST = 1e-3, 1e3
 """Dimensionless drive frequencies: slower, one period has too many steps to wait for."""
-ANSWERS = frozenset(
-    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
-)
-"""Statuses that answer the question where no response was wanted."""
 STARTS = 16
 """Initial states tried for each response: rest and a Sobol set."""
 SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
@@ -134,9 +130,12 @@ def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
 
 def on_circuit(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Orbit:
     """The orbit that the exact circuit reaches from the model's own, in volts and seconds."""
-    return settle(
-        circuit_flow(system, design, response), response.orbit.start * design.volts(response.b)
-    )
+    return reached(circuit_flow(system, design, response), design, response)
+
+
+def reached(flow: Flow, design: Design, response: ModelResponse) -> Orbit:
+    """``on_circuit``, with the circuit's flow at this response."""
+    return settle(flow, response.orbit.start * design.volts(response.b))
 
 
 def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Flow:

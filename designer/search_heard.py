@@ -30,6 +30,8 @@ FEWER, LEAST = 1, 8
 """Boards of a response that ngspice may lose, and answers that it takes to say so."""
 LONGEST = 60
 """Drive periods: a board that is further from its orbit in ngspice is not asked."""
+LEVELS = 3
+"""Step sizes that the numerics gate tries; what needs finer ones near a border is not waited for."""
 REFINEMENTS = 1
 """How often the step is halved where ngspice disagrees."""
 
@@ -88,7 +90,7 @@ class Listener:
         near = [s for s in map(_started, there) if s.discard <= LONGEST]
         if len(near) < LEAST:
             return [(len(there), 0, len(there))]
-        (nominal,) = gate.check(self._pool, [replace(bench.nominal(stand), rung=RUNG)])
+        (nominal,) = gate.check(self._pool, [replace(bench.nominal(stand), rung=RUNG)], LEVELS)
         if not nominal.passed:
             return [(len(there), 0, len(there))]
         queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]

@@ -30,7 +30,7 @@ from designer.progress import Progress
 from designer.provenance import provenance
 from designer.rung_choice import SEARCH
 from designer.search import look, search
-from designer.search_heard import RUNG, Listener
+from designer.search_heard import LEVELS, RUNG, Listener
 from designer.search_json import confirmation_json, search_json
 from designer.search_memory import Memory
 from designer.search_resolved import resolved
@@ -228,6 +228,7 @@ def _confirm(
         gates = gate.check(
             pool,
             [Subject(reduction, q.excitation, q.start, rung=RUNG) for q in study.plan.questions],
+            LEVELS,
         )
         plan = replace(
             study.plan,

@@ -203,10 +203,7 @@ def _checks(
         if not any(finding.reason for finding in equations.findings):
             kept.put("equations", key, equations)
     if not equations.passed:
-        said = "the netlist does not compute the model's equation"
-        if equations.open:
-            said = "whether the netlist computes the model's equation is not to be trusted here"
-        progress.note(f"{said}: {equations.worst}")
+        progress.note(equations.problem)
     gates = kept.get("gates", key)
     checked = check(made, pool, progress, gates)
     met = tuple(c.gate for c in checked)
@@ -262,5 +259,6 @@ def _satisfied(answer: Mapping[str, Any]) -> bool:
 
 
 def _trusted(said: Mapping[str, Any]) -> bool:
-    """Of the engines' answers; a yield says only how far it is known. Older folders say nothing."""
-    return all(engine["trusted"] for name, engine in said.items() if name != "yield")
+    """Of the engines' answers, where each has one (null: it has none); a yield says only how far
+    it is known. Older folders say nothing."""
+    return all(engine["trusted"] is True for name, engine in said.items() if name != "yield")

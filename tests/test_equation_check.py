@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -9,13 +11,16 @@ from functools import cache
 import numpy as np
 import pytest
 
+from designer import show
 from designer.api import Synthesis, synthesise
 from designer.circuit import Circuit, Resistor
 from designer.coefficients import coefficient_errors
 from designer.equation_check import FLOOR, EquationCheck, Finding, check, explained, transfer
+from designer.jsonout import dumps
 from designer.mechanics import SecondOrderSystem
 from designer.model import Dimensionless
 from designer.modelfile import parse_model_file
+from designer.study_job import _satisfied
 from designer.synthesis import Certificate, Design
 from designer.workers import SpicePool
 from designer.zone import Sides
@@ -232,6 +237,29 @@ def test_a_check_without_an_answer_is_open_and_a_wrong_one_is_not() -> None:
     assert not EquationCheck((right, silent)).passed
     assert not EquationCheck((wrong, silent)).open
     assert not EquationCheck((right,)).open
+
+
+@pytest.mark.parametrize(
+    ("deviation", "reason", "words"),
+    [
+        (math.nan, "singular matrix", "is not to be trusted here: second: singular matrix"),
+        (0.5, "", "does not compute the model's equation: second: 0.5, bound 0.1"),
+        (0.01, "", ""),
+    ],
+)
+def test_what_did_not_pass_is_said_again_from_the_file(
+    deviation: float, reason: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The exit status is 1 then, also where a finished folder is shown again."""
+    found = EquationCheck((Finding("first", 0.01, 0.1), Finding("second", deviation, 0.1, reason)))
+    assert found.problem.endswith(words)
+    assert bool(found.problem) is bool(words)
+    written = json.loads(dumps(found.as_dict()))
+    answer = {"samples": 1, "responses": [], "equation_check": written}
+    show.tolerance(answer)
+    assert ("equation" in capsys.readouterr().err) is bool(words)
+    assert EquationCheck.read(written).problem == found.problem
+    assert _satisfied(answer) is not bool(words)
 
 
 def test_a_deck_that_ngspice_cannot_solve_says_why(pool: SpicePool) -> None:
