@@ -61,7 +61,8 @@ class Outline:
 
     def room(self, corners: Array) -> float:
         """From a convex shape to the edge [mm]: the gap where all of it is on the board, 0 where it
-        lies across the edge, else less than 0 by how far its outermost corner is outside.
+        lies across the edge or over a cut-out, else less than 0 by how far its outermost corner is
+        outside.
 
         corners : shape (k, 2), in order.
         """
@@ -69,7 +70,7 @@ class Outline:
         if not inside.all():
             return -float(_to_sides(corners[~inside], self.sides).min(axis=1).max())
         around = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-        if _cross(around, self.sides):
+        if _cross(around, self.sides) or _any_within(self.sides.reshape(-1, 2), around):
             return 0.0
         gaps = _to_sides(corners, self.sides), _to_sides(self.sides.reshape(-1, 2), around)
         return float(min(gap.min() for gap in gaps))
@@ -184,14 +185,21 @@ def _to_sides(points: Array, sides: Array) -> Array:
 
 def _cross(some: Array, others: Array) -> bool:
     """Whether any straight piece of the one crosses one of the others."""
-
-    def turn(a: Array, b: Array, c: Array) -> Array:
-        found: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (
-            b[..., 1] - a[..., 1]
-        ) * (c[..., 0] - a[..., 0])
-        return found
-
     a, b = some[:, None, 0], some[:, None, 1]
     c, d = others[None, :, 0], others[None, :, 1]
-    apart = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
+    apart = _turn(a, b, c) * _turn(a, b, d), _turn(c, d, a) * _turn(c, d, b)
     return bool(((apart[0] < 0.0) & (apart[1] < 0.0)).any())
+
+
+def _any_within(points: Array, around: Array) -> bool:
+    """Whether any of the points, shape (k, 2), lies inside a convex shape with these sides."""
+    turns = _turn(around[None, :, 0], around[None, :, 1], points[:, None])
+    return bool(((turns > 0.0).all(axis=1) | (turns < 0.0).all(axis=1)).any())
+
+
+def _turn(a: Array, b: Array, c: Array) -> Array:
+    """Above 0 where c lies on the one side of the line from a to b, below on the other."""
+    found: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
+        c[..., 0] - a[..., 0]
+    )
+    return found

@@ -23,7 +23,8 @@ class CaseStore:
     Parameters
     ----------
     out : the report's folder, which is made. files : names of the report's own files. resume : go
-    on with the pieces that are there.
+    on with the pieces that are there. place : what messages call ``out``, where the command has no
+    ``--out`` and no ``--resume``, since it always goes on.
 
     Raises
     ------
@@ -31,19 +32,24 @@ class CaseStore:
         the report's goes, and nothing that it could be made of; the folder cannot be made.
     """
 
-    def __init__(self, out: Path, files: Iterable[str], *, resume: bool) -> None:
+    def __init__(
+        self, out: Path, files: Iterable[str], *, resume: bool, place: str | None = None
+    ) -> None:
         self._out, self._folder, self._files = out, out / FOLDER, tuple(files)
+        self._place, self._option = place or "--out", place or "--resume"
         self._keys: str | Mapping[str, str] = {}
         begun = self._folder.is_dir() and any(self._folder.iterdir())
         if begun and not resume:
-            raise InputError(self._folder, "--out", "results", "an empty folder, or --resume")
+            raise InputError(self._folder, self._place, "results", "an empty folder, or --resume")
         if not begun:
             self._check_free()
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             said = error.strerror or str(error)
-            raise InputError(self._folder, "--out", said, "a place that can be written") from None
+            raise InputError(
+                self._folder, self._place, said, "a place that can be written"
+            ) from None
 
     def expect(self, keys: str | Mapping[str, str]) -> None:
         """Before the first piece: keys : of all that decides the pieces, one for all of them, or
@@ -82,13 +88,19 @@ class CaseStore:
         for name in self._files:
             if (self._out / name).exists():
                 found = "a file that the report would replace, and no piece of it to go on with"
-                raise InputError(self._out / name, "--out", found, "a folder without it")
+                raise InputError(self._out / name, self._place, found, "a folder without it")
 
     def _read(self, path: Path) -> dict[str, Any] | None:
-        known = read_piece(path, "--resume")
+        known = read_piece(path, self._option)
         if known is not None and known.get("key") != self._key(path.stem):
             found = "a piece of other settings"
-            raise InputError(path, "--resume", found, "the same settings")
+            raise InputError(
+                path,
+                self._option,
+                found,
+                "the same settings, or another folder; to make the report anew in this one, "
+                f"delete {self._folder} and what was made beside it",
+            )
         return known
 
 

@@ -140,7 +140,8 @@ def _choice(said: Mapping[str, Any]) -> Choice:
         return Choice("auto", f"rung by trade.json: it asked no boards, so as usual{warning}")
     overall = found[-1]  # of all responses, or of the only one
     if overall["rung"] == CIRCUIT:
-        kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %)"
+        note = f"; {overall['note']}" if overall.get("note") else ""
+        kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %{note})"
         return Choice(
             "auto",
             f"rung by trade.json: the exact circuit decides, {kept}; ngspice is asked about "

@@ -81,7 +81,7 @@ def report(
     options = Options(seed, jobs, samples, resume=True)
     rules = [__version__, search_job.RULES, study_hash.RULES]
     settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
-    store = CaseStore(out, FILES, resume=True)
+    store = CaseStore(out, FILES, resume=True, place="out")
     store.expect(dumps(settings, indent=None))
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:

@@ -156,9 +156,12 @@ def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = Fal
     measured = max(b.bound for b in some)
     off = any(b.off(YIELD) for b in some)
     rung = "ideal" if off else CIRCUIT
-    if off:  # ngspice is what is measured against: the circuit's difference is what there is to say
-        said = f"the exact circuit is off by more than {100.0 * YIELD:g} %"
-        note = f"{said}; {note}" if note else said
+    # ngspice is what is measured against: the circuit's difference is what there is to say.
+    said = [f"the exact circuit is off by more than {100.0 * YIELD:g} %"] if off else []
+    said += [note] if note else []
+    if undecided := sum(b.undecided for b in some):
+        asked = sum(b.asked for b in some)
+        said.append(f"{undecided} of {asked} boards undecided, counted as differing")
     return Cheapest(
         SHARE,
         IDEAL,
@@ -169,5 +172,5 @@ def _of_some(some: Sequence[BoardTrade], note: str = "", *, together: bool = Fal
         math.nan if off else measured,
         off or measured <= YIELD,
         sum(b.seconds[rung] for b in some),
-        note,
+        "; ".join(said),
     )

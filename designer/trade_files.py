@@ -166,8 +166,10 @@ def sheet(answer: Mapping[str, Any]) -> str:
             "",
             "## Boards",
             "",
-            "Yield of the exact circuit less that of ngspice with ideal op-amps on the same boards,"
-            " with its 95 % interval.",
+            "Yield of the exact circuit less that of ngspice with ideal op-amps on the boards that "
+            "both decided, with its 95 % interval. The interval holds for all boards that were "
+            "asked: those that one of them left undecided count as ok on the exact circuit alone "
+            "for its upper end, and in ngspice alone for its lower end.",
             "",
             "| response | boards | ok | only exact | only ngspice | undecided | difference |"
             " interval |",

@@ -3,7 +3,9 @@
 Boards of the model file's spread, started on the nominal orbit, each by both engines. Where they
 differ by D = +1 or -1 a board, the mean of D is the error of the exact circuit's yield. Its 95 %
 interval joins the Wilson limits of both shares with their correlation (Zou and Donner, Statistics
-in Medicine 27, 2008, 1693): boards without any difference still leave room for one.
+in Medicine 27, 2008, 1693): boards without any difference still leave room for one. Boards that an
+engine has no answer to are asked all the same, and may differ either way: D = +1 on each for the
+upper end, -1 for the lower one.
 """
 
 from __future__ import annotations
@@ -62,9 +64,10 @@ class Tally:
 
 @dataclass(frozen=True)
 class BoardTrade:
-    """One response on boards that both engines decided; see ``Tally``.
+    """One response on its boards; see ``Tally``.
 
-    periods : drive periods of ngspice for a board, mean. seconds : CPU time of a board, by rung.
+    boards : that both engines decided. periods : drive periods of ngspice for a board, mean.
+    seconds : CPU time of a board, by rung.
     """
 
     label: Label
@@ -94,22 +97,18 @@ class BoardTrade:
         )
 
     @property
+    def asked(self) -> int:
+        """Boards, decided or not."""
+        return self.boards + self.undecided
+
+    @property
     def difference(self) -> tuple[float, float, float]:
-        """Exact circuit's yield less ngspice's, and its 95 % interval."""
-        n = self.boards
-        if n == 0:
-            return math.nan, -1.0, 1.0
-        up, down = self.lost / n, self.gained / n
-        (up_low, up_high), (down_low, down_high) = wilson(self.lost, n), wilson(self.gained, n)
-        # A board counts for one share at most: they go against each other.
-        rest = (1.0 - up) * (1.0 - down)
-        against = math.sqrt(up * down / rest) if rest > 0.0 else 1.0
-        d = up - down
-        return (
-            d,
-            d - _joined(up - up_low, down_high - down, against),
-            d + _joined(up_high - up, down - down_low, against),
-        )
+        """Exact circuit's yield less ngspice's on the boards that both decided, and the 95 %
+        interval that holds however the undecided ones would have turned out."""
+        d = (self.lost - self.gained) / self.boards if self.boards else math.nan
+        _, high = _interval(self.lost + self.undecided, self.gained, self.asked)
+        low, _ = _interval(self.lost, self.gained + self.undecided, self.asked)
+        return d, low, high
 
     @property
     def bound(self) -> float:
@@ -182,6 +181,22 @@ def tally(
         runs=len(periods),
         periods=float(sum(periods)),
         seconds=seconds,
+    )
+
+
+def _interval(lost: int, gained: int, n: int) -> tuple[float, float]:
+    """95 % interval of the difference of two yields on the same n boards."""
+    if n == 0:
+        return -1.0, 1.0
+    up, down = lost / n, gained / n
+    (up_low, up_high), (down_low, down_high) = wilson(lost, n), wilson(gained, n)
+    # A board counts for one share at most: they go against each other.
+    rest = (1.0 - up) * (1.0 - down)
+    against = math.sqrt(up * down / rest) if rest > 0.0 else 1.0
+    d = up - down
+    return (
+        d - _joined(up - up_low, down_high - down, against),
+        d + _joined(up_high - up, down - down_low, against),
     )
 
 

@@ -68,6 +68,40 @@ def test_the_inner_corner_and_a_slot_through_a_pad() -> None:
     assert slotted.room(square(20.0, 10.0)) == 0.0
     assert slotted.room(square(20.0, 8.0)) == pytest.approx(9.9 - 8.5)
     assert slotted.room(square(20.0, 10.0, half=0.05)) < 0.0, "in the slot"
+    # A cut-out wholly under a pad: no corner is off the board, and no edge meets the pad's.
+    holed = board("gr_rect (start 0 0) (end 40 40)", "gr_rect (start 19 19) (end 21 21)")
+    assert holed.room(square(20.0, 20.0, half=5.0)) == 0.0
+    assert holed.room(square(20.0, 20.0, half=5.0, turn=0.5)) == 0.0
+    assert holed.room(square(30.0, 20.0, half=5.0)) == pytest.approx(4.0)
+
+
+@given(
+    at=st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0)),
+    radius=st.floats(0.05, 12.0),
+    turn=st.floats(0.0, 6.2),
+    reverse=st.booleans(),
+)
+def test_a_pad_and_a_round_cut_out(
+    at: tuple[float, float], radius: float, turn: float, reverse: bool
+) -> None:
+    """A square pad, 10 mm wide, and a hole beside it, across its edge, wholly under it or around
+    it: the gap between a square and a disc is known in the square's own frame."""
+    outline = board(
+        "gr_rect (start -40 -40) (end 40 40)",
+        f"gr_circle (center {at[0]} {at[1]}) (end {at[0] + radius} {at[1]})",
+    )
+    pad = square(0.0, 0.0, half=5.0, turn=turn)
+    room = outline.room(pad[::-1] if reverse else pad)
+    u = abs(at[0] * math.cos(turn) + at[1] * math.sin(turn))
+    v = abs(at[1] * math.cos(turn) - at[0] * math.sin(turn))
+    gap = math.hypot(max(u - 5.0, 0.0), max(v - 5.0, 0.0)) - radius
+    chord = radius * (1.0 - math.cos(math.pi / 72)) + 1e-9
+    if gap > chord:
+        assert room == pytest.approx(gap, abs=chord)
+    elif gap < 0.0:
+        assert room <= chord
+    if max(u, v) < 5.0 - radius:
+        assert room == 0.0, "wholly under the pad"
 
 
 def test_rounded_boards() -> None:

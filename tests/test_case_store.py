@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from designer import search_report
 from designer.case_store import FOLDER, CaseStore, read_piece
 from designer.errors import InputError
 
@@ -52,6 +53,24 @@ def test_a_piece_of_other_settings_is_refused(keys: str | dict[str, str], tmp_pa
     store.piece("one", lambda: made(1.0))
     with pytest.raises(InputError, match="other settings"):
         CaseStore(tmp_path, [], resume=True).expect(keys)
+
+
+def test_a_report_that_always_goes_on_names_no_option_that_it_does_not_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """After a changed model or changed rules: what to do is said, with no word of --resume."""
+    store = CaseStore(tmp_path, [], resume=True, place="out")
+    store.expect("k")
+    store.piece("one", lambda: made(1.0))
+    model = Path(__file__).parent.parent / "examples" / "robust.toml"
+    assert search_report.main([str(tmp_path), "--model", str(model)]) == 2
+    said = capsys.readouterr().err
+    assert "one.json: out: found a piece of other settings" in said
+    assert f"delete {tmp_path / FOLDER}" in said
+    assert "another folder" in said
+    assert "--" not in said
+    with pytest.raises(InputError, match=r"--resume: found a piece of other settings.*folder"):
+        CaseStore(tmp_path, [], resume=True).expect("other")
 
 
 def test_a_file_of_somebody_else_s_stays(tmp_path: Path) -> None:

@@ -308,14 +308,14 @@ def test_velocities_are_compared_in_order_of_size_and_across_twins() -> None:
     assert not alike(Orbit(OrbitStatus.FAILED), Orbit(OrbitStatus.FAILED))
 
 
-def of_boards(boards: int, gained: int, lost: int) -> BoardTrade:
+def of_boards(boards: int, gained: int, lost: int, undecided: int = 0) -> BoardTrade:
     return BoardTrade(
         ONE,
         boards,
         boards - gained,
         gained,
         lost,
-        0,
+        undecided,
         10.0,
         {"circuit": 1e-4, "ideal": 0.05},
     )
@@ -360,6 +360,52 @@ def test_boards_without_a_difference_leave_room_for_one() -> None:
     assert of_boards(40, 0, 0).bound > 0.01
     assert not of_boards(40, 0, 0).off(0.01)
     assert of_boards(40, 30, 0).off(0.01)
+
+
+@given(st.integers(0, 60), st.integers(0, 6), st.data())
+def test_the_interval_holds_however_undecided_boards_turn_out(
+    decided: int, undecided: int, data: st.DataObject
+) -> None:
+    """Against every way to decide them, whose interval is then that of decided boards alone."""
+    gained = data.draw(st.integers(0, decided))
+    lost = data.draw(st.integers(0, decided - gained))
+    one = of_boards(decided, gained, lost, undecided)
+    d, low, high = one.difference
+    assert one.asked == decided + undecided
+    assert -1.0 - 1e-12 <= low <= high <= 1.0 + 1e-12
+    if decided:
+        assert d == pytest.approx((lost - gained) / decided)
+        assert low - 1e-12 <= d <= high + 1e-12
+    ends = [
+        of_boards(one.asked, gained + theirs, lost + mine).difference[1:]
+        for theirs, mine in product(range(undecided + 1), repeat=2)
+        if theirs + mine <= undecided
+    ]
+    assert low == pytest.approx(min(end[0] for end in ends), abs=1e-12)
+    assert high == pytest.approx(max(end[1] for end in ends), abs=1e-12)
+
+
+def test_undecided_boards_are_no_evidence(tmp_path: Path) -> None:
+    """1000 boards without a difference show 1 %; with 20 undecided they do not, and a difference
+    that only the decided ones show is not shown either."""
+    some = judged(*LADDER, boards=of_boards(980, 0, 0, 20))
+    share = picked(some, SHARE, IDEAL)
+    assert (share.rung, share.shown) == ("circuit", False)
+    assert share.measured > 0.02
+    answer = document(some)
+    assert "20 of 1000 boards undecided" in sheet(answer)
+    reason = choose(folder_with(tmp_path / "some", answer)).reason
+    assert f"within {100.0 * share.measured:.2g} % of ngspice's yield" in reason
+    assert "20 of 1000 boards undecided" in reason
+    off = judged(*LADDER, boards=of_boards(400, 20, 0))
+    assert picked(off, SHARE, IDEAL).rung == "ideal"
+    open_ = judged(*LADDER, boards=of_boards(400, 20, 0, 20))
+    assert (picked(open_, SHARE, IDEAL).rung, picked(open_, SHARE, IDEAL).shown) == (
+        "circuit", False
+    )  # fmt: skip
+    none = of_boards(0, 0, 0, 40)
+    assert none.bound == 1.0
+    assert not none.off(0.01)
 
 
 @pytest.mark.slow
