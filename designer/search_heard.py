@@ -31,7 +31,7 @@ FEWER, LEAST = 1, 8
 LONGEST = 60
 """Drive periods: a board that is further from its orbit in ngspice is not asked."""
 LEVELS = 3
-"""Step sizes that the numerics gate tries; what needs finer ones near a border is not waited for."""
+"""Step sizes that the numerics gate tries; finer ones, near a border, are not waited for."""
 REFINEMENTS = 1
 """How often the step is halved where ngspice disagrees."""
 

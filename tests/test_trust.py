@@ -285,7 +285,7 @@ def test_the_tables_name_what_is_not_to_be_trusted() -> None:
 
 def test_a_study_says_why_ngspice_has_no_answer(capsys: pytest.CaptureFixture[str]) -> None:
     """With the figures of its reason, from the folder's files alone."""
-    gates = [SimulationFailed("timestep too small"), READ]
+    gates: list[Read | SimulationFailed] = [SimulationFailed("timestep too small"), READ]
     rows: list[dict[str, Any]] = []
     for read in gates:
         checked = _checked(0.999, GateResult(SETTINGS, False, 5e-3, read, (200,)))
