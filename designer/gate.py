@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from designer import deck, remedies, warm_start
 from designer.circuit import Board, Circuit
 from designer.deck import Excitation, SolverSettings
+from designer.doubt import Doubt
 from designer.flow import Flow
 from designer.ngspice import SimulationFailed
 from designer.opamp_model import Rung, limit_into
@@ -80,22 +81,25 @@ class GateResult:
     @property
     def why(self) -> str:
         """Why it did not pass, at the finest step tried; empty where it did."""
-        if self.passed:
-            return ""
         if isinstance(self.read, SimulationFailed):
-            return self.read.reason
+            return "" if self.passed else self.read.reason
+        return ", ".join(map(str, self.doubts))
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What the runs that there are were found not to do; none where they passed."""
+        if self.passed or isinstance(self.read, SimulationFailed):
+            return ()
         said = []
         if self.difference > BOUND:
-            said.append(f"strobes differ by {self.difference:.1g} of the peak, bound {BOUND:g}")
+            differ = f"strobes differ by more than {BOUND:g} of the peak"
+            said.append(Doubt(differ, f"by {self.difference:.1g}"))
         if self.wave > self.wave_bound:
-            said.append(
-                f"the wave is {self.wave:.1g} of the peak off the exact circuit's, bound "
-                f"{self.wave_bound:.1g}"
-            )
-        shown = self.read.orbit.response
-        return ", ".join(said) or (
-            f"its runs do not all show the exact circuit's response (the coarsest shows {shown})"
-        )
+            off = f"by {self.wave:.1g} of the peak, bound {self.wave_bound:.1g}"
+            said.append(Doubt("the wave is off the exact circuit's by more than its bound", off))
+        other = "its runs do not all show the exact circuit's response"
+        shown = f"the coarsest shows {self.read.orbit.response}"
+        return tuple(said) or (Doubt(other, shown),)
 
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""

@@ -191,7 +191,7 @@ def simulate_answer(
     if plots is not None:
         progress.stage("pictures")
         answer["files"] = simulate_plots.write(plots, names, simulated, overwrite)
-    return plain(answer), all(s.found and s.trust.trusted for s in simulated)
+    return plain(answer), all(s.found and s.trust.trusted is True for s in simulated)
 
 
 def read_design(

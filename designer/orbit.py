@@ -29,6 +29,12 @@ class OrbitStatus(StrEnum):
     FAILED = "failed"
 
 
+ANSWERS = frozenset(
+    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
+)
+"""Statuses that answer the question where no response was wanted."""
+
+
 @dataclass(frozen=True)
 class Orbit:
     """A steady response.

@@ -82,16 +82,12 @@ class Checked:
     def trust(self) -> dict[str, Trust]:
         """Of each engine's answer."""
         said = {"model": self.model_trust, "circuit": self.circuit_trust}
-        heard = self.ngspice
-        return (
-            said
-            if heard is None
-            else {**said, "ngspice": trust.of_reason(heard.status, heard.reason)}
-        )
+        return said if self.gate is None else {**said, "ngspice": trust.of_gate(self.gate)}
 
     @property
     def trusted(self) -> bool:
-        return all(said.trusted for said in self.trust.values())
+        """Whether every engine that was asked has an answer, and it can be trusted."""
+        return all(said.trusted is True for said in self.trust.values())
 
     @property
     def agrees(self) -> bool:

@@ -10,6 +10,7 @@ from designer.orbit import Orbit, OrbitStatus
 from designer.pipeline import Checked
 from designer.plots import EXACT
 from designer.quantity import format_quantity
+from designer.trust import WORDS
 
 NONE = "–"
 
@@ -36,7 +37,9 @@ def problem(c: Checked) -> str:
     if not without.agrees:
         said.append(f"model {orbit(c.model.orbit)} and exact circuit {orbit(c.circuit)} differ")
     exact = {"model": c.model_trust, "exact circuit": c.circuit_trust}
-    said += [f"{engine} {trust}" for engine, trust in exact.items() if not trust.trusted]
+    for engine, trust in exact.items():
+        if trust.reasons:  # without figures: equal studies are equal reports
+            said.append(f"{engine} {WORDS}: {'; '.join(trust.reasons)}")
     if ngspice is not None and ngspice.status is OrbitStatus.FAILED:
         said.append(f"ngspice gave no answer: {ngspice.reason or 'no reason given'}")
     elif ngspice is not None and without.agrees and not c.agrees:

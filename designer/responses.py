@@ -14,15 +14,11 @@ from designer.errors import InputError
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.modelfile import Response
-from designer.orbit import Orbit, OrbitStatus
+from designer.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.system import Array, Drive, PiecewiseLinearSystem
 
 SLOWEST, FASTEST = 1e-3, 1e3
 """Dimensionless drive frequencies: slower, one period has too many steps to wait for."""
-ANSWERS = frozenset(
-    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
-)
-"""Statuses that answer the question where no response was wanted."""
 STARTS = 16
 """Initial states tried for each response: rest and a Sobol set."""
 SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))

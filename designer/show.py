@@ -98,7 +98,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         )
     console.print(table)
     for r in answer["responses"]:
-        for doubt in doubts(r.get("trust") or {}):
+        for doubt in doubts(_with_its_figures(r)):
             _line(console, f"ω = {r['omega']:g}: {doubt}")
     if answer.get("equation_check") is not None:
         from designer.equation_check import EquationCheck  # only here is it needed
@@ -172,7 +172,7 @@ def simulated(answer: Mapping[str, Any]) -> None:
             table,
             f"{r['omega']:g}",
             r["expected"] or "-",
-            r["response"] + ("" if r["trust"]["trusted"] else " (not to be trusted)"),
+            r["response"] + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
             {True: "yes", False: "no", None: "-"}[r["symmetric"]],
             "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
             "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
@@ -268,8 +268,20 @@ def doubts(trust: Mapping[str, Any]) -> list[str]:
     return [
         f"{what} not to be trusted here: {'; '.join(said['reasons'])}"
         for what, said in trust.items()
-        if said is not None and not said["trusted"]
+        if said is not None and said["trusted"] is False
+    ] + [
+        f"{what} gave no answer: {'; '.join(said['reasons'])}"
+        for what, said in trust.items()
+        if said is not None and said["trusted"] is None and said["reasons"]
     ]
+
+
+def _with_its_figures(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The trust of a study's response; ngspice's with the reason that has the figures."""
+    said = dict(row.get("trust") or {})
+    if said.get("ngspice") is not None and row.get("ngspice_reason"):
+        said["ngspice"] = {**said["ngspice"], "reasons": [row["ngspice_reason"]]}
+    return said
 
 
 def _console() -> Console:

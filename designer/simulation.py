@@ -317,7 +317,7 @@ def _in_ngspice(
                 sides=_sides(made.design.model),
                 settings=_gate_settings(gates[0]) if gates else {},
                 traces=_spice_traces(gates[0], volts, scale) if gates and traces else (),
-                trust=trust.of_reason(heard[0].status, heard[0].reason),
+                trust=trust.of_gate(gates[0]) if gates else Trust(),
             )
         )
     return tuple(out)

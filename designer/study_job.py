@@ -258,5 +258,6 @@ def _satisfied(answer: Mapping[str, Any]) -> bool:
 
 
 def _trusted(said: Mapping[str, Any]) -> bool:
-    """Of the engines' answers; a yield says only how far it is known. Older folders say nothing."""
-    return all(engine["trusted"] for name, engine in said.items() if name != "yield")
+    """Of the engines' answers, where each has one (null: it has none); a yield says only how far
+    it is known. Older folders say nothing."""
+    return all(engine["trusted"] is True for name, engine in said.items() if name != "yield")

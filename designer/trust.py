@@ -8,7 +8,7 @@ velocity, and into μ times as much of the multipliers. The fixed point of the l
 times ‖(I - Φ)⁻¹‖, Φ the lap's linearised map. States count in units of their peaks.
 
 A result that says more than this error allows is *not to be trusted here*, and the reason is said:
-the tool gives no bare answer then.
+the tool gives no bare answer then. Where there is no answer there is nothing to trust either.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from typing import Any
 import numpy as np
 
 from designer.attractor import STROBE_TOLERANCE, peaks_near
+from designer.doubt import Doubt
 from designer.flow import Flow, FlowResult, FlowStatus
-from designer.orbit import Orbit, OrbitStatus
+from designer.gate import GateResult
+from designer.ngspice import SimulationFailed
+from designer.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.system import Array
 from designer.verdict import Yield
 
@@ -42,31 +45,42 @@ class Trust:
 
     rounding : largest difference of a lap's end between the ways to compute it; magnification :
     ‖Φ‖ of the lap; error : bound of the state's error, multiplier_error : of the largest
-    multiplier's modulus. States in units of their peaks; nan where nothing was measured. reasons :
-    why the result is not to be trusted; none where it is.
+    multiplier's modulus. States in units of their peaks; nan where nothing was measured. doubts :
+    why the result is not to be trusted. answered : whether there is a result.
     """
 
     rounding: float = math.nan
     magnification: float = math.nan
     error: float = math.nan
     multiplier_error: float = math.nan
-    reasons: tuple[str, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
+    answered: bool = False
 
     @property
-    def trusted(self) -> bool:
-        return not self.reasons
+    def trusted(self) -> bool | None:
+        """None where there is nothing to trust: no answer, and no doubt of what there is."""
+        if self.doubts:
+            return False
+        return True if self.answered else None
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """The doubts' words, without figures."""
+        return tuple(doubt.words for doubt in self.doubts)
 
     def __str__(self) -> str:
-        """Empty where it is to be trusted."""
-        return f"{WORDS}: {'; '.join(self.reasons)}" if self.reasons else ""
+        """With the figures; empty without a doubt."""
+        return f"{WORDS}: {'; '.join(map(str, self.doubts))}" if self.doubts else ""
 
     def verdict(self) -> dict[str, Any]:
         """Without the figures, which no two machines share: equal studies are equal files."""
         return {"trusted": self.trusted, "reasons": list(self.reasons)}
 
     def as_dict(self) -> dict[str, Any]:
+        """With the figures, in the reasons too."""
         return {
-            **self.verdict(),
+            "trusted": self.trusted,
+            "reasons": [str(doubt) for doubt in self.doubts],
             "rounding": self.rounding,
             "magnification": self.magnification,
             "error": self.error,
@@ -77,8 +91,8 @@ class Trust:
 def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
     """Of what the exact engine says of a response; ``flow`` is the one it was found with.
 
-    Without a start there is no result: its status and reason say so, and nothing is measured.
-    Of a motion without a period, one drive period is a lap.
+    Without a start nothing is measured: its status and reason say why. One that has not settled
+    is measured too, but no answer. Of a motion without a period, one drive period is a lap.
     """
     if not len(orbit.start):
         return Trust()
@@ -94,41 +108,46 @@ def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
     laps = [run.tangent * peak / peak[:, None] for run in runs if run.tangent is not None]
     ended = [run.status for run in runs if run.status is not FlowStatus.DONE]
     if ended:
-        return Trust(reasons=(f"a lap computed anew ends with: {ended[0]}",))
+        return Trust(doubts=(Doubt(f"a lap computed anew ends with: {ended[0]}"),))
     ends = np.array([run.strobes[-1] for run in runs]) / peak
     magnification = float(np.linalg.norm(laps[0], 2))
     rounding = float(np.ptp(ends, axis=0).max())
     if runs[0].counts.any():  # all runs may have found the stop with the same last digit
         rounding = max(rounding, ROUNDING * _kick(flow, peak) * magnification)
     error = MARGIN * rounding * (_carried(laps[0]) if orbit.n else 1.0)
-    reasons = _reasons_of_lap(runs, error, counted=not _at_strobe(orbit, n * flow.drive.period))
+    doubts = _doubts_of_lap(runs, error, counted=not _at_strobe(orbit, n * flow.drive.period))
     if orbit.n == 0:
-        return Trust(rounding, magnification, error, reasons=reasons)
+        answered = orbit.status in ANSWERS
+        return Trust(rounding, magnification, error, doubts=doubts, answered=answered)
     open_by = MARGIN * float(np.ptp([_radius(lap) for lap in laps]))
     if orbit.status is OrbitStatus.PERIODIC:
-        reasons += _reasons_of_orbit(orbit, error, open_by, float(peak[_moving(flow)]))
-    return Trust(rounding, magnification, error, open_by, reasons)
+        doubts += _doubts_of_orbit(orbit, error, open_by, float(peak[_moving(flow)]))
+    return Trust(rounding, magnification, error, open_by, doubts, orbit.status in ANSWERS)
 
 
 def of_yield(counted: Yield, nominal: Trust) -> Trust:
     """Of a yield: not better than the nominal orbit's that each board starts on, nor with so many
     boards without an answer that they could move it out of its own interval."""
-    reasons = [f"the nominal response: {reason}" for reason in nominal.reasons]
+    doubts = [Doubt(f"the nominal response: {d.words}", d.figures) for d in nominal.doubts]
     if counted.failed:
         least = counted.ok / counted.samples
         most = (counted.ok + counted.failed) / counted.samples
         low, high = counted.interval
         if counted.failed == counted.samples or least < low or most > high:
-            reasons.append(
+            # Counts of boards, which the study's rows have: no measured figures.
+            said = (
                 f"{counted.failed} of {counted.samples} boards have no answer; whatever they "
                 f"were, the yield lies between {100 * least:.3g} and {100 * most:.3g} %"
             )
-    return Trust(error=nominal.error, reasons=tuple(reasons))
+            doubts.append(Doubt(said))
+    return Trust(error=nominal.error, doubts=tuple(doubts), answered=True)
 
 
-def of_reason(status: OrbitStatus, reason: str) -> Trust:
-    """Of an engine that answers only behind a gate of its own: not where it has failed."""
-    return Trust(reasons=(reason,) if status is OrbitStatus.FAILED else ())
+def of_gate(gate: GateResult) -> Trust:
+    """Of ngspice, which answers only behind its gate; a run that failed is no answer."""
+    if isinstance(gate.read, SimulationFailed):
+        return Trust()
+    return Trust(doubts=gate.doubts, answered=gate.read.orbit.status in ANSWERS)
 
 
 # ---------------------------------------------------------------------------------------------
@@ -169,34 +188,34 @@ def _at_strobe(orbit: Orbit, span: float) -> bool:
     return bool((np.minimum(times, np.abs(span - times)) < STROBE_TOLERANCE * span).any())
 
 
-def _reasons_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[str, ...]:
-    reasons = []
+def _doubts_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[Doubt, ...]:
+    doubts = []
     if not error <= STROBE_TOLERANCE:
-        reasons.append(
-            f"rounding errors, as the flow magnifies them, leave the state open by {error:.1g} of "
-            f"its peak, and to call a response periodic asks for {STROBE_TOLERANCE:.0e}"
+        said = (
+            "rounding errors, as the flow magnifies them, leave the state open by more than the "
+            f"{STROBE_TOLERANCE:.0e} of its peak that to call a response periodic asks for"
         )
+        doubts.append(Doubt(said, f"{error:.1g}"))
     counts = {tuple(int(c) for c in run.counts.sum(axis=(0, 1))) for run in runs}
     if counted and len(counts) > 1:
         said = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
-        reasons.append(f"computed with other steps a lap has {said} impacts")
-    return tuple(reasons)
+        doubts.append(Doubt("computed with other steps a lap has other impacts", said))
+    return tuple(doubts)
 
 
-def _reasons_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) -> tuple[str, ...]:
-    reasons = []
+def _doubts_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) -> tuple[Doubt, ...]:
+    doubts = []
     nearest = min(orbit.penetration, orbit.miss) / peak
     if nearest <= error:
-        reasons.append(
-            f"a contact or a miss of {nearest:.1g} of the peak lies within the error of "
-            f"{error:.1g}: the count of impacts is open"
-        )
+        said = "a contact or a miss lies within the error: the count of impacts is open"
+        doubts.append(Doubt(said, f"{nearest:.1g} of the peak, error {error:.1g}"))
     if abs(1.0 - orbit.radius) <= open_by:
-        reasons.append(
-            f"its largest multiplier cannot be told from 1 (it is open by {open_by:.1g}): whether "
-            "the response is stable is not known"
+        said = (
+            "its largest multiplier cannot be told from 1: whether the response is stable is not "
+            "known"
         )
-    return tuple(reasons)
+        doubts.append(Doubt(said, f"it is open by {open_by:.1g}"))
+    return tuple(doubts)
 
 
 def _radius(lap: Array) -> float:

@@ -1,0 +1,17 @@
+"""A reason why a result is not to be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """words : the reason, without what was measured: two machines say the same. figures : what was
+    measured, whose last digits they do not share; empty where there is none."""
+
+    words: str
+    figures: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.words} ({self.figures})" if self.figures else self.words
