@@ -7,7 +7,8 @@ prints; ``designer.folder`` and the command line do.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.partnames import parts_of
 from designer.reduction import Reduction
-from designer.responses import ModelResponse, circuit_flow, find, on_circuit, peaks
+from designer.responses import ModelResponse, circuit_flow, find, peaks, reached
 from designer.spread import Spread
 from designer.spreadrules import check_names
 from designer.synthesis import check_choices, synthesise
@@ -52,15 +53,28 @@ class Checked:
     """A wanted response on all three engines, for the nominal circuit.
 
     circuit : orbit of the exact circuit rung, in volts and seconds. gate : ngspice's settings and
-    its run; None where ngspice was not asked. model_trust, circuit_trust : of the exact answers.
+    its run; None where ngspice was not asked. design, flow : what was checked, and its circuit's
+    flow at this response; without them nothing is measured of the exact answers' trust.
     """
 
     model: ModelResponse
     circuit: Orbit
     excitation: Excitation
     gate: GateResult | None
-    model_trust: Trust = field(default_factory=Trust)
-    circuit_trust: Trust = field(default_factory=Trust)
+    design: Design | None = None
+    flow: Flow | None = None
+
+    @cached_property
+    def model_trust(self) -> Trust:
+        """Of the model's answer. Measured when somebody asks: it takes as long as the check."""
+        if self.design is None:
+            return Trust()
+        return trust.of_orbit(model_flow(self.design, self.model), self.model.orbit)
+
+    @cached_property
+    def circuit_trust(self) -> Trust:
+        """Of the exact circuit's answer, likewise."""
+        return Trust() if self.flow is None else trust.of_orbit(self.flow, self.circuit)
 
     @property
     def ngspice(self) -> Orbit | None:
@@ -143,7 +157,8 @@ def check(
         Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in found
     ]
     progress("exact circuit")
-    orbits = [on_circuit(system, design, r) for r in found]
+    flows = [circuit_flow(system, design, r) for r in found]
+    orbits = [reached(flow, design, r) for flow, r in zip(flows, found, strict=True)]
     met: list[GateResult | None] = [None] * len(found)
     if pool is not None and gates is not None:
         met = list(gates)
@@ -156,15 +171,8 @@ def check(
             )
         )
     return tuple(
-        Checked(
-            r,
-            o,
-            e,
-            g,
-            trust.of_orbit(model_flow(design, r), r.orbit),
-            trust.of_orbit(circuit_flow(system, design, r), o),
-        )
-        for r, o, e, g in zip(found, orbits, settings, met, strict=True)
+        Checked(r, o, e, g, design, flow)
+        for r, o, e, g, flow in zip(found, orbits, settings, met, flows, strict=True)
     )
 
 

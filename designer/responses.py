@@ -130,9 +130,12 @@ def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
 
 def on_circuit(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Orbit:
     """The orbit that the exact circuit reaches from the model's own, in volts and seconds."""
-    return settle(
-        circuit_flow(system, design, response), response.orbit.start * design.volts(response.b)
-    )
+    return reached(circuit_flow(system, design, response), design, response)
+
+
+def reached(flow: Flow, design: Design, response: ModelResponse) -> Orbit:
+    """``on_circuit``, with the circuit's flow at this response."""
+    return settle(flow, response.orbit.start * design.volts(response.b))
 
 
 def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Flow:

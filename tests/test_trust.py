@@ -193,9 +193,7 @@ def _checked(k0: float, gate: GateResult | None = None) -> pipeline.Checked:
     """A response whose circuit's flow is the model's, against a stop of this stiffness."""
     flow, orbit = found(k0)
     response = ModelResponse(Response(0.9, Expect(1, 1, 0)), 0.5, orbit, (), True)
-    return pipeline.Checked(
-        response, orbit, Excitation(200.0, 4.0), gate, circuit_trust=trust.of_orbit(flow, orbit)
-    )
+    return pipeline.Checked(response, orbit, Excitation(200.0, 4.0), gate, flow=flow)
 
 
 @pytest.mark.parametrize(("k0", "trusted"), [(STIFFEST, False), (0.999, True)])
@@ -205,6 +203,25 @@ def test_a_report_names_it_among_the_problems(k0: float, trusted: bool) -> None:
     said = report_words.problem(checked)
     assert ("exact circuit not to be trusted here: rounding errors" in said) is not trusted
     assert bool(said) is not trusted
+
+
+def test_the_trust_of_a_check_is_measured_when_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And once: a search checks hundreds of designs and shows none of it."""
+    asked = []
+
+    def measured(flow: Flow, orbit: Orbit) -> Trust:
+        asked.append(flow)
+        return Trust(answered=True)
+
+    monkeypatch.setattr(trust, "of_orbit", measured)
+    checked = _checked(0.999)
+    assert checked.agrees
+    assert not asked
+    assert checked.circuit_trust.trusted
+    assert checked.trust["circuit"].trusted
+    assert asked == [found(0.999)[0]]
 
 
 SETTINGS = SolverSettings("trap", 1e-5)
