@@ -18,6 +18,7 @@ import pytest
 
 from benchmarks.references import Problem, truth
 from designer import attractor, cli, pipeline, report_words, show, trust
+from designer.api import RunResult
 from designer.attractor import settle
 from designer.deck import Excitation, SolverSettings
 from designer.doubt import Doubt
@@ -28,6 +29,7 @@ from designer.modelfile import Expect, Response
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.responses import ModelResponse
+from designer.study_job import _satisfied
 from designer.system import Drive
 from designer.trust import Trust
 from designer.verdict import Yield
@@ -297,3 +299,78 @@ def test_a_study_says_why_ngspice_has_no_answer(capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().err
     assert "ngspice gave no answer: timestep too small" in said
     assert re.search(r"ngspice not to be trusted here: .* \(by 0.005\)", said)
+
+
+SMALL = """\
+format = 1
+[model]
+m = 0.5
+k = 0.5
+k0 = 0.95
+c = 0.5
+zeta = 0.1
+f20 = 0.0
+b = 0.25
+[[response]]
+omega = 0.85
+expect = "1-2-2"
+"""
+
+
+@pytest.mark.parametrize(
+    ("engine", "counted", "right"),
+    [(True, True, True), (True, False, True), (False, True, False), (None, True, False)],
+)
+def test_a_study_is_satisfied_by_what_can_be_trusted(
+    engine: bool | None, counted: bool, right: bool
+) -> None:
+    """A yield says only how far it is known; an engine without an answer is no agreement."""
+    said = {"model": {"trusted": True}, "circuit": {"trusted": engine}}
+    row = {"found": True, "engines_agree": True, "trust": {**said, "yield": {"trusted": counted}}}
+    assert _satisfied({"equation_check": None, "responses": [row]}) is right
+
+
+@pytest.mark.slow
+def test_a_study_ends_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A distrusted exact circuit, everything else as it should be: the row, and exit status 1,
+    also where the folder is shown again; of the result in memory likewise."""
+    measured = trust.of_orbit
+    doubt = Doubt("so it is", "by 2e-07")
+
+    def doubted(flow: Flow, orbit: Orbit) -> Trust:
+        said = measured(flow, orbit)
+        # A period of the circuit takes milliseconds, of the model 2π/ω.
+        return said if flow.drive.period > 1.0 else replace(said, doubts=(doubt,))
+
+    monkeypatch.setattr(trust, "of_orbit", doubted)
+    model, out = tmp_path / "small.toml", tmp_path / "out"
+    model.write_text(SMALL)
+    words = ["tolerance", str(model), "--out", str(out), "--samples", "2", "--rung", "exact"]
+    words += ["--jobs", "1"]
+    assert cli.status([*words, "--json", "-q"]) == 1
+    (row,) = json.loads(capfd.readouterr().out)["responses"]
+    assert row["found"]
+    assert row["engines_agree"]
+    assert row["yield"]["ok"] == 2
+    assert row["trust"] == {
+        "model": {"trusted": True, "reasons": []},
+        "circuit": {"trusted": False, "reasons": ["so it is"]},
+        "yield": {"trusted": False, "reasons": ["the nominal response: so it is"]},
+    }
+    assert "exact circuit not to be trusted here: so it is" in (out / "report.md").read_text()
+    monkeypatch.undo()
+    assert cli.status(words) == 1
+    said = capfd.readouterr().err
+    assert "circuit not to be trusted here: so it is" in said
+    assert "yield not to be trusted here: the nominal response: so it is" in said
+
+
+@pytest.mark.parametrize(("k0", "trusted"), [(STIFFEST, False), (0.999, True)])
+def test_a_result_in_memory_is_not_satisfied(k0: float, trusted: bool) -> None:
+    checked = _checked(k0)
+    checked.__dict__["model_trust"] = Trust(answered=True)
+    nothing: Any = None
+    result = RunResult(nothing, nothing, (checked.model,), nothing, (checked,), nothing)
+    assert result.satisfied is trusted
