@@ -29,6 +29,7 @@ from designer.modelfile import Expect, Response
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
 from designer.responses import ModelResponse
+from designer.study_job import _satisfied
 from designer.system import Drive
 from designer.trust import Trust
 from designer.verdict import Yield
@@ -316,6 +317,20 @@ expect = "1-2-2"
 """
 
 
+@pytest.mark.parametrize(
+    ("engine", "counted", "right"),
+    [(True, True, True), (True, False, True), (False, True, False), (None, True, False)],
+)
+def test_a_study_is_satisfied_by_what_can_be_trusted(
+    engine: bool | None, counted: bool, right: bool
+) -> None:
+    """A yield says only how far it is known; an engine without an answer is no agreement."""
+    said = {"model": {"trusted": True}, "circuit": {"trusted": engine}}
+    row = {"found": True, "engines_agree": True, "trust": {**said, "yield": {"trusted": counted}}}
+    assert _satisfied({"equation_check": None, "responses": [row]}) is right
+
+
+@pytest.mark.slow
 def test_a_study_ends_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
