@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from designer.board_outline import Outline, circle, read_outline
+from designer.board_outline import Outline, read_outline
 from designer.components import Component
 from designer.errors import InputError
 from designer.kicad_footprint import FILE_VERSION
 from designer.kicad_names import circuit_net
 from designer.natural import natural
+from designer.pad_shape import corners, turned
 from designer.quantity import parse_quantity
 from designer.sexpr import Expression, read
 from designer.views import View
@@ -35,7 +36,8 @@ Point = tuple[float, float]
 class Pad:
     """net : the circuit's name of it, "" where none is connected. at : on the board [mm].
 
-    corners : of the copper, or of the rectangle around it, in order [mm]; a circle's are many.
+    corners : of the copper, or of the rectangle around it, in order [mm]; a circle's are many, and
+    a shape that is not read has none.
     """
 
     number: str
@@ -228,33 +230,14 @@ def _field(found: Expression, name: str) -> str:
 
 
 def _pad(found: Expression, origin: Point, turn: float) -> Pad:
-    """Angles are counter-clockwise as seen, with y downwards."""
     at = found.get("at")
-    centre = _turned((at.number(0), at.number(1)), origin, turn)
+    place = turned((at.number(0), at.number(1)), origin, turn)
     net = found.find("net")
     return Pad(
         found.text(0),
         circuit_net(net.text(1)) if net is not None and not _unconnected(net.text(1)) else "",
-        centre,
-        _corners(found, centre, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
-    )
-
-
-def _corners(found: Expression, centre: Point, turn: float) -> tuple[Point, ...]:
-    """turn : the pad's angle on the board, which the file states with the footprint's in it."""
-    size = found.get("size")
-    half = size.number(0) / 2.0, size.number(1) / 2.0
-    if "circle" in found.atoms[1:]:
-        return tuple(circle(centre, half[0], 16))
-    signs = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
-    return tuple(_turned((x * half[0], y * half[1]), centre, turn) for x, y in signs)
-
-
-def _turned(at: Point, origin: Point, turn: float) -> Point:
-    x, y = at
-    return (
-        origin[0] + x * math.cos(turn) + y * math.sin(turn),
-        origin[1] - x * math.sin(turn) + y * math.cos(turn),
+        place,
+        corners(found, place, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
     )
 
 

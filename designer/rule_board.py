@@ -116,8 +116,10 @@ def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator
         raise NotRun(f"the edge on {LAYER} is not closed at ({at[0]:.2f} mm, {at[1]:.2f} mm)")
     for component in components:
         for pad in board.pads(component.reference):
-            room = board.outline.room(np.array(pad.corners))
             where = f"{component.reference}.{pad.number}"
+            if not pad.corners:
+                raise NotRun(f"{where} has a shape that is not read")
+            room = board.outline.room(np.array(pad.corners))
             yield Found(room, where, more=_READ)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -384,6 +385,119 @@ def test_a_part_past_the_edge_is_caught_and_a_near_miss_is_not(
     assert near.status == PASS
     assert near.value == pytest.approx(0.55, abs=1e-5)
     assert "read from the board file" in near.found
+
+
+def reshaped(name: str, number: str, change: Any) -> str:
+    """The exported board with the text of one pad of one component changed."""
+
+    def pad(item: Any) -> Any:
+        if isinstance(item, Expression) and item.name == "pad" and item.text(0) == number:
+            return read(change(write(item)))
+        return item
+
+    def footprint(item: Expression) -> Expression:
+        if item.name != "footprint" or reference(item) != name:
+            return item
+        return Expression(tuple(pad(i) for i in item.items))
+
+    return edited(footprint)
+
+
+def custom_pad(*primitives: str) -> Any:
+    """To a custom pad of a small round anchor and these primitives."""
+
+    def change(text: str) -> str:
+        shape = re.sub(r"^\(pad (\S+) (\S+) \S+", r"(pad \1 \2 custom", text.strip())
+        shape = re.sub(r"\(size [^)]*\)", "(size 0.2 0.2)", shape)
+        shape = re.sub(r"\(roundrect_rratio [^)]*\)", "", shape)
+        options = "(options (clearance outline) (anchor circle))"
+        return f"{shape[:-1]} {options} (primitives {' '.join(primitives)}))"
+
+    return change
+
+
+def with_offset(text: str) -> str:
+    """The copper 0.7 mm along and 0.4 mm across the pad."""
+    return f"{text.strip()[:-1]} (drill (offset 0.7 0.4)))"
+
+
+SHAPES: dict[str, tuple[Any, tuple[float, float, float, float]]] = {
+    "polygon": (
+        custom_pad("(gr_poly (pts (xy -1 -0.5) (xy 1.6 -0.5) (xy 1 2)) (width 0.2) (fill yes))"),
+        (-1.1, -0.6, 1.7, 2.1),
+    ),
+    "line, circle and arc": (
+        custom_pad(
+            "(gr_line (start 0 0) (end 0 -1.5) (width 0.4))",
+            "(gr_circle (center 0.5 0) (end 1 0) (width 0) (fill yes))",
+            "(gr_arc (start 0 1) (mid -1 0) (end 0 -1) (width 0.2))",
+        ),
+        (-1.1, -1.7, 1.0, 1.1),
+    ),
+    "rectangle": (
+        custom_pad("(gr_rect (start -0.3 -2) (end 0.3 0.5) (width 0.1) (fill yes))"),
+        (-0.35, -2.05, 0.35, 0.55),
+    ),
+}
+"""Pads, and how far each reaches in its own frame: left, top, right, bottom [mm]."""
+
+
+@pytest.mark.parametrize("name", ["R4"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_custom_pad_reaches_as_far_as_its_primitives(
+    tmp_path: Path, name: str, shape: str
+) -> None:
+    change, reach = SHAPES[shape]
+    board = board_of(reshaped(name, "2", change), tmp_path)
+    ((at, turn),) = [(p.at, angle_of(name)) for p in board.pads(name) if p.number == "2"]
+    (found,) = [p.corners for p in board.pads(name) if p.number == "2"]
+    left, top, right, bottom = turned_box(reach, turn)
+    assert min(x for x, _ in found) == pytest.approx(at[0] + left, abs=2e-3)
+    assert max(x for x, _ in found) == pytest.approx(at[0] + right, abs=2e-3)
+    assert min(y for _, y in found) == pytest.approx(at[1] + top, abs=2e-3)
+    assert max(y for _, y in found) == pytest.approx(at[1] + bottom, abs=2e-3)
+
+
+def angle_of(name: str) -> int:
+    """A footprint's angle on the board, a whole number of right angles."""
+    at = next(i for i in read(drawn()).all("footprint") if reference(i) == name).get("at")
+    return round(at.number(2) if len(at.atoms) > 2 else 0.0) % 360
+
+
+def turned_box(
+    reach: tuple[float, float, float, float], turn: int
+) -> tuple[float, float, float, float]:
+    """The box after right angles counter-clockwise as seen, y downwards: (x, y) to (y, -x)."""
+    left, top, right, bottom = reach
+    for _ in range(turn // 90):
+        left, top, right, bottom = top, -right, bottom, -left
+    return left, top, right, bottom
+
+
+@pytest.mark.parametrize("name", ["R4"])
+def test_copper_that_is_off_its_hole_is_looked_for_where_it_is(tmp_path: Path, name: str) -> None:
+    plain, moved = (
+        next(p for p in board_of(text, tmp_path).pads(name) if p.number == "1")
+        for text in (drawn(), reshaped(name, "1", with_offset))
+    )
+    by = turned_box((0.7, 0.4, 0.7, 0.4), angle_of(name))[:2]
+    assert moved.at == plain.at
+    for old, new in zip(plain.corners, moved.corners, strict=True):
+        assert (new[0] - old[0], new[1] - old[1]) == pytest.approx(by, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("roundrect", "trapezoid", 1),
+        lambda text: f"{text.strip()[:-1]} (padstack (mode front_inner_back)))",
+        custom_pad('(gr_text "A" (at 0 0))'),
+    ],
+)
+def test_a_pad_whose_shape_is_not_read_passes_nothing(tmp_path: Path, change: Any) -> None:
+    found = by_reading(reshaped("R4", "1", change), tmp_path)["board-outline"]
+    assert found.status == NOT_RUN
+    assert found.found == "R4.1 has a shape that is not read"
 
 
 def test_without_an_edge_or_with_a_gap_in_it_nothing_is_passed(tmp_path: Path) -> None:
