@@ -130,12 +130,15 @@ class Folder:
         return None
 
     def begin(
-        self, wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]], provenance: Any
+        self,
+        wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]],
+        provenance: Any,
+        kept: Mapping[str, Any] | None = None,
     ) -> None:
         """Create the folder if need be, and mark these stages as unfinished.
 
-        A stage that depends on one that begins anew is forgotten; its files stay listed until
-        ``finish`` removes them.
+        kept : what they are to know again when they go on. A stage that depends on one that begins
+        anew is forgotten; its files stay listed until ``finish`` removes them.
         """
         manifest = self.manifest or Manifest()
         with _writing(self.path):
@@ -150,7 +153,7 @@ class Folder:
             manifest.files = {
                 n: ("replaced" if s == stage else s, d) for n, (s, d) in manifest.files.items()
             }
-            manifest.stages[stage] = Stage(inputs)
+            manifest.stages[stage] = Stage(inputs, kept=dict(kept or {}))
             manifest.files |= dict.fromkeys(names, (stage, None))
         for name in manifest.files:  # what a killed process left behind
             if name.endswith("/"):
@@ -210,6 +213,7 @@ class Folder:
             else:  # planned and not needed: a study of no response has no samples
                 del manifest.files[name]
         manifest.stages[stage].complete = True
+        manifest.stages[stage].kept = {}
         gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
         for name in folders:
             del manifest.files[name]

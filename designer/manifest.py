@@ -44,10 +44,12 @@ _MAX_MANIFEST = 20_000_000
 
 @dataclass
 class Stage:
-    """inputs : what decides the stage's files; equal inputs give equal files."""
+    """inputs : what decides the stage's files; equal inputs give equal files. kept : what the stage
+    found when it began and is to know again when it goes on; gone once it is complete."""
 
     inputs: dict[str, Any]
     complete: bool = False
+    kept: dict[str, Any] = field(default_factory=dict)
 
     @property
     def hash(self) -> str:
@@ -77,7 +79,12 @@ class Manifest:
             for name, (stage, digest) in sorted(self.files.items())
         }
         stages = {
-            name: {"inputs": s.inputs, "inputs_sha256": s.hash, "complete": s.complete}
+            name: {
+                "inputs": s.inputs,
+                "inputs_sha256": s.hash,
+                "complete": s.complete,
+                **({"kept": s.kept} if s.kept else {}),
+            }
             for name, s in sorted(self.stages.items())
         }
         return {
@@ -139,9 +146,7 @@ def read_manifest(path: Path) -> Manifest | None:
         if value["tool"] != "designer":
             raise ValueError
         stages: dict[str, Stage] = {
-            name: Stage(dict(value["stages"][name]["inputs"]), value["stages"][name]["complete"])
-            for name in STAGES
-            if name in value["stages"]
+            name: _stage(value["stages"][name]) for name in STAGES if name in value["stages"]
         }
         files = {
             _inside(path, name): (str(said["stage"]), said["sha256"])
@@ -150,6 +155,10 @@ def read_manifest(path: Path) -> Manifest | None:
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(file, "the file", "something else", "a manifest of this tool") from None
     return Manifest(stages, files, value.get("provenance", {}))
+
+
+def _stage(said: Mapping[str, Any]) -> Stage:
+    return Stage(dict(said["inputs"]), said["complete"], dict(said.get("kept", {})))
 
 
 def _inside(root: Path, name: str) -> str:

@@ -94,17 +94,15 @@ def searched_into(
         )
     program_version()
     goes_on = begun and options.resume
-    kept = folder.json(SEARCH) if goes_on and (folder / SEARCH).exists() else {}
-    word = None if goes_on else rung_choice.before_search(folder, modelfile.sha256)
-    trade = kept.get("trade") if word is None else asdict(word)
+    trade = _word(folder, modelfile, goes_on=goes_on)
     began = time.perf_counter()
     jobs = cores() if options.jobs is None else options.jobs
     windows = look(modelfile, catalog, jobs, progress)
     source = provenance(modelfile, catalog.hash, seed=options.seed, settings={"rules": RULES})
     if not goes_on:
         (folder / CANDIDATES).unlink(missing_ok=True)
-    folder.begin({"search": (inputs, FILES)}, source)
-    folder.write(SEARCH, dumps({"format": 1, "trade": trade}))  # trade.json goes with its design
+    # trade.json goes with its design, and so before this is done.
+    folder.begin({"search": (inputs, FILES)}, source, {"trade": trade} if trade else None)
     folder.write(ASKED, modelfile.text)
     memory = Memory(folder / CANDIDATES, inputs["model"])
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
@@ -127,7 +125,7 @@ def searched_into(
     design_files.write(folder, made, files)
     folder.finish("design")
     if trade is not None:
-        trade["model"] = final.sha256
+        trade = {**trade, "model": final.sha256}
     said = {**search_json(found), "trade": trade, "provenance": source}
     folder.write(SEARCH, dumps({**said, "cost": {"seconds": time.perf_counter() - began}}))
     folder.finish("search")
@@ -261,6 +259,16 @@ def to_confirm(answers: Iterable[Answer]) -> list[Ask]:
             count[a.question] += 1
             asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
     return asks
+
+
+def _word(folder: Folder, modelfile: ModelFile, *, goes_on: bool) -> dict[str, Any] | None:
+    """What a trade says that stood here when the search began, as ``rung_choice.Choice``."""
+    if goes_on:
+        assert folder.manifest is not None
+        found: dict[str, Any] | None = folder.manifest.stages["search"].kept.get("trade")
+        return found
+    word = rung_choice.before_search(folder, modelfile.sha256)
+    return None if word is None else asdict(word)
 
 
 def _inputs(modelfile: ModelFile, catalog: Catalog, options: Options) -> dict[str, Any]:

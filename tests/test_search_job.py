@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,12 +14,12 @@ import pytest
 
 from designer import cli, rung_choice
 from designer.errors import InputError
-from designer.folder import Folder, StageName
+from designer.folder import MODEL, Folder, StageName
 from designer.jsonout import dumps
-from designer.modelfile import parse_model_file, read_model_file
+from designer.modelfile import ModelFile, parse_model_file, read_model_file
 from designer.options import Options
 from designer.progress import Progress
-from designer.search_job import confirms, to_confirm
+from designer.search_job import confirms, searched_into, to_confirm
 from designer.search_levers import Choice
 from designer.search_memory import Memory
 from designer.search_resolved import resolved
@@ -130,11 +130,11 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     words = ("search", model, "--out", out, "-q")
     assert run(*words) == 2  # the design is one that no search made
     assert run(*words, "--overwrite") == 130
-    kept = read(out / "search.json")["trade"]
+    kept = read(out / "manifest.json")["stages"]["search"]["kept"]["trade"]
     assert kept["rung"] == "ngspice"
     (out / "trade.json").unlink()  # as when the found design is written
     assert run(*words, "--resume") == 130
-    assert read(out / "search.json")["trade"] == kept
+    assert read(out / "manifest.json")["stages"]["search"]["kept"]["trade"] == kept
 
     found = Folder(tmp_path / "found")
     stages: dict[StageName, Any] = {
@@ -157,6 +157,59 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
     with pytest.raises(InputError, match="what search wrote"):
         rung_choice.choose(found)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What stands for a design that was found."""
+
+    modelfile: ModelFile
+    seconds: float = 0.0
+
+
+@pytest.mark.parametrize("earlier", [None, "auto"])
+def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
+    earlier: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Right after the manifest says that it has begun, with and without the file of an earlier
+    search that says another thing; resumed, the found design has the word."""
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(asked(OPEN), encoding="utf-8")
+    folder = with_trade(out, "ideal", "design", read_model_file(model).sha256)
+    if earlier is not None:
+        folder.begin({"search": ({}, ["search.json"])}, {})
+        said = {"rung": earlier, "reason": "another", "model": "another"}
+        folder.write("search.json", dumps({"format": 1, "trade": said}))
+        folder.finish("search")
+    begin = Folder.begin
+
+    def killed(self: Folder, wanted: Any, *rest: Any) -> None:
+        begin(self, wanted, *rest)
+        if "search" in wanted:
+            raise KeyboardInterrupt
+
+    file = read_model_file(model)
+    found = SimpleNamespace(made=Found(file), final=SimpleNamespace(choice=None))
+    for name, value in (
+        ("look", ()),
+        ("search", found),
+        ("search_json", {"format": 1}),
+        ("resolved", file),
+    ):
+        monkeypatch.setattr(f"designer.search_job.{name}", lambda *_, value=value, **__: value)
+    design = "designer.design_files"
+    monkeypatch.setattr(f"{design}.design_provenance", lambda _: {})
+    monkeypatch.setattr(f"{design}.texts", lambda _: {MODEL: file.text})
+    monkeypatch.setattr(f"{design}.write", lambda out, _, files: out.write(MODEL, files[MODEL]))
+    monkeypatch.setattr(Folder, "begin", killed)
+    with pytest.raises(KeyboardInterrupt):
+        searched_into(file, out, Options(jobs=1, overwrite=True), Progress())
+    monkeypatch.setattr(Folder, "begin", begin)
+    final = searched_into(file, out, Options(jobs=1, resume=True), Progress())
+    trade = read(out / "search.json")["trade"]
+    assert (trade["rung"], trade["model"]) == ("ngspice", final.sha256)
+    assert rung_choice.choose(Folder(out)).rung == "ngspice"
+    assert "kept" not in read(out / "manifest.json")["stages"]["search"]
 
 
 def test_forty_boards_of_each_response_confirm_even_where_some_have_no_answer() -> None:
