@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 SAMPLES = 4000
 """Boards of the final study; as ``search_job.SAMPLES``."""
-KINDS = ("grade", "reference", "op-amp", "dead-zone", "place", "trim")
+KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
 
 

@@ -8,7 +8,7 @@ import itertools
 import json
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -534,6 +534,14 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
         options=tuple(replace(o, price=0.0) for o in seen.parts[-1].slot.options),
     )
     seen = replace(seen, parts=(*seen.parts[:-1], replace(seen.parts[-1], slot=free)))
+
+    def pictured(seen: Picture, which: Sequence[tuple[int, int]], *_: object) -> Picture:
+        """With a margin that sees no limit of the trimmed boards."""
+        assert which == [(0, 1)]
+        plain, trimmed = seen.ways[0]
+        return replace(seen, ways=((plain, replace(trimmed, margin=Margin((), ()))),))
+
+    monkeypatch.setattr(cure_search, "pictured", pictured)
     found = searched(monkeypatch, seen, of)
     assert found.reached
     assert found.rounds[0].upgrades.trimmer

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from designer import margins
+from designer import cure_trimmed, margins
 from designer.boards import Boards
 from designer.circuit import nominal_board
-from designer.cure_trimmed import trimmed_margins, without_wiper
+from designer.cure_study import Book
+from designer.cure_trimmed import trimmed_margins, trimmer_ways, without_wiper
+from designer.cure_ways import Looker, Way
 from designer.exact import block
 from designer.margins import Limit, Margin
 from designer.quantities import quantities
 from designer.spread import draw_many
 from designer.trimmer import at_rest, trimmed_answers, trimmed_boards
-from designer.verdict import Verdict
+from designer.verdict import StudyPlan, Verdict
 from tests.bench_plans import plan
 from tests.test_trimmer import ROUGH, trim
 
@@ -42,6 +45,39 @@ def test_what_the_trimmer_holds_still_depends_on_nothing() -> None:
     before = untouched.each(plain).std()
     after = (found.each(plain) * found.limits[0].sigma).std()
     assert after < 0.1 * before
+
+
+class _Looker(Looker):
+    """Of a plan, where there is no branch."""
+
+    @property
+    def plan(self) -> StudyPlan:
+        return replace(plan(6, spread=ROUGH), questions=())
+
+
+def ways(best: StudyPlan, target: float) -> list[Way] | None:
+    none = cast(Any, None)
+    looker = _Looker(none, target, 1, Book(), 0.0, frozenset(), (best,), 2, lambda: None)
+    return trimmer_ways(looker, trim(), [Way(0, "as it is", plan(6, spread=ROUGH).questions[0])])
+
+
+def test_what_trimmed_boards_show_is_what_a_study_of_them_finds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And the trimmer is no way where even the best parts, here as rough as the others, lose too
+    many boards for the target."""
+    monkeypatch.setattr(cure_trimmed, "SAMPLES", 40)
+    of = plan(6, spread=ROUGH)
+    answers, _ = trimmed_answers(trim(), of, range(40), 2)
+    rate = sum(a.verdict is Verdict.OK for a in answers) / 40
+    assert 0.0 < rate < 0.95
+    fine = replace(of, spread=replace(ROUGH, resistor=1e-4, capacitor=1e-4), questions=())
+    found = ways(fine, 0.99)
+    assert found is not None
+    (way,) = found
+    assert way.kind == "trimmer"
+    assert way.rate == pytest.approx(rate)
+    assert ways(replace(of, questions=()), 0.999) is None
 
 
 @pytest.mark.slow
