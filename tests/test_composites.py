@@ -16,7 +16,7 @@ from designer.boardspec import BoardChoice
 from designer.bom import bill
 from designer.catalog import load_catalog
 from designer.coefficients import EXACT
-from designer.components import components
+from designer.components import components, designator
 from designer.composites import Pair, Program, best, pairs_near
 from designer.design import Design, Peaks
 from designer.job import Options, read_design, synthesise_into
@@ -141,7 +141,7 @@ def test_the_paper_s_case_in_e24_is_exact_with_composites(names: bool | tuple[st
         for row in bill(components(made.circuit, CATALOG, BoardChoice.of(E24)))
         for d in row.designators
     }
-    assert {f"{n}{part}" for n in made.composites for part in "AB"} <= bought
+    assert {designator(f"{n}{part}") for n in made.composites for part in "AB"} <= bought
 
 
 def test_without_any_that_may_be_one_nothing_changes() -> None:
