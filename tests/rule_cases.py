@@ -26,25 +26,23 @@ from designer.pins import Pin
 from designer.responses import find
 from designer.rule import Outcome
 from designer.rule_subject import Subject
+from tests.model_text import PAPER_TABLE
 from tests.stages import CATALOG, PAPER, bought, rectifier, stage
 
-TEXT = """
+TEXT = (
+    """
 format = 1
 title = "<b>rules</b> & ]]> ${X}"
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
+"""
+    + PAPER_TABLE
+    + """\
 [[response]]
 omega = 1.55
 expect = "1-1-1"
 [circuit]
 dead_zone = "rectifier"
 """
+)
 Look = Callable[[], Outcome]
 
 

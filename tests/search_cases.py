@@ -8,18 +8,14 @@ from designer.api import Synthesis, synthesise
 from designer.catalog import Catalog, load_catalog
 from designer.modelfile import ModelFile, parse_model_file
 from designer.spread import Spread
+from tests.model_text import PAPER_TABLE
 
-HEAD = """format = 1
+HEAD = (
+    """format = 1
 title = "A search"
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
 """
+    + PAPER_TABLE
+)
 TAIL = """[circuit]
 saturation = 13.0
 dead_zone = "{zone}"

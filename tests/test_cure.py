@@ -47,6 +47,7 @@ from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yield_maps import Axis, YieldMap
 from tests import bench_plans, paper_cases
+from tests.model_text import PAPER_TABLE
 
 CATALOG = load_catalog()
 WEIGHTS = {"R50": 3.0, "R203": 2.0, "R4": 1.5, "R11": 1.0, "C2": 1.0, "R8": 0.6}
@@ -325,19 +326,14 @@ def test_seeds_are_their_own() -> None:
     assert not set(seeds) & set(range(1000))
 
 
-SMALL = """
+SMALL = (
+    """
 format = 1
 title = "One response of the soft-impacting system"
 
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-
+"""
+    + PAPER_TABLE
+    + """
 [[response]]
 omega = 0.337
 expect = "1-5-5"
@@ -349,6 +345,7 @@ resistors = "E24"
 resistor_grade = 0.01
 capacitor_grade = 0.01
 """
+)
 WITHOUT = ("place", "trim", "dead zone", "op-amp")
 
 

@@ -23,18 +23,13 @@ from designer.progress import Progress
 from designer.spread import Spread, draw_many
 from designer.upgrade import Upgrades, upgraded_file
 from tests import paper_cases
+from tests.model_text import PAPER_TABLE
 
 CATALOG = load_catalog()
-SMALL = """
-format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
+SMALL = (
+    "\nformat = 1\n"
+    + PAPER_TABLE
+    + """\
 [[response]]
 omega = 1.55
 expect = "1-1-1"
@@ -42,6 +37,7 @@ expect = "1-1-1"
 saturation = 13.0
 resistors = "E24"
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -21,19 +21,10 @@ from designer.flow import Flow, interrupt
 from designer.model import Dimensionless
 from designer.system import Drive
 from designer.threads import parallel
+from tests.model_text import PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parent.parent
-MODEL = """\
-format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-"""
+MODEL = "format = 1\n" + PAPER_TABLE
 COMPILING = "compiling the exact engine's part for motion between the stops (first use of this part"
 PROMPT = 30.0
 """Seconds: on a busy machine too, what is not answered by then never is. Some 0.3 to 0.8 s were

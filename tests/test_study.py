@@ -41,23 +41,19 @@ from designer.study import Stores, Study, tolerance
 from designer.study_folder import NGSPICE
 from designer.study_work import Work
 from designer.verdict import BLOCK, Answer, Verdict
+from tests.model_text import PAPER_TABLE
 from tests.test_verdict import plan
 
 ROOT = Path(__file__).resolve().parent.parent
-SMALL = """\
-format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
+SMALL = (
+    "format = 1\n"
+    + PAPER_TABLE
+    + """\
 [[response]]
 omega = 0.85
 expect = "1-2-2"
 """
+)
 
 
 # ---------------------------------------------------------------------------------------------

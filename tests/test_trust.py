@@ -34,6 +34,7 @@ from designer.system import Drive
 from designer.trust import Trust
 from designer.verdict import Yield
 from designer.waveform_orbit import Read
+from tests.model_text import PAPER_TABLE
 
 STIFFEST = 1.0 - 2.0**-52
 """The stiffest stop but one that a double can ask for: one impact excites 7e7 of the frequency."""
@@ -301,20 +302,15 @@ def test_a_study_says_why_ngspice_has_no_answer(capsys: pytest.CaptureFixture[st
     assert re.search(r"ngspice not to be trusted here: .* \(by 0.005\)", said)
 
 
-SMALL = """\
-format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
+SMALL = (
+    "format = 1\n"
+    + PAPER_TABLE
+    + """\
 [[response]]
 omega = 0.85
 expect = "1-2-2"
 """
+)
 
 
 @pytest.mark.parametrize(
