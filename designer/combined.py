@@ -128,7 +128,9 @@ def combine(
     strata = tuple(_strata(list(mine.values()), theirs, heard, question))
     estimate, low, high = interval(ok, strata)
     silent = {
-        h.sample for h in heard if h.kind is Kind.NOMINAL and not h.decided and h.sample in mine
+        h.sample
+        for h in heard
+        if h.kind is Kind.NOMINAL and h.sample in mine and h.survives(question) is None
     }
 
     def if_all(said: bool) -> float:
@@ -227,7 +229,8 @@ def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> S
 def differences(
     answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
 ) -> list[Disagreement]:
-    """Every board on which ngspice says another n-p-q, with what explains it, if anything does."""
+    """Every board on which ngspice says another n-p-q, or two of which neither is the wanted one
+    that the exact rung sees, with what explains it, if anything does."""
     known = {a.sample: a for a in answers}
     stayed = {
         h.sample
@@ -240,13 +243,18 @@ def differences(
             h.kind,
             h.why,
             known[h.sample].response,
-            h.response,
+            h.either or h.response,
             distance(known[h.sample], question.start),
             _explain(known[h.sample], h, question, h.sample in stayed),
         )
         for h in heard
-        if h.sample in known and h.agrees(known[h.sample]) is False
+        if h.sample in known and _differs(known[h.sample], h, question)
     ]
+
+
+def _differs(answer: Answer, said: Hearing, question: Question) -> bool:
+    lost = answer.verdict is Verdict.OK and said.survives(question) is False
+    return lost or said.agrees(answer) is False
 
 
 def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) -> Explanation:

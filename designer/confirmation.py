@@ -18,7 +18,7 @@ from designer import exact, gate, remedies
 from designer.deck import SolverSettings
 from designer.flow import Flow, FlowStatus
 from designer.gate import Subject
-from designer.hearing import UNDECIDED, Ask, Hearing, Kind
+from designer.hearing import OR, UNDECIDED, Ask, Hearing, Kind
 from designer.ngspice import SimulationFailed
 from designer.opamp_model import Rung
 from designer.orbit import Orbit, OrbitStatus
@@ -55,12 +55,13 @@ class Query:
 @dataclass(frozen=True)
 class Heard:
     """What ngspice said: n-p-q, status or `UNDECIDED`, with the reason and the remedies of the last
-    run. An undecided one's reason has both answers."""
+    run. An undecided one's reason has both answers, as has ``either`` if both are any."""
 
     response: str
     reason: str = ""
     remedies: str = ""
     symmetric: bool = False
+    either: str = ""
 
 
 def hear(
@@ -111,6 +112,7 @@ def hear(
             said.remedies,
             query.subject.discard,
             said.symmetric,
+            said.either,
         )
     return [heard[k] for k in sorted(heard)]
 
@@ -232,9 +234,10 @@ def _steps(query: Query) -> float:
 
 
 def _undecided(before: str | None, said: Heard) -> Heard:
-    only = f"only one run had an answer: {said.response}"
+    if before is None:
+        return Heard(UNDECIDED, f"only one run had an answer: {said.response}", said.remedies)
     both = f"{before}, at a smaller step {said.response}"
-    return Heard(UNDECIDED, only if before is None else both, said.remedies)
+    return Heard(UNDECIDED, both, said.remedies, either=OR.join((before, said.response)))
 
 
 def _heard(outcome: remedies.Outcome[Read]) -> Heard:

@@ -34,6 +34,8 @@ BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
 UNDECIDED = "undecided"
 """What is heard where the last two step sizes still say different things."""
+OR = " or "
+"""Between the two answers of an undecided board."""
 
 
 class Kind(StrEnum):
@@ -70,7 +72,8 @@ class Hearing:
     response : n-p-q or status there, "undecided" where two step sizes differ to the last, ""
     where the way was too long to be asked; ``reason`` then says how long. remedies : those that a
     run needed to converge, in order. periods : drive periods left out before the run was judged.
-    symmetric : whether its orbit was; False too where it has none.
+    symmetric : whether its orbit was; False too where it has none. either : the last two answers of
+    an undecided one, with `OR` between them.
     """
 
     sample: int
@@ -82,6 +85,7 @@ class Hearing:
     remedies: str
     periods: int
     symmetric: bool
+    either: str = ""
 
     @property
     def decided(self) -> bool:
@@ -93,10 +97,14 @@ class Hearing:
         return self.response == answer.response if self.decided else None
 
     def survives(self, question: Question) -> bool | None:
-        """Whether the board shows the wanted response in ngspice; None without an answer."""
-        if not self.decided:
-            return None
-        return shows(question.spec, question.start, self.response, symmetric=self.symmetric)
+        """Whether the board shows the wanted response in ngspice; None without an answer. Two step
+        sizes that name different responses need not name the wanted one: then it is lost."""
+        spec, start = question.spec, question.start
+        if self.decided:
+            return shows(spec, start, self.response, symmetric=self.symmetric)
+        said = self.either.split(OR) if self.either else []
+        wanted = any(shows(spec, start, one, symmetric=True) for one in said)
+        return False if said and not wanted else None
 
 
 def is_answer(response: str) -> bool:

@@ -15,7 +15,7 @@ from designer.verdict import StudyPlan, kept
 
 RULES = {
     "samples": 1,
-    "ngspice": 2,
+    "ngspice": 3,
     "tuned": 3,
     "reached": 3,
     "trimmed": 1,

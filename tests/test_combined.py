@@ -17,7 +17,16 @@ from designer.combined import (
     differences,
     interval,
 )
-from designer.hearing import BOUNDARY_SAMPLES, Ask, Hearing, Kind, Why, ask_boundary, ask_random
+from designer.hearing import (
+    BOUNDARY_SAMPLES,
+    OR,
+    Ask,
+    Hearing,
+    Kind,
+    Why,
+    ask_boundary,
+    ask_random,
+)
 from designer.verdict import Answer, Verdict, Yield
 from tests.test_hearing import BLANK, HEARD, question
 
@@ -157,6 +166,27 @@ def test_boards_without_an_answer_are_bounded() -> None:
     all_answered = combine(answers, [h for h in heard if h.decided], QUESTION)
     assert all_answered is not None
     assert all_answered.if_lost == all_answered.if_ok == all_answered.estimate
+
+
+def test_a_board_that_is_lost_by_either_step_is_lost() -> None:
+    """Undecided between two other responses; between one of them and the wanted one it is open."""
+    answers = [replace(BLANK, sample=i) for i in range(10)]
+    says = {3: OR.join((LOST, "not settled")), 7: OR.join((LOST, OK))}
+    heard = [
+        replace(
+            HEARD, sample=i, kind=Kind.NOMINAL, why=Why.ALL,
+            response="undecided" if i in says else OK, either=says.get(i, ""),
+        )
+        for i in range(10)
+    ]  # fmt: skip
+    assert [heard[i].survives(QUESTION) for i in (0, 3, 7)] == [True, False, None]
+    both = combine(answers, heard, QUESTION)
+    assert both is not None
+    assert both.estimate == pytest.approx(8 / 9)
+    assert both.undecided == 1
+    assert both.if_lost == pytest.approx(8 / 10)
+    assert both.disagreement.of == 8  # neither names one n-p-q
+    assert [(d.sample, d.ngspice) for d in both.differences] == [(3, "1-1-1 or not settled")]
 
 
 def test_no_answer_from_ngspice_is_no_estimate() -> None:

@@ -26,7 +26,7 @@ from designer.confirmation import (
 from designer.deck import SolverSettings
 from designer.flow import Flow
 from designer.gate import Subject
-from designer.hearing import UNDECIDED, Ask, Hearing, Kind, Why, ask_random
+from designer.hearing import OR, UNDECIDED, Ask, Hearing, Kind, Why, ask_random
 from designer.layers import Samples, listen
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus
@@ -191,6 +191,8 @@ def test_only_two_answers_that_are_the_same_count(
     query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", refinements)
     (heard,) = confirm(pool, [query], lambda: calls.append(1))  # type: ignore[arg-type]
     assert (heard.response, heard.reason) == (response, reason)
+    both = OR.join(reason.split(", at a smaller step "))
+    assert heard.either == (both if ", at a" in reason else "")
     assert pool.steps == len(ends)
     assert calls == [1]
 
