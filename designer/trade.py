@@ -3,8 +3,9 @@ answers each question.
 
 Two truths are asked of a response (``designer.trade_errors``), and of boards a third, ngspice with
 ideal op-amps. A bound counts as kept only if the error and the truth's own uncertainty, what its
-two finest steps differ by, keep it together. A setting of ngspice that did not pass the numerics
-gate is measured and is never named.
+two finest steps differ by, keep it together. The board's truth competes with that uncertainty for
+its error: where nothing less will do, it is the answer. A setting of ngspice that did not pass the
+numerics gate is measured and is never named.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ QUESTIONS = (RESPONSE, IMPACT, WAVE)
 """Of a response; ``SHARE`` is one of boards."""
 NO_IMPACTS = "no impacts"
 """Why a question does not arise."""
+ITSELF = "the truth itself, by what its two finest steps differ by"
+"""What is said of an answer that only the truth keeps."""
 
 
 @dataclass(frozen=True)
@@ -97,17 +100,20 @@ def cheapest(question: str, of: str, responses: Sequence[Response]) -> Cheapest 
             question, of, label, None, None, bound, math.nan, None, math.nan, NO_IMPACTS
         )
     without = ", ".join(str(r.truth.label.number) for r in responses if r not in asked)
-    note = f"without response {without}: {NO_IMPACTS}" if without else ""
+    left_out = [f"without response {without}: {NO_IMPACTS}"] if without else []
+    finest = [(row.rung, row.level) for row in asked[0].rows if row.rung == TOP][-1:]
     kinds = dict.fromkeys((row.rung, row.level) for r in asked for row in r.rows)
     best: Cheapest | None = None
     for rung, level in kinds:
         picked = [row for r in asked for row in r.rows if (row.rung, row.level) == (rung, level)]
-        if len(picked) < len(asked) or not _competes(rung, level, of, picked, asked[0]):
+        if len(picked) < len(asked) or not _competes(rung, of, picked):
             continue
         errors = [_error(question, of, row, r.truth) for row, r in zip(picked, asked, strict=True)]
         measured = sum(errors) if question == RESPONSE else max(errors)
         seconds = sum(row.seconds for row in picked)
         shown = measured <= bound
+        itself = of == BOARD and [(rung, level)] == finest
+        note = "; ".join([ITSELF, *left_out] if itself else left_out)
         one = Cheapest(question, of, label, rung, level, bound, measured, shown, seconds, note)
         if best is None or _rank(one) < _rank(best):
             best = one
@@ -120,12 +126,11 @@ def _rank(one: Cheapest) -> tuple[bool, float]:
     return (not one.shown, math.inf if math.isnan(measure) else measure)
 
 
-def _competes(rung: str, level: str, of: str, picked: Sequence[Compared], first: Response) -> bool:
-    """Not where the gate was not passed; nor the truth itself, whose error is not known."""
+def _competes(rung: str, of: str, picked: Sequence[Compared]) -> bool:
+    """Not where the gate was not passed; of the model's equations, only the ways to compute it."""
     if of == EQUATIONS:
         return rung in (RK4, MODEL)
-    finest = [row.level for row in first.rows if row.rung == TOP][-1:]
-    return not (rung == TOP and [level] == finest) and all(row.gate is not False for row in picked)
+    return all(row.gate is not False for row in picked)
 
 
 def _error(question: str, of: str, row: Compared, truth: Truth) -> float:

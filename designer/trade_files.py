@@ -134,7 +134,8 @@ def sheet(answer: Mapping[str, Any]) -> str:
         "ngspice at the finest step, `equations` the exact flow of the model, `ideal` ngspice with "
         "ideal op-amps on the same boards. Where the bound is not kept by any rung, the one that "
         "comes nearest is named. A setting of ngspice that did not pass the numerics gate is never "
-        "named.",
+        "named; the board itself is, by what its two finest steps differ by, where nothing less "
+        "will do.",
         "",
         "| question | against | rung | setting | measured | kept | CPU seconds | |",
         "|---|---|---|---|---|---|---|---|",

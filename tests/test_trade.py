@@ -41,6 +41,7 @@ from designer.stopwatch import SpiceClock
 from designer.trade import (
     IDEAL,
     IMPACT,
+    ITSELF,
     NO_IMPACTS,
     RESPONSE,
     SHARE,
@@ -143,6 +144,7 @@ def test_the_cheapest_keeps_the_bound_with_the_truths_own_uncertainty() -> None:
 
 
 def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
+    """Here that is the truth itself, whose two finest steps differ by more than the bound."""
     found = judged(
         said("model", "exact", 0.02, 1e-6),
         said("circuit", "exact", 0.01, 1e-6),
@@ -151,7 +153,19 @@ def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
     )
     wave = picked(found, WAVE)
     assert not wave.shown
-    assert (wave.rung, wave.level) == ("full", "step ×1")  # the truth itself does not compete
+    assert (wave.rung, wave.level, wave.note) == ("full", "step ×0.5", ITSELF)
+    assert wave.measured == pytest.approx(0.005, rel=1e-3)
+
+
+def test_where_nothing_less_will_do_the_truth_is_the_answer() -> None:
+    """The next finer setting did not pass the gate: what the truth's two finest steps differ by is
+    below the bound all the same."""
+    found = judged(*LADDER[:4], replace(LADDER[5], gate=False), LADDER[6])
+    wave = picked(found, WAVE)
+    assert (wave.rung, wave.level, wave.shown, wave.note) == ("full", "step ×0.5", True, ITSELF)
+    assert wave.measured == pytest.approx(1e-4, rel=1e-3)
+    assert picked(found, IMPACT).note == ""
+    assert f"| 0.01 % | yes | 0.04 | {ITSELF} |" in sheet(document(found))
 
 
 def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
