@@ -20,7 +20,7 @@ BASE = Problem(0.85)
 """The paper's case where it shows 1-2-2."""
 START = np.array([0.1, -0.2, 0.05, 0.3])
 PERIODS = 3
-MOST = 1500
+MOST = 10_000
 """Mode changes that the reference follows."""
 ROUNDING = 2.0**-53
 SHOWN = {
@@ -29,6 +29,7 @@ SHOWN = {
     "omega, high": "ω, high",
     "off critical": "off critical damping",
     "impacts": "slow and stiff, 1/(ω (1 − k0))",
+    "ringing": "slow, hardly damped (k0 0.5, ζ 1e-5), 1/ω",
 }
 """Axes by the names that are printed, where those differ."""
 Row = Mapping[str, Any]
@@ -80,6 +81,10 @@ def scenes() -> Iterator[Scene]:
     for k0, omega in ((0.99, 0.05), (0.999, 0.05), (0.9999, 0.05), (0.9999, 0.02)):
         slow = Problem(omega, k0=k0, zeta=0.01, b=0.05)
         yield Scene("impacts", 1.0 / (omega * (1.0 - k0)), slow, 1, 0.2, settled=False)
+    # Free oscillations that strike all through a slow period: thousands of impacts.
+    for omega in (0.01, 0.005, 0.002, 0.001, 0.0005):
+        slow = Problem(omega, k0=0.5, zeta=1e-5, b=0.05)
+        yield Scene("ringing", 1.0 / omega, slow, 1, 3.0, settled=False)
 
 
 def critical_damping() -> float:
