@@ -212,7 +212,7 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
         "",
         _filled(
             "Made by `python -m benchmarks stability`; pieces that stand in `cases/` are taken as "
-            "they are, so take them away to measure anew. What *not to be trusted here* "
+            "they are, so take the folder away to measure anew. What *not to be trusted here* "
             "means, and how it is found out, is in [docs/stability.md](../../docs/stability.md)."
         ),
         "",
