@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Generator
 
 # Before anything imports matplotlib.pyplot: tests run without a display.
@@ -10,6 +11,11 @@ os.environ["MPLBACKEND"] = "Agg"
 
 import pytest
 from hypothesis import settings
+
+# What a script starts in the background is deaf to Ctrl-C, and so is all that it starts: the tests
+# of Ctrl-C are to hold there too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples in each run: a failure that one run shows, the next shows too.
 settings.register_profile("ci", deadline=None, derandomize=True)
