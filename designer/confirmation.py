@@ -72,12 +72,14 @@ def hear(
     progress: Callable[[], None] = lambda: None,
     *,
     rung: Rung = "ideal",
+    refinements: int = NOMINAL_REFINEMENTS,
 ) -> list[Hearing]:
     """ngspice's answers, in the order of ``asks``; ``progress`` is called once for each.
 
     The exact rung is asked again for the boards in question: where to start and how long to run
-    is its to say. rung : the op-amps' model. Above ``ideal`` a board's own orbit is only near
-    ngspice's, so that as many periods are discarded as shrink a deviation to a hundredth.
+    is its to say. refinements : of runs from the nominal orbit. rung : the op-amps' model. Above
+    ``ideal`` a board's own orbit is only near ngspice's, so that as many periods are discarded as
+    shrink a deviation to a hundredth.
     """
     subjects = _subjects(plan, asks, jobs)
     queries: dict[int, Query] = {}
@@ -86,7 +88,7 @@ def hear(
         subject, question = subjects.get((ask.sample, ask.question)), plan.questions[ask.question]
         if subject is None or question.settings is None:
             continue
-        refinements = OWN_REFINEMENTS
+        halvings = OWN_REFINEMENTS
         if ask.kind is Kind.NOMINAL:
             way = periods_to_settle(_flow(subject), question.start.start, subject.orbit)
             if way > MOST_PERIODS:
@@ -94,12 +96,12 @@ def hear(
                 progress()
                 continue
             subject = replace(subject, start=question.start.start, discard=int(way))
-            refinements = NOMINAL_REFINEMENTS
+            halvings = refinements
         elif rung != "ideal":
             subject = replace(subject, discard=way_to_rung(subject.orbit))
         subject = replace(subject, rung=rung)
         expected = subject.orbit.response
-        queries[k] = Query(subject, question.settings, expected, refinements)
+        queries[k] = Query(subject, question.settings, expected, halvings)
     answers = confirm(pool, list(queries.values()), progress)
     for (k, query), said in zip(queries.items(), answers, strict=True):
         heard[k] = Hearing(

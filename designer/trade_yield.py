@@ -29,6 +29,9 @@ from designer.workers import SpicePool
 
 BOARDS = 100
 """Boards of each response."""
+REFINEMENTS = 3
+"""How often ngspice's step is halved for a board at most: further than in a study, for here ngspice
+is what is measured against, and what it leaves open widens the interval both ways."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +166,8 @@ def tally(
     answers = exact.block(plan, samples, jobs)
     seconds = time.process_time() - began
     asks = [Ask(a.sample, 0, Kind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED]
-    heard = {h.sample: h for h in hear(plan, asks, pool, jobs, progress)}
+    hearings = hear(plan, asks, pool, jobs, progress, refinements=REFINEMENTS)
+    heard = {h.sample: h for h in hearings}
     asked = plan.questions[0]
     both = []
     for answer in answers:
