@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from designer.blocks import BlockStore
 from designer.confirmation import (
     MOST_PERIODS,
     REMAINDER,
+    Heard,
     Query,
     confirm,
     hear,
@@ -244,6 +245,23 @@ def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
         assert not isinstance(found, SimulationFailed)
         assert h.response == found.orbit.response == answer.response
         assert h.periods >= 5.0 / (1.0 - orbit.radius)
+
+
+def test_how_often_the_step_is_halved_goes_with_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As often as is asked from the nominal orbit; a board's own orbit needs no more for it."""
+    asked: list[int] = []
+
+    def count(_pool: Any, queries: Sequence[Query], _progress: Any) -> list[Heard]:
+        asked.extend(q.refinements for q in queries)
+        return [Heard("1-1-1") for _ in queries]
+
+    monkeypatch.setattr(confirmation, "confirm", count)
+    pool: Any = None
+    asks = both(range(1), 1)
+    hear(asking(), asks, pool, 1)
+    hear(asking(), asks, pool, 1, refinements=5)
+    assert [ask.kind for ask in asks] == [Kind.NOMINAL, Kind.OWN]
+    assert asked == [1, 2, 5, 2]
 
 
 def test_what_is_left_out_of_the_record_changes_nothing(pool: SpicePool) -> None:
