@@ -18,10 +18,10 @@ from designer import exact, gate, remedies
 from designer.deck import SolverSettings
 from designer.flow import Flow, FlowStatus
 from designer.gate import Subject
-from designer.hearing import OR, UNDECIDED, Ask, Hearing, Kind
+from designer.hearing import OR, UNDECIDED, Ask, Hearing, Kind, is_answer
 from designer.ngspice import SimulationFailed
 from designer.opamp_model import Rung
-from designer.orbit import Orbit, OrbitStatus
+from designer.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.system import Array
 from designer.verdict import StudyPlan
 from designer.waveform_orbit import Read
@@ -37,6 +37,8 @@ out by name."""
 STRETCH = 40
 """Drive periods after which the exact trajectory is looked at again, and for which it must have
 stayed with the attractor before it counts as arrived."""
+LONG = 4 * MAX_PERIOD
+"""Drive periods in which any period, or none, is seen."""
 OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
 """How often the step is halved where ngspice disagrees, until two step sizes say the same."""
 
@@ -204,35 +206,50 @@ def confirm(
     A first answer that is the expected one stands: its settings have passed the gate at two step
     sizes. Where it is another the step is halved, at most as often as the query says, until two
     step sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A
-    failed run is no answer: it is neither the same as another nor different. ``progress`` is
-    called once a query.
+    failed run is no answer: it is neither the same as another nor different. Nor is one that has
+    not settled: it is made again, longer (`longer`). ``progress`` is called once a query.
     """
+    queries = list(queries)
     heard: list[Heard | None] = [None] * len(queries)
     answered: list[str | None] = [None] * len(queries)
-    # The longest first: the workers then end together.
-    order = sorted(range(len(queries)), key=lambda k: -_steps(queries[k]))
-    asked = [(k, queries[k].settings) for k in order]
-    for level in range(max((q.refinements for q in queries), default=-1) + 1):
-        tasks = [gate.task(queries[k].subject, settings) for k, settings in asked]
+    halved = [0] * len(queries)
+    asked = list(range(len(queries)))
+    settings = [q.settings for q in queries]
+    while asked:
+        # The longest first: the workers then end together.
+        asked.sort(key=lambda k: (-_steps(queries[k].subject, settings[k]), k))
+        tasks = [gate.task(queries[k].subject, settings[k]) for k in asked]
         again = []
         for i, outcome in remedies.run(pool, tasks):
-            k, settings = asked[i]
-            before, said = answered[k], _heard(outcome)
-            failed = said.response == OrbitStatus.FAILED
-            settled = not failed and said.response == (before or queries[k].expected)
-            if settled or level == queries[k].refinements:
-                heard[k] = said if settled or failed else _undecided(before, said)
+            k = asked[i]
+            query, before, said = queries[k], answered[k], _heard(outcome)
+            if said.response == OrbitStatus.NOT_SETTLED and query.subject.judged < LONG:
+                queries[k] = replace(query, subject=longer(query.subject))
+                again.append(k)
+                continue
+            none = not is_answer(said.response)
+            settled = not none and said.response == (before or query.expected)
+            if settled or halved[k] == query.refinements:
+                heard[k] = said if settled or none else _undecided(before, said)
                 progress()
             else:
-                again.append((k, replace(settings, max_step=settings.max_step / 2.0)))
-            answered[k] = before if failed else said.response
-        asked = sorted(again, key=lambda item: (-_steps(queries[item[0]]), item[0]))
+                settings[k] = replace(settings[k], max_step=settings[k].max_step / 2.0)
+                halved[k] += 1
+                again.append(k)
+            answered[k] = before if none else said.response
+        asked = again
     return [h for h in heard if h is not None]
 
 
-def _steps(query: Query) -> float:
+def longer(subject: Subject) -> Subject:
+    """Twice the way and `STRETCH` more, and `LONG` periods to judge: what had not settled may have
+    been on its way yet, or have a period or none that a few strobes do not show."""
+    return replace(subject, discard=2 * subject.discard + STRETCH, judged=LONG)
+
+
+def _steps(subject: Subject, settings: SolverSettings) -> float:
     """Steps of a run, which its time goes with."""
-    return gate.length(query.subject) * query.subject.period / query.settings.max_step
+    return gate.length(subject) * subject.period / settings.max_step
 
 
 def _undecided(before: str | None, said: Heard) -> Heard:

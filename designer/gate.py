@@ -124,7 +124,7 @@ class Subject:
 
     orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
     voltages at t = 0 if not the orbit's. discard : periods left out before the run is judged.
-    rung : the op-amps' model in ngspice.
+    judged : periods that are judged at least. rung : the op-amps' model in ngspice.
     """
 
     reduction: Reduction
@@ -133,6 +133,7 @@ class Subject:
     start: Array | None = None
     discard: int = DISCARD
     rung: Rung = "ideal"
+    judged: int = 0
 
     @property
     def circuit(self) -> Circuit:
@@ -204,7 +205,8 @@ def job(
 
 def length(subject: Subject) -> int:
     """Drive periods that the run of a subject takes."""
-    return max(subject.discard + 4 * (subject.orbit.n or MAX_PERIOD), SHORTEST)
+    judged = max(4 * (subject.orbit.n or MAX_PERIOD), subject.judged)
+    return max(subject.discard + judged, SHORTEST)
 
 
 def task(

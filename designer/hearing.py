@@ -109,8 +109,8 @@ class Hearing:
 
 def is_answer(response: str) -> bool:
     """Whether what ngspice said is a response or a status of one: "" is no answer, nor is a run
-    that failed or two that differ."""
-    return response not in ("", OrbitStatus.FAILED, UNDECIDED)
+    that failed or has not settled, or two that differ."""
+    return response not in ("", OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED, UNDECIDED)
 
 
 def shows(spec: Response, nominal: Orbit, response: str, *, symmetric: bool) -> bool:

@@ -48,7 +48,7 @@ SAMPLES = 4000
 """Boards of the final study, at least."""
 DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
-RULES = 4
+RULES = 5
 """Number of the rules by which a search goes; whoever changes what it finds raises it."""
 
 

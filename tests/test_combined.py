@@ -171,7 +171,7 @@ def test_boards_without_an_answer_are_bounded() -> None:
 def test_a_board_that_is_lost_by_either_step_is_lost() -> None:
     """Undecided between two other responses; between one of them and the wanted one it is open."""
     answers = [replace(BLANK, sample=i) for i in range(10)]
-    says = {3: OR.join((LOST, "not settled")), 7: OR.join((LOST, OK))}
+    says = {3: OR.join((LOST, "aperiodic")), 7: OR.join((LOST, OK))}
     heard = [
         replace(
             HEARD, sample=i, kind=Kind.NOMINAL, why=Why.ALL,
@@ -186,7 +186,7 @@ def test_a_board_that_is_lost_by_either_step_is_lost() -> None:
     assert both.undecided == 1
     assert both.if_lost == pytest.approx(8 / 10)
     assert both.disagreement.of == 8  # neither names one n-p-q
-    assert [(d.sample, d.ngspice) for d in both.differences] == [(3, "1-1-1 or not settled")]
+    assert [(d.sample, d.ngspice) for d in both.differences] == [(3, "1-1-1 or aperiodic")]
 
 
 def test_no_answer_from_ngspice_is_no_estimate() -> None:

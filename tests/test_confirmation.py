@@ -157,7 +157,9 @@ class Saying:
         for i, _ in enumerate(jobs):
             end = self.ends[self.steps]
             self.steps += 1
-            if isinstance(end, str):
+            if end == 0:
+                yield i, Read(Orbit(OrbitStatus.NOT_SETTLED), np.zeros((9, 4)), None)
+            elif isinstance(end, str):
                 yield i, SimulationFailed(end)
             else:
                 orbit = Orbit(OrbitStatus.PERIODIC, n=1, p=end, q=end)
@@ -183,6 +185,12 @@ class Saying:
         ((2, "died", 2), 2, "1-2-2", ""),
         ((2, "died", 1), 2, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
         ((2, "died"), 1, "failed", "died"),
+        # Nor is a run that has not settled: a longer one at the same step takes its place.
+        ((0, 1), 1, "1-1-1", ""),
+        ((0, 2, 2), 1, "1-2-2", ""),
+        ((2, 0, 2), 1, "1-2-2", ""),
+        ((0, 2, 1), 1, UNDECIDED, "1-2-2, at a smaller step 1-1-1"),
+        ((0, 0, 0), 1, "not settled", ""),
     ],
 )
 def test_only_two_answers_that_are_the_same_count(
@@ -196,6 +204,19 @@ def test_only_two_answers_that_are_the_same_count(
     assert heard.either == (both if ", at a" in reason else "")
     assert pool.steps == len(ends)
     assert calls == [1]
+
+
+def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> None:
+    """From far off, and judged at once: two short runs see no period at either step size."""
+    who = subject(1)
+    early = replace(who, start=1.5 * who.orbit.start, discard=0)
+    settings = SolverSettings("trap", who.period / 400.0)
+    for step in (settings, replace(settings, max_step=settings.max_step / 2.0)):
+        ((_, first),) = pool.map([gate.job(early, step)])
+        assert not isinstance(first, SimulationFailed)
+        assert first.orbit.status is OrbitStatus.NOT_SETTLED
+    (heard,) = confirm(pool, [Query(early, settings, "1-1-1", 1)])
+    assert heard.response == "1-1-1"
 
 
 def test_a_run_that_fails_says_why(pool: SpicePool) -> None:

@@ -64,7 +64,8 @@ class Gate:
     [
         ({}, ("1-2-2",) * 16, Agreement(16, 16)),
         ({"expect": None}, ("1-2-2",) * 16, Agreement(16, 16)),
-        ({}, ("1-2-2",) * 12 + ("2-4-4", "chaos", "1-3-2", "not settled"), Agreement(16, 12)),
+        ({}, ("1-2-2",) * 12 + ("2-4-4", "chaos", "1-3-2", "aperiodic"), Agreement(16, 12)),
+        ({}, ("1-2-2",) * 15 + ("not settled",), Agreement(16, 15, 1)),
         ({}, ("1-2-2",) * 13 + (OrbitStatus.FAILED, UNDECIDED, "1-1-1"), Agreement(16, 13, 2)),
     ],
 )
