@@ -97,14 +97,17 @@ class Hearing:
         return self.response == answer.response if self.decided else None
 
     def survives(self, question: Question) -> bool | None:
-        """Whether the board shows the wanted response in ngspice; None without an answer. Two step
-        sizes that name different responses need not name the wanted one: then it is lost."""
+        """Whether the board shows the wanted response in ngspice; None without an answer, or where
+        a contact is too near to grazing to be counted. Two step sizes that name different responses
+        need not name the wanted one: then it is lost."""
         spec, start = question.spec, question.start
-        if self.decided:
+        if self.decided and self.response != OrbitStatus.GRAZING:
             return shows(spec, start, self.response, symmetric=self.symmetric)
         said = self.either.split(OR) if self.either else []
+        if not said or OrbitStatus.GRAZING in said:
+            return None
         wanted = any(shows(spec, start, one, symmetric=True) for one in said)
-        return False if said and not wanted else None
+        return None if wanted else False
 
 
 def is_answer(response: str) -> bool:

@@ -3,16 +3,16 @@ answers each question.
 
 Two truths are asked of a response (``designer.trade_errors``), and of boards a third, ngspice with
 ideal op-amps. A bound counts as kept only if the error and the truth's own uncertainty, what its
-two finest steps differ by, keep it together. The board's truth competes with that uncertainty for
-its error: where nothing less will do, it is the answer. A setting of ngspice that did not pass the
-numerics gate is measured and is never named.
+two finest steps differ by, keep it together. The board's truth is the answer where that
+uncertainty keeps the bound and nothing less does. A setting of ngspice that did not pass the
+numerics gate, the truth's own too, is measured and is never named.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from designer.trade_errors import BOARD, EQUATIONS, Compared, Truth
 from designer.trade_label import Label
@@ -32,9 +32,12 @@ RESPONSE, IMPACT, WAVE, SHARE = (
 QUESTIONS = (RESPONSE, IMPACT, WAVE)
 """Of a response; ``SHARE`` is one of boards."""
 NO_IMPACTS = "no impacts"
-"""Why a question does not arise."""
-ITSELF = "the truth itself, by what its two finest steps differ by"
-"""What is said of an answer that only the truth keeps."""
+NO_PERIOD = "no period"
+"""Why questions do not arise."""
+ITSELF = "the board itself; measured is what its two finest steps differ by"
+"""What is said where nothing less than the truth will do."""
+UNSURE = "the two finest steps of the board show different n-p-q, or none"
+"""Why a question has no answer."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +46,10 @@ class Cheapest:
 
     measured : the largest error with the truth's uncertainty, of this rung; for n-p-q the number of
     responses it has wrong; nan where there is none to measure. shown : whether that keeps the
-    bound; where not, the rung is the one that comes nearest. seconds : CPU time of a drive period,
-    summed over the responses. note : what else there is to say. A question that does not arise has
-    no rung, no setting and no answer (None), and the note says why.
+    bound; where not, the rung is the one that comes nearest, or none where the truth is not sure.
+    seconds : CPU time of a drive period, summed over the responses. note : what else there is to
+    say. A question that does not arise has no rung, no setting and no answer (None), and the note
+    says why.
     """
 
     question: str
@@ -94,13 +98,16 @@ def cheapest(question: str, of: str, responses: Sequence[Response]) -> Cheapest 
     where none does. None where nothing was asked."""
     bound = {RESPONSE: 0.0, IMPACT: VELOCITY, WAVE: WAVEFORM}[question]
     label = responses[0].truth.label if len(responses) == 1 else None
-    asked = [r for r in responses if question != IMPACT or r.truth.impacts[of]]
+    why = {r.truth.label.number: _no_question(question, of, r.truth) for r in responses}
+    asked = [r for r in responses if not why[r.truth.label.number]]
+    nothing = Cheapest(question, of, label, None, None, bound, math.nan, None, math.nan)
     if not asked:
-        return Cheapest(
-            question, of, label, None, None, bound, math.nan, None, math.nan, NO_IMPACTS
-        )
-    without = ", ".join(str(r.truth.label.number) for r in responses if r not in asked)
-    left_out = [f"without response {without}: {NO_IMPACTS}"] if without else []
+        return replace(nothing, note=", ".join(dict.fromkeys(why.values())))
+    left_out = [f"without response {n}: {reason}" for n, reason in why.items() if reason]
+    open_ = [str(r.truth.label.number) for r in asked if of == BOARD and not r.truth.sure]
+    if open_:
+        told = UNSURE if label else f"{UNSURE} (response {', '.join(open_)})"
+        return replace(nothing, shown=False, note="; ".join([told, *left_out]))
     finest = [(row.rung, row.level) for row in asked[0].rows if row.rung == TOP][-1:]
     kinds = dict.fromkeys((row.rung, row.level) for r in asked for row in r.rows)
     best: Cheapest | None = None
@@ -113,11 +120,22 @@ def cheapest(question: str, of: str, responses: Sequence[Response]) -> Cheapest 
         seconds = sum(row.seconds for row in picked)
         shown = measured <= bound
         itself = of == BOARD and [(rung, level)] == finest
+        if itself and not shown:
+            continue  # nothing is nearer than what is measured against
         note = "; ".join([ITSELF, *left_out] if itself else left_out)
         one = Cheapest(question, of, label, rung, level, bound, measured, shown, seconds, note)
         if best is None or _rank(one) < _rank(best):
             best = one
     return best
+
+
+def _no_question(question: str, of: str, truth: Truth) -> str:
+    """Why it does not arise; "" where it does."""
+    if question == RESPONSE or (of == BOARD and not truth.sure):
+        return ""
+    if not truth.periodic[of]:
+        return NO_PERIOD
+    return NO_IMPACTS if question == IMPACT and not truth.impacts[of] else ""
 
 
 def _rank(one: Cheapest) -> tuple[bool, float]:

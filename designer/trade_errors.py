@@ -27,7 +27,7 @@ class Compared:
     """One rung at one setting on one response.
 
     response : n-p-q or status. seconds : CPU time of a drive period. gate : whether ngspice's
-    setting passed the numerics gate; None of what ngspice does not compute, and of the truth.
+    setting passed the numerics gate; None of what ngspice does not compute.
     right : whether its n-p-q is the truth's (either twin), by truth. error : RMS difference of x1
     over its peak; velocity : largest relative difference of an impact's velocity; both by truth,
     nan where they do not apply. numerical : error against the exact flow of the rung's own
@@ -51,13 +51,15 @@ class Compared:
 @dataclass(frozen=True)
 class Truth:
     """The board's. response : n-p-q or status. sure : whether its two finest steps show the same.
-    error, velocity : what they differ by. impacts : whether there are any, by truth."""
+    error, velocity : what they differ by. periodic : whether it has a period, impacts : and any
+    impacts in it, by truth."""
 
     label: Label
     response: str
     sure: bool
     error: float
     velocity: float
+    periodic: Mapping[str, bool]
     impacts: Mapping[str, bool]
 
 
@@ -90,13 +92,17 @@ def compare(label: Label, some: Sequence[Answer]) -> tuple[tuple[Compared, ...],
         )
         for a in some
     )
-    impacts = {of: _strikes(orbit) for of, (orbit, _) in against.items()}
-    return rows, Truth(label, last.response, sure, error, velocity, impacts)
+    periodic = {of: o.status is OrbitStatus.PERIODIC for of, (o, _) in against.items()}
+    impacts = {of: periodic[of] and o.p + o.q > 0 for of, (o, _) in against.items()}
+    return rows, Truth(label, last.response, sure, error, velocity, periodic, impacts)
 
 
 def difference(first: Orbit, second: Orbit) -> float:
-    """Largest relative difference of the impacts' speeds, side by side in order of size; nan where
-    the counts differ. A twin counts as the same: sides may be exchanged."""
+    """Largest difference of the impacts' speeds on a stop, over the second orbit's fastest there,
+    side by side in order of size; nan where the counts differ or an orbit has no period. A twin
+    counts as the same: sides may be exchanged."""
+    if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
+        return math.nan
     best = math.nan
     for turn in (1.0, -1.0):
         worst = 0.0
@@ -117,11 +123,6 @@ def alike(first: Orbit, second: Orbit) -> bool:
     if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
         return first.status is second.status and first.status is OrbitStatus.APERIODIC
     return first.n == second.n and sorted((first.p, first.q)) == sorted((second.p, second.q))
-
-
-def _strikes(orbit: Orbit) -> bool:
-    """Whether a stop is met; what has no period may meet one."""
-    return orbit.status is not OrbitStatus.PERIODIC or orbit.p + orbit.q > 0
 
 
 def _numerical(answer: Answer, some: Sequence[Answer]) -> float:

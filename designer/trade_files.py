@@ -83,6 +83,7 @@ def _truth(truth: Truth) -> dict[str, Any]:
         "sure": truth.sure,
         "uncertainty": truth.error,
         "impact_velocity_uncertainty": truth.velocity,
+        "periodic": dict(truth.periodic),
         "impacts": dict(truth.impacts),
     }
 
@@ -195,7 +196,8 @@ def _boards_asked(answer: Mapping[str, Any]) -> int:
 def _answered(c: Mapping[str, Any]) -> str:
     start = f"| {c['question']} | {c['of']} |"
     if c["rung"] is None:
-        return f"{start} – | – | – | – | – | {c['note']} |"
+        kept = "–" if c["shown"] is None else "no"
+        return f"{start} – | – | – | {kept} | – | {c['note']} |"
     kept = "yes" if c["shown"] else "no"
     return (
         f"{start} {TITLES[c['rung']]} | {c['level']} | {_measured(c)} | {kept} | "

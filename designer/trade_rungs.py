@@ -60,8 +60,7 @@ class Answer:
     level : names the setting alike for all responses. settings : of the solver. orbit : in model
     units as far as it is used: n-p-q, status, impacts. shown : (n · POINTS,) first displacement in
     model units; empty where there is none. seconds : CPU time of a drive period. reason : why there
-    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs,
-    and of the finest on ``TOP``.
+    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs.
     """
 
     rung: str
@@ -204,14 +203,12 @@ def _spice(
     on = gate.warmed(pool, [replace(subject, rung=rung) for rung in SPICE_RUNGS])
     ladder = [(max(1, round(first / factor)), reltol) for factor, reltol in levels]
     names = [f"step ×{factor:g}, reltol {reltol:g}" for factor, reltol in levels]
-    last = len(levels) - 1
     asks: list[tuple[Subject, int, SolverSettings]] = []
     for one in on:
         for k, own in enumerate(ladder):
             settings = _own(one, own)
             asks.append((one, k, settings))
-            if not (one.rung == TOP and k == last):  # what is measured against needs no gate
-                asks += [(one, k, other) for other in trade_gate.companions(settings)]
+            asks += [(one, k, other) for other in trade_gate.companions(settings)]
     jobs = [gate.job(one, said, keep=said == _own(one, ladder[k])) for one, k, said in asks]
     heard = dict(pool.map(jobs))
     runs: dict[tuple[Rung, int], list[Run]] = {}
@@ -220,8 +217,8 @@ def _spice(
     for one in on:
         for k, own in enumerate(ladder):
             settings = _own(one, own)
-            found, *beside = runs[one.rung, k]
-            passed = trade_gate.passed(one, found, (beside[0], beside[1])) if beside else None
+            found, half, gear = runs[one.rung, k]
+            passed = trade_gate.passed(one, found, (half, gear))
             entrant = _timed(one, settings, clock)
             said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
             said["discarded_periods"] = one.discard

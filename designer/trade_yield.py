@@ -47,9 +47,9 @@ class Tally:
     """Counts of boards, which add up.
 
     decided : by both engines. ok : by the exact circuit. gained, lost : boards that only ngspice
-    calls ok, and that only the exact circuit does. undecided : boards that one of them has no
-    answer to. runs, periods : of ngspice, and their drive periods. seconds : CPU time of the exact
-    circuit.
+    calls ok, and that only the exact circuit does. undecided : boards of which one of them does not
+    say whether they show the response. runs, periods : of ngspice, and their drive periods.
+    seconds : CPU time of the exact circuit.
     """
 
     decided: int = 0
@@ -175,7 +175,8 @@ def tally(
         said = None if hearing is None else hearing.survives(asked)
         if answer.verdict in (Verdict.OK, Verdict.LOST) and said is not None:
             both.append((answer.verdict is Verdict.OK, said))
-    periods = [h.periods + 4 * max(asked.start.n, 1) for h in heard.values()]
+    # The first run of each; too long a way is none.
+    periods = [h.periods + 4 * max(asked.start.n, 1) for h in heard.values() if h.response]
     return Tally(
         decided=len(both),
         ok=sum(mine for mine, _ in both),

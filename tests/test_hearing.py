@@ -122,9 +122,20 @@ def test_agreement_and_survival() -> None:
     for said in ("failed", "undecided", "not settled", ""):
         assert replace(HEARD, response=said).agrees(BLANK) is None
         assert replace(HEARD, response=said).survives(question()) is None
-    for said in ("1-1-1", "aperiodic", "grazing"):
+    for said in ("1-1-1", "aperiodic"):
         assert replace(HEARD, response=said).agrees(BLANK) is False
         assert replace(HEARD, response=said).survives(question()) is False
+    near = replace(HEARD, response="grazing")
+    assert near.agrees(BLANK) is False
+    assert near.survives(question()) is None
+    for either, shown in (
+        ("1-1-1 or aperiodic", False),
+        ("1-1-1 or 1-2-2", None),
+        ("1-1-1 or grazing", None),
+        ("", None),
+    ):
+        open_ = replace(HEARD, response="undecided", either=either)
+        assert open_.survives(question()) is shown
     twin = replace(HEARD, response="1-2-1")
     assert twin.survives(question("1-1-2")) is True
     assert twin.survives(question("1-1-2", twin="exact")) is False

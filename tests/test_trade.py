@@ -43,8 +43,10 @@ from designer.trade import (
     IMPACT,
     ITSELF,
     NO_IMPACTS,
+    NO_PERIOD,
     RESPONSE,
     SHARE,
+    UNSURE,
     WAVE,
     Response,
     Trade,
@@ -144,7 +146,7 @@ def test_the_cheapest_keeps_the_bound_with_the_truths_own_uncertainty() -> None:
 
 
 def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
-    """Here that is the truth itself, whose two finest steps differ by more than the bound."""
+    """Not the truth itself, which is nearest to itself always."""
     found = judged(
         said("model", "exact", 0.02, 1e-6),
         said("circuit", "exact", 0.01, 1e-6),
@@ -153,8 +155,8 @@ def test_where_no_rung_keeps_the_bound_the_nearest_is_named() -> None:
     )
     wave = picked(found, WAVE)
     assert not wave.shown
-    assert (wave.rung, wave.level, wave.note) == ("full", "step ×0.5", ITSELF)
-    assert wave.measured == pytest.approx(0.005, rel=1e-3)
+    assert (wave.rung, wave.level, wave.note) == ("full", "step ×1", "")
+    assert wave.measured == pytest.approx(0.005 + 0.005, rel=1e-3)
 
 
 def test_where_nothing_less_will_do_the_truth_is_the_answer() -> None:
@@ -166,6 +168,9 @@ def test_where_nothing_less_will_do_the_truth_is_the_answer() -> None:
     assert wave.measured == pytest.approx(1e-4, rel=1e-3)
     assert picked(found, IMPACT).note == ""
     assert f"| 0.01 % | yes | 0.04 | {ITSELF} |" in sheet(document(found))
+    doubted = judged(*LADDER[:4], *(replace(a, gate=False) for a in LADDER[5:]))
+    assert picked(doubted, WAVE).rung == "circuit"  # a truth that its gate speaks against is none
+    assert not picked(doubted, WAVE).shown
 
 
 def test_a_rung_whose_time_is_not_known_is_not_the_cheapest() -> None:
@@ -183,8 +188,27 @@ def test_a_truth_that_is_not_sure_answers_nothing() -> None:
         said("full", "step ×0.5", 0.0, 2e-2),
     )
     assert not found.responses[0].truth.sure
-    assert not picked(found, RESPONSE).shown
-    assert not picked(found, WAVE).shown
+    for question in (RESPONSE, IMPACT, WAVE):
+        one = picked(found, question)
+        assert (one.rung, one.shown, one.note) == (None, False, UNSURE)
+    assert f"| {WAVE} | board | – | – | – | no | – | {UNSURE} |" in sheet(document(found))
+    both = cheapest(
+        RESPONSE, BOARD, [answered(*LADDER, label=Label(2, 2.0, 0.2, "")), *found.responses]
+    )
+    assert both is not None
+    assert (both.shown, both.note) == (False, f"{UNSURE} (response 1)")
+
+
+def test_of_a_motion_without_a_period_only_the_n_p_q_is_asked() -> None:
+    """No impact of it was compared, and no wave."""
+    chaos = [replace(a, orbit=Orbit(OrbitStatus.APERIODIC), shown=np.zeros(0)) for a in LADDER]
+    found = judged(*chaos)
+    assert picked(found, RESPONSE).shown
+    for of in (BOARD, EQUATIONS):
+        for question in (IMPACT, WAVE):
+            one = picked(found, question, of)
+            assert (one.rung, one.shown, one.note) == (None, None, NO_PERIOD)
+    assert math.isnan(difference(chaos[0].orbit, chaos[1].orbit))
 
 
 def test_a_rung_with_another_response_keeps_no_bound() -> None:
