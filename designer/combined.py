@@ -229,8 +229,8 @@ def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> S
 def differences(
     answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
 ) -> list[Disagreement]:
-    """Every board on which ngspice says another n-p-q, or two of which neither is the wanted one
-    that the exact rung sees, with what explains it, if anything does."""
+    """Every board on which ngspice says another n-p-q, or two others at two step sizes, with what
+    explains it, if anything does."""
     known = {a.sample: a for a in answers}
     stayed = {
         h.sample
@@ -248,13 +248,8 @@ def differences(
             _explain(known[h.sample], h, question, h.sample in stayed),
         )
         for h in heard
-        if h.sample in known and _differs(known[h.sample], h, question)
+        if h.sample in known and h.agrees(known[h.sample]) is False
     ]
-
-
-def _differs(answer: Answer, said: Hearing, question: Question) -> bool:
-    lost = answer.verdict is Verdict.OK and said.survives(question) is False
-    return lost or said.agrees(answer) is False
 
 
 def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) -> Explanation:

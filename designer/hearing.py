@@ -93,21 +93,37 @@ class Hearing:
         return is_answer(self.response)
 
     def agrees(self, answer: Answer) -> bool | None:
-        """Whether ngspice names the response that the exact rung names; None without an answer."""
-        return self.response == answer.response if self.decided else None
+        """Whether ngspice names the response that the exact rung names; None without an answer.
+        Two step sizes that name different ones both differ from a third."""
+        if self.decided:
+            return self.response == answer.response
+        said = _both(self.either)
+        return False if said and answer.response not in said else None
 
     def survives(self, question: Question) -> bool | None:
-        """Whether the board shows the wanted response in ngspice; None without an answer, or where
-        a contact is too near to grazing to be counted. Two step sizes that name different responses
-        need not name the wanted one: then it is lost."""
-        spec, start = question.spec, question.start
-        if self.decided and self.response != OrbitStatus.GRAZING:
-            return shows(spec, start, self.response, symmetric=self.symmetric)
-        said = self.either.split(OR) if self.either else []
-        if not said or OrbitStatus.GRAZING in said:
-            return None
-        wanted = any(shows(spec, start, one, symmetric=True) for one in said)
-        return None if wanted else False
+        """Whether the board shows the wanted response in ngspice; None where it does not say."""
+        return survives(
+            question.spec, question.start, self.response, self.either, symmetric=self.symmetric
+        )
+
+
+def survives(
+    spec: Response, nominal: Orbit, response: str, either: str, *, symmetric: bool
+) -> bool | None:
+    """Whether a response that ngspice named is the wanted one, or the nominal orbit's where none
+    is; None without an answer, or where a contact is too near to grazing to be counted. Two step
+    sizes that name different ones (``either``) need not name the wanted one: then it is lost."""
+    if is_answer(response) and response != OrbitStatus.GRAZING:
+        return shows(spec, nominal, response, symmetric=symmetric)
+    said = _both(either)
+    wanted = any(shows(spec, nominal, one, symmetric=True) for one in said)
+    return False if said and not wanted else None
+
+
+def _both(either: str) -> list[str]:
+    """The two answers of an undecided board; none if one of them cannot be counted."""
+    said = either.split(OR) if either else []
+    return [] if OrbitStatus.GRAZING in said else said
 
 
 def is_answer(response: str) -> bool:

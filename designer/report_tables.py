@@ -127,14 +127,18 @@ def ngspice_table(data: ReportData) -> Table | None:
             if not asked:
                 continue
             agrees = [h.agrees(known[h.sample]) for h in asked]
-            open_ = Counter(h.reason for h in asked if h.response == UNDECIDED)
+            open_ = Counter(
+                h.reason
+                for h, same in zip(asked, agrees, strict=True)
+                if h.response == UNDECIDED and same is None
+            )
             failed = Counter(
                 h.reason or "no reason given"
                 for h in asked
                 if not h.decided and h.response != UNDECIDED
             )
             differ = Counter(
-                f"{known[h.sample].response} but {h.response}"
+                f"{known[h.sample].response} but {h.either or h.response}"
                 for h, same in zip(asked, agrees, strict=True)
                 if same is False
             )

@@ -21,17 +21,15 @@ from designer.hearing import NOMINAL_SAMPLES, OWN_SAMPLES
 from designer.options import Options
 from designer.progress import Progress
 from designer.study import RUNGS, RungName
-from designer.trade import RESPONSE, SHARE
+from designer.trade import SHARE
 from designer.trade_errors import BOARD
-from designer.trade_rungs import CIRCUIT, MODEL, RK4
+from designer.trade_rungs import CIRCUIT
 
 TRADE = "trade.json"
 """What ``designer.trade_job`` writes."""
 SEARCH = "search.json"
 """What ``designer.search_job`` writes."""
 EARLIER = " (of the design that stood here before the search)"
-DECIDE = (RK4, MODEL, CIRCUIT, "ideal")
-"""Rungs that a yield can be computed on, and those below them."""
 LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
 """Boards of each response that ngspice is asked about, whatever a trade says."""
 
@@ -121,23 +119,12 @@ def _kept(model: object, said: Mapping[str, Any]) -> Choice:
 
 
 def _choice(said: Mapping[str, Any]) -> Choice:
-    wrong = [
-        _place(c)
-        for c in said["cheapest"]
-        if c["question"] == RESPONSE
-        and c["of"] == BOARD
-        and c["omega"] is not None
-        and not (c["shown"] and c["rung"] in DECIDE)
-    ]
-    warning = ""
-    if wrong:
-        warning = (
-            f"; at {'; '.join(wrong)} no rung up to ideal op-amps is shown to have the nominal "
-            "board's n-p-q, and yields are not computed above it"
-        )
     found = [c for c in said["cheapest"] if c["question"] == SHARE]
     if not found:
-        return Choice("auto", f"rung by trade.json: it asked no boards, so as usual{warning}")
+        reasons = dict.fromkeys(f"{_place(r)}: {r['reason']}" for r in said["left_out"])
+        why = f" ({'; '.join(reasons)})" if reasons else ""
+        said_ = f"rung by trade.json: it asked no boards{why}, so as usual"
+        return Choice("auto", said_ + _warning(said, CIRCUIT))
     overall = found[-1]  # of all responses, or of the only one
     if overall["rung"] == CIRCUIT:
         note = f"; {overall['note']}" if overall.get("note") else ""
@@ -145,13 +132,31 @@ def _choice(said: Mapping[str, Any]) -> Choice:
         return Choice(
             "auto",
             f"rung by trade.json: the exact circuit decides, {kept}; ngspice is asked about "
-            f"{LEAST} boards of each response at least{warning}",
+            f"{LEAST} boards of each response at least{_warning(said, CIRCUIT)}",
         )
     return Choice(
         "ngspice",
         "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
-        f"than {100.0 * overall['bound']:g} %{warning}",
+        f"than {100.0 * overall['bound']:g} %{_warning(said, 'ideal')}",
     )
+
+
+def _warning(said: Mapping[str, Any], decides: str) -> str:
+    """Where the rung that decides is not shown to have the nominal board's n-p-q."""
+    wrong = []
+    for truth in said["truths"]:
+        rows = [
+            row
+            for row in said["rungs"]
+            if row["number"] == truth["number"] and row["rung"] == decides
+        ]
+        right = any(row["right"][BOARD] and row["gate"] is not False for row in rows)
+        if not (truth["sure"] and right):
+            wrong.append(_place(truth))
+    if not wrong:
+        return ""
+    name = "the exact circuit" if decides == CIRCUIT else "ngspice with ideal op-amps"
+    return f"; at {'; '.join(wrong)} {name} is not shown to have the nominal board's n-p-q"
 
 
 def _place(said: Mapping[str, Any]) -> str:

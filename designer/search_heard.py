@@ -17,7 +17,7 @@ from functools import partial
 from designer import gate
 from designer.confirmation import Query, confirm, way_to_rung
 from designer.gate import Subject
-from designer.hearing import is_answer, shows
+from designer.hearing import survives
 from designer.opamp_model import Rung
 from designer.search_distance import Stand, Stretched
 from designer.search_memory import Memory
@@ -40,7 +40,8 @@ REFINEMENTS = 1
 class Agreement:
     """Of ``LISTENED`` boards of one response: those that show it on the exact circuit, those of
     them that show it in ngspice as well, and those without an answer: too long a way to be asked,
-    runs that failed, step sizes that differ, a numerics gate that does not pass."""
+    runs that failed, step sizes of which one shows it, a contact that cannot be counted, a numerics
+    gate that does not pass."""
 
     exact: int
     ngspice: int
@@ -94,11 +95,12 @@ class Listener:
         if not nominal.passed:
             return [(len(there), 0, len(there))]
         queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]
-        answers = [h for h in confirm(self._pool, queries) if is_answer(h.response)]
         kept = [
-            h for h in answers if shows(stand.spec, stand.orbit, h.response, symmetric=h.symmetric)
+            survives(stand.spec, stand.orbit, h.response, h.either, symmetric=h.symmetric)
+            for h in confirm(self._pool, queries)
         ]
-        return [(len(there), len(kept), len(there) - len(answers))]
+        answers = len(kept) - kept.count(None)
+        return [(len(there), kept.count(True), len(there) - answers)]
 
 
 def _started(subject: Subject) -> Subject:

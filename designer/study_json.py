@@ -11,7 +11,7 @@ import numpy as np
 
 from designer.combined import Combined
 from designer.equation_check import EquationCheck
-from designer.hearing import Hearing
+from designer.hearing import UNDECIDED, Hearing
 from designer.jsonout import FORMAT
 from designer.pipeline import Checked
 from designer.reached import Reached
@@ -176,7 +176,9 @@ def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str,
             "asked": len(asked),
             "agreed": sum(h.agrees(known[h.sample]) is True for h in asked),
             "failed": sum(h.response == "failed" for h in asked),
-            "undecided": sum(h.response == "undecided" for h in asked),
+            "undecided": sum(
+                h.response == UNDECIDED and h.agrees(known[h.sample]) is None for h in asked
+            ),
         }
 
     too_long = [h for h in heard if not h.response]

@@ -136,6 +136,10 @@ def test_agreement_and_survival() -> None:
     ):
         open_ = replace(HEARD, response="undecided", either=either)
         assert open_.survives(question()) is shown
+        assert open_.agrees(BLANK) is shown  # which is what is wanted
+    third = replace(HEARD, response="undecided", either="1-1-1 or 1-2-2")
+    assert third.agrees(replace(BLANK, response="1-3-3")) is False
+    assert third.survives(question()) is None
     twin = replace(HEARD, response="1-2-1")
     assert twin.survives(question("1-1-2")) is True
     assert twin.survives(question("1-1-2", twin="exact")) is False

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from designer.confirmation import Heard, Query
-from designer.hearing import UNDECIDED
+from designer.hearing import OR, UNDECIDED
 from designer.orbit import OrbitStatus
 from designer.quantities import between
 from designer.reduction import Reduction
@@ -66,6 +66,8 @@ class Gate:
         ({"expect": None}, ("1-2-2",) * 16, Agreement(16, 16)),
         ({}, ("1-2-2",) * 12 + ("2-4-4", "chaos", "1-3-2", "aperiodic"), Agreement(16, 12)),
         ({}, ("1-2-2",) * 15 + ("not settled",), Agreement(16, 15, 1)),
+        ({}, ("1-2-2",) * 14 + ("1-1-1 or 1-3-3", "1-2-2 or 1-3-3"), Agreement(16, 14, 1)),
+        ({}, ("1-2-2",) * 15 + (OrbitStatus.GRAZING,), Agreement(16, 15, 1)),
         ({}, ("1-2-2",) * 13 + (OrbitStatus.FAILED, UNDECIDED, "1-1-1"), Agreement(16, 13, 2)),
     ],
 )
@@ -80,7 +82,7 @@ def test_what_ngspice_says_is_counted(
     def confirm(_: object, queries: Sequence[Query]) -> list[Heard]:
         assert all(q.subject.rung == "dynamic" for q in queries)
         assert {q.expected for q in queries} == {"1-2-2"}
-        return [Heard(a) for a in answers]
+        return [Heard(UNDECIDED, either=a) if OR in a else Heard(a) for a in answers]
 
     boards, stand = bench()
     wanted = replace(stand, spec=replace(stand.spec, **spec))

@@ -534,7 +534,22 @@ def test_a_response_that_ideal_op_amps_do_not_show_is_named(tmp_path: Path) -> N
     other = orbit(2, 2, (1.0, 1.0), (1.0, 1.0))
     answers = [replace(a, orbit=other) if a.rung == "full" else a for a in LADDER]
     choice = choose(folder_with(tmp_path / "d", document(judged(*answers))))
-    assert "ω = 1.55" in choice.reason
+    told = "at ω = 1.55, b = 0.25 the exact circuit is not shown to have the nominal board's n-p-q"
+    assert told in choice.reason
+    near = of_boards(1000, 0, 0)
+    wrong = [replace(a, orbit=other) if a.rung == "circuit" else a for a in LADDER]
+    choice = choose(folder_with(tmp_path / "c", document(judged(*wrong, boards=near))))
+    assert told in choice.reason  # though a model that shows it is cheaper still
+    off = of_boards(200, 60, 0)
+    choice = choose(folder_with(tmp_path / "n", document(judged(*wrong, boards=off))))
+    assert "n-p-q" not in choice.reason
+
+
+def test_boards_that_were_left_out_say_why(tmp_path: Path) -> None:
+    found = judged(*LADDER, boards=LeftOut(ONE, "the numerics gate did not pass"))
+    choice = choose(folder_with(tmp_path / "d", document(found)))
+    assert choice.rung == "auto"
+    assert "no boards (ω = 1.55, b = 0.25: the numerics gate did not pass)" in choice.reason
 
 
 @pytest.mark.parametrize("rung", ["exact", "ngspice"])
