@@ -34,6 +34,9 @@ REMAINDER = 5e-4
 MOST_PERIODS = 4000
 """Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
 out by name."""
+MOST_AGAIN = 2 * MOST_PERIODS
+"""Longest run that is made again, in drive periods at the step of the first; half steps count
+twice."""
 STRETCH = 40
 """Drive periods after which the exact trajectory is looked at again, and for which it must have
 stayed with the attractor before it counts as arrived."""
@@ -207,7 +210,8 @@ def confirm(
     sizes. Where it is another the step is halved, at most as often as the query says, until two
     step sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A
     failed run is no answer: it is neither the same as another nor different. Nor is one that has
-    not settled: it is made again, longer (`longer`). ``progress`` is called once a query.
+    not settled: it is made again, longer (`longer`). Neither is done where it would take more than
+    `MOST_AGAIN` periods' steps. ``progress`` is called once a query.
     """
     queries = list(queries)
     heard: list[Heard | None] = [None] * len(queries)
@@ -223,13 +227,19 @@ def confirm(
         for i, outcome in remedies.run(pool, tasks):
             k = asked[i]
             query, before, said = queries[k], answered[k], _heard(outcome)
-            if said.response == OrbitStatus.NOT_SETTLED and query.subject.judged < LONG:
-                queries[k] = replace(query, subject=longer(query.subject))
+            more, fine = longer(query.subject), 2 ** halved[k]
+            if (
+                said.response == OrbitStatus.NOT_SETTLED
+                and query.subject.judged < LONG
+                and fine * gate.length(more) <= MOST_AGAIN
+            ):
+                queries[k] = replace(query, subject=more)
                 again.append(k)
                 continue
             none = not is_answer(said.response)
             settled = not none and said.response == (before or query.expected)
-            if settled or halved[k] == query.refinements:
+            dear = 2 * fine * gate.length(query.subject) > MOST_AGAIN
+            if settled or dear or halved[k] == query.refinements:
                 heard[k] = said if settled or none else _undecided(before, said)
                 progress()
             else:

@@ -48,6 +48,8 @@ def study_hash(
                 confirmation.REMAINDER,
                 confirmation.MOST_PERIODS,
                 confirmation.STRETCH,
+                confirmation.LONG,
+                confirmation.MOST_AGAIN,
             ],
             "undecided": hearing.UNDECIDED,
             "settings": [

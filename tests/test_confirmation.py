@@ -219,6 +219,28 @@ def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> Non
     assert heard.response == "1-1-1"
 
 
+@pytest.mark.parametrize(
+    ("way", "ends", "runs", "response"),
+    [
+        (100, (2, 2), 2, "1-2-2"),
+        (3900, (2, 2), 2, "1-2-2"),
+        (4000, (2,), 1, UNDECIDED),  # a half step would be more than 8000 periods
+        (3900, (0, 1), 2, "1-1-1"),
+        (4000, (0,), 1, "not settled"),
+        (1000, (0, 2, 2), 3, "1-2-2"),
+        (2000, (0, 2), 2, UNDECIDED),
+    ],
+)
+def test_a_long_way_is_not_gone_again_at_any_price(
+    way: int, ends: tuple[int, ...], runs: int, response: str
+) -> None:
+    who, pool = replace(subject(1), discard=way), Saying(*ends)
+    query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", 1)
+    (heard,) = confirm(pool, [query])  # type: ignore[arg-type]
+    assert heard.response == response
+    assert pool.steps == runs
+
+
 def test_a_run_that_fails_says_why(pool: SpicePool) -> None:
     who = subject(1)
     broken = replace(who, start=np.full(4, np.nan))
