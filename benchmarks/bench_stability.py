@@ -7,6 +7,7 @@ soon as it is done; a run that was interrupted goes on.
 
 from __future__ import annotations
 
+import math
 import os
 import textwrap
 import time
@@ -23,6 +24,7 @@ from benchmarks.stability_flow import SHOWN, by_axis, ratio, trusted
 from benchmarks.stability_pictures import flow_picture, spice_picture
 from designer.case_store import CaseStore
 from designer.jsonout import dumps, plain
+from designer.orbit import OrbitStatus
 from designer.workers import SpicePool
 
 ROOT = Path(__file__).parent.parent
@@ -70,8 +72,10 @@ def flow_summary(rows: Sequence[Row]) -> Iterator[list[str]]:
         yield [
             f"exact flow, {SHOWN.get(axis, axis)}",
             f"{fine[-1]['value']:.1g}" if fine else "nowhere",
-            "the end of what was tried" if first is None else f"{first['value']:.1g}: rounding",
-            "–" if largest is None else f"state right to {largest:.0e}",
+            "the end of what was tried"
+            if first is None
+            else f"{first['value']:.1g}: {_short(first.get('trust') or first['said'])}",
+            "–" if largest is None else f"state right to {_up(largest)}",
         ]
 
 
@@ -94,7 +98,7 @@ def flow_table(rows: Sequence[Row]) -> list[str]:
                 _text(general, ".2g"),
                 _text(row["bound"] / row["first_error"] if known else None, ".2g"),
                 row.get("response", "not asked"),
-                "yes" if trusted(row) else "no",
+                _trusted(row),
             ]
         )
     return table(header, body)
@@ -116,7 +120,7 @@ def spice_summary(rows: Sequence[Row]) -> Iterator[list[str]]:
                 f"ngspice {rung}, {axis}",
                 ", ".join(f"{row['value']:g}" for row in fine) or "nowhere",
                 "; ".join(f"{r['value']:g}: {r['rungs'][rung]['why']}" for r in bad) or "nothing",
-                "–" if worst is None else f"wave right to {worst:.1g} of the peak (RMS)",
+                "–" if worst is None else f"wave right to {_up(worst)} of the peak (RMS)",
             ]
 
 
@@ -243,7 +247,8 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
             f"{min(bounds):.2g} to {max(bounds):.2g} times the true error of the first period. "
             f"{len(doubted)} of {len(flow)} scenes are called not to be trusted. Where there is no "
             f"error the reference gave up after {stability_flow.MOST} mode changes. *From rest* is "
-            "what the start from rest leads to; it is not asked where that takes minutes."
+            "what the start from rest leads to; it is not asked where that takes minutes. Where it "
+            "has not settled there is no answer to trust, but *a period* from the given start is."
         ),
         "",
         *(f"Wrong counts at {r['axis']} {r['value']:g}." for r in wrong),
@@ -292,6 +297,23 @@ def report(pieces: Mapping[str, Sequence[Row]], seconds: float) -> str:
         *edge_table(edges),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _trusted(row: Row) -> str:
+    """From rest there may be no answer to trust, where a period of its own start has one."""
+    open_ = row.get("response") in (OrbitStatus.NOT_SETTLED, OrbitStatus.DIVERGED)
+    return ("a period" if open_ else "yes") if trusted(row) else "no"
+
+
+def _short(reason: str) -> str:
+    """Its first clause."""
+    return reason.removeprefix("not to be trusted here: ").split(",")[0]
+
+
+def _up(value: float) -> str:
+    """To one figure, never less than it is."""
+    power = math.floor(math.log10(value))
+    return f"{math.ceil(value / 10.0**power - 1e-9) * 10.0**power:.1g}"
 
 
 def _filled(text: str) -> str:

@@ -105,7 +105,7 @@ def _short(
     asked = sum(bool(m.get("responses")) for m in misprints)
     out.append(
         f"Of {asked} misprints that were put into the circuit alone, {len(lost)} change an n-p-q: "
-        f"{', '.join(lost) or 'none'}."
+        f"{'; '.join(lost) or 'none'}."
     )
     for one in offsets:
         rates = [_share(r["counted"]) for r in one["sizes"]["typical"] if r["there"]]
