@@ -27,7 +27,7 @@ from designer.cure_picture import Picture
 from designer.cure_plots import front_chart
 from designer.cure_program import cheapest
 from designer.cure_search import find_cure
-from designer.cure_slots import network_slots, part_slots, trimmer_slot
+from designer.cure_slots import PartSlot, network_slots, part_slots, trimmer_slot
 from designer.cure_study import Book, Measured, measure, measure_together
 from designer.cure_table import text
 from designer.cure_trial import Cure
@@ -449,20 +449,24 @@ def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
     assert named == set(answer["upgrades"]["grades"])
 
 
+@cache
+def trimming() -> PartSlot:
+    slot = trimmer_slot(branch().made)
+    assert slot is not None
+    return slot
+
+
 def with_trimmer(nominal: float, rate: float) -> Picture:
     """The known picture, where a trimmer can be had as well: so many boards show it trimmed."""
     seen = known_picture(nominal)
-    slot = trimmer_slot(branch().made)
-    assert slot is not None
+    slot = trimming()
     rows = (*seen.ways[0], Way(0, "trimmer", cast(Question, None), None, None, rate))
     parts = (*seen.parts, slot)
     return replace(seen, parts=parts, ways=(rows,))
 
 
 def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
-    made = branch().made
-    slot = trimmer_slot(made)
-    assert slot is not None
+    made, slot = branch().made, trimming()
     assert slot.trim is not None
     trimmer = CATALOG.trimmer(slot.trim.track)
     series = slot.trim.circuit.values["R911"]
@@ -546,9 +550,7 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
 
 def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     """The book's verdicts are those of the trimmed boards, once found and then known."""
-    made = branch().made
-    slot = trimmer_slot(made)
-    assert slot is not None
+    made, slot = branch().made, trimming()
     assert slot.trim is not None
     question = bench_plans.question(3)
     circuit = made.design.circuit
