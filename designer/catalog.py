@@ -14,6 +14,7 @@ import hashlib
 import importlib.resources
 import math
 import os
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -270,7 +271,7 @@ class Catalog:
         return [
             (family, nearest)
             for family in families
-            for nearest in [min(family.values, key=lambda sold: abs(sold - value))]
+            for nearest in [_nearest(family.values, value)]
             if math.isclose(nearest, value, rel_tol=_SAME)
         ]
 
@@ -379,6 +380,12 @@ def _shipped() -> Path:
         if folder.is_dir():
             return folder
     raise InputError(None, "catalogs", "nothing", "the catalogue that comes with the tool")
+
+
+def _nearest(ascending: Sequence[float], value: float) -> float:
+    """The one that is nearest to the value, the smaller of two that are as near."""
+    above = bisect_left(ascending, value)
+    return min(ascending[max(above - 1, 0) : above + 1], key=lambda each: abs(each - value))
 
 
 def _choice(family: PartFamily, value: float) -> PartChoice:

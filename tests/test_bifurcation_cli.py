@@ -19,6 +19,8 @@ from designer.design_files import load
 from designer.folder import Folder
 from designer.modelfile import read_model_file
 from designer.sweep_subject import BoardSubject
+from tests.model_text import COARSE_CIRCUIT
+from tests.quick_folders import quick_folder
 from tests.test_cli import BASE, WANTED, _process, _strict, _tree
 
 SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
@@ -27,15 +29,13 @@ SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bifurcation") / "small.toml"
-    path.write_text(BASE + WANTED, encoding="utf-8")
+    path.write_text(BASE + WANTED + COARSE_CIRCUIT, encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
 def design(model: Path) -> Path:
-    out = model.parent / "design"
-    assert cli.status(["synthesise", str(model), "--out", str(out), "-q"]) == 0
-    return out
+    return quick_folder(model.read_text(encoding="utf-8"), model.parent / "design")
 
 
 def _asked(capfd: pytest.CaptureFixture[str], *words: object) -> Any:

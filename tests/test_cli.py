@@ -20,6 +20,7 @@ import pytest
 from designer import __version__, cli
 from designer.ngspice import open_simulator
 from designer.setup_table import COLUMNS
+from tests.model_text import COARSE_CIRCUIT
 
 ROOT = Path(__file__).resolve().parent.parent
 HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [bold] ${HOME}"
@@ -331,7 +332,7 @@ def test_simulate_from_rest(home: Path, capfd: pytest.CaptureFixture[str]) -> No
 def test_a_response_that_is_not_there_is_exit_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    model = _model(tmp_path, BASE + WANTED.replace("1-2-2", "1-7-7"))
+    model = _model(tmp_path, BASE + WANTED.replace("1-2-2", "1-7-7") + COARSE_CIRCUIT)
     assert cli.status(["simulate", str(model), "--json"]) == 1
     assert _strict(capfd.readouterr().out)["responses"][0]["found"] is False
     out = tmp_path / "out"
@@ -342,7 +343,7 @@ def test_a_response_that_is_not_there_is_exit_1(
 def test_synthesis_without_responses_or_stops(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    model = _model(tmp_path, BASE.replace("k0 = 0.95", "k0 = 0.0"))
+    model = _model(tmp_path, BASE.replace("k0 = 0.95", "k0 = 0.0") + COARSE_CIRCUIT)
     out = tmp_path / "out"
     assert cli.status(["synthesize", str(model), "--out", str(out), "--json"]) == 0
     answer = _strict(capfd.readouterr().out)
@@ -634,8 +635,8 @@ def test_a_response_that_the_model_does_not_show_ends_the_folder_properly(
 ) -> None:
     """No response can be studied: no samples, yet a finished folder, an answer, status 1."""
     model = tmp_path / "wrong.toml"
-    text = Path(_model(tmp_path)).read_text(encoding="utf-8")
-    model.write_text(re.sub(r'expect = "[^"]*"', 'expect = "1-5-5"', text), encoding="utf-8")
+    text = BASE + WANTED.replace("1-2-2", "1-5-5") + COARSE_CIRCUIT
+    model.write_text(text, encoding="utf-8")
     arguments = ["run", str(model), "--out", str(tmp_path / "out"), "--samples", "3", "--json"]
     assert cli.status(arguments) == 1
     (response,) = _strict(capfd.readouterr().out)["responses"]

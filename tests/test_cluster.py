@@ -22,6 +22,7 @@ from designer.errors import EnvironmentMissing
 from designer.layers import Here, Samples, fill
 from designer.study_hash import study_hash
 from designer.verdict import Answer, StudyPlan
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.test_verdict import nothing, plan
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -109,7 +110,8 @@ def test_a_scheduler_that_dies_is_said() -> None:
 
 def test_nobody_at_the_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Exit 3 and nothing written: neither anew nor over what is there."""
-    model, out = ROOT / "examples" / "paper.toml", tmp_path / "out"
+    model, out = tmp_path / "small.toml", tmp_path / "out"
+    model.write_text(f"format = 1\n{PAPER_TABLE}[[response]]\nomega = 1.55\n{COARSE_CIRCUIT}")
     words = ["tolerance", str(model), "--out", str(out), "--rung", "exact", "--samples", "5"]
     assert cli.status([*words, "--cluster", "tcp://127.0.0.1:9", "-q"]) == 3
     assert "no cluster at tcp://127.0.0.1:9" in capfd.readouterr().err

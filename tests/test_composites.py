@@ -28,12 +28,13 @@ from designer.resistors import effective
 from designer.synthesis import synthesise
 from designer.system import Array
 from tests.oracles import Plain, coefficient_error
+from tests.quick_folders import without_starts
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 CATALOG = load_catalog()
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), 0.202, 0.0, 36.0)
-E24 = CircuitSpec(resistors=("E24",))
+E12, E24 = CircuitSpec(resistors=("E12",)), CircuitSpec(resistors=("E24",))
 
 
 def test_a_pair_is_what_its_parts_make() -> None:
@@ -145,7 +146,10 @@ def test_the_paper_s_case_in_e24_is_exact_with_composites(names: bool | tuple[st
 
 
 def test_without_any_that_may_be_one_nothing_changes() -> None:
-    assert design(()).circuit == design(False).circuit
+    none, never = (
+        synthesise(PAPER, replace(E12, composites=names), CATALOG, PEAKS) for names in ((), False)
+    )
+    assert none.circuit == never.circuit
 
 
 @pytest.mark.slow
@@ -166,7 +170,10 @@ def test_matched_parts_stay_single(matched: tuple[tuple[str, str], ...]) -> None
         assert made.composites, "others may still be two parts"
 
 
-def test_a_design_folder_with_composites_is_read_again(tmp_path: Path) -> None:
+def test_a_design_folder_with_composites_is_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_starts(monkeypatch)
     text = (EXAMPLES / "paper.toml").read_text(encoding="utf-8")
     text = text[: text.index("# Below the pitchfork")] + text[text.index("[circuit]") :]
     text = text.replace('resistors = "E96"', 'resistors = "E24"')

@@ -27,7 +27,7 @@ from designer.cure_picture import Picture
 from designer.cure_plots import front_chart
 from designer.cure_program import cheapest
 from designer.cure_search import find_cure
-from designer.cure_slots import network_slots, part_slots, trimmer_slot
+from designer.cure_slots import PartSlot, network_slots, part_slots, trimmer_slot
 from designer.cure_study import Book, Measured, measure, measure_together
 from designer.cure_table import text
 from designer.cure_trial import Cure
@@ -47,7 +47,8 @@ from designer.upgrade import Upgrades, price, upgraded_file, with_parts_kept
 from designer.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yield_maps import Axis, YieldMap
 from tests import bench_plans, paper_cases
-from tests.model_text import PAPER_TABLE
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.quick_folders import quick_folder
 
 CATALOG = load_catalog()
 WEIGHTS = {"R50": 3.0, "R203": 2.0, "R4": 1.5, "R11": 1.0, "C2": 1.0, "R8": 0.6}
@@ -326,13 +327,10 @@ def test_seeds_are_their_own() -> None:
     assert not set(seeds) & set(range(1000))
 
 
+HEAD = "format = 1\n" + PAPER_TABLE
+QUICK = HEAD + '[[response]]\nomega = 1.55\nexpect = "1-1-1"\n' + COARSE_CIRCUIT
 SMALL = (
-    """
-format = 1
-title = "One response of the soft-impacting system"
-
-"""
-    + PAPER_TABLE
+    HEAD
     + """
 [[response]]
 omega = 0.337
@@ -351,9 +349,7 @@ WITHOUT = ("place", "trim", "dead zone", "op-amp")
 
 @pytest.fixture(scope="module")
 def design(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("cure") / "design"
-    synthesise_into(parse_model_file(SMALL), out, Options(), Progress())
-    return out
+    return quick_folder(QUICK, tmp_path_factory.mktemp("cure") / "design")
 
 
 def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
@@ -415,9 +411,11 @@ def test_a_trade_that_sends_every_board_to_ngspice_is_told(
 
 
 @pytest.mark.slow
-def test_a_design_is_cured_and_its_cure_is_a_design(design: Path, tmp_path: Path) -> None:
+def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
     from designer.study_job import run_into
 
+    design = tmp_path / "design"
+    synthesise_into(parse_model_file(SMALL), design, Options(), Progress())
     other = Path(shutil.copytree(design, tmp_path / "stopped"))
     out = tmp_path / "cured"
     found = cure(design, target=0.99, without=WITHOUT, out=out)
@@ -451,20 +449,24 @@ def test_a_design_is_cured_and_its_cure_is_a_design(design: Path, tmp_path: Path
     assert named == set(answer["upgrades"]["grades"])
 
 
+@cache
+def trimming() -> PartSlot:
+    slot = trimmer_slot(branch().made)
+    assert slot is not None
+    return slot
+
+
 def with_trimmer(nominal: float, rate: float) -> Picture:
     """The known picture, where a trimmer can be had as well: so many boards show it trimmed."""
     seen = known_picture(nominal)
-    slot = trimmer_slot(branch().made)
-    assert slot is not None
+    slot = trimming()
     rows = (*seen.ways[0], Way(0, "trimmer", cast(Question, None), None, None, rate))
     parts = (*seen.parts, slot)
     return replace(seen, parts=parts, ways=(rows,))
 
 
 def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
-    made = branch().made
-    slot = trimmer_slot(made)
-    assert slot is not None
+    made, slot = branch().made, trimming()
     assert slot.trim is not None
     trimmer = CATALOG.trimmer(slot.trim.track)
     series = slot.trim.circuit.values["R911"]
@@ -548,9 +550,7 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
 
 def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     """The book's verdicts are those of the trimmed boards, once found and then known."""
-    made = branch().made
-    slot = trimmer_slot(made)
-    assert slot is not None
+    made, slot = branch().made, trimming()
     assert slot.trim is not None
     question = bench_plans.question(3)
     circuit = made.design.circuit

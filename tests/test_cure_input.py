@@ -16,14 +16,14 @@ from designer.catalog import load_catalog
 from designer.cure import cure
 from designer.cure_branch import KINDS, kind_named
 from designer.errors import InputError
-from designer.job import synthesise_into
 from designer.modelfile import ModelFile, parse_model_file
 from designer.options import Options
 from designer.progress import Progress
 from designer.spread import Spread, draw_many
 from designer.upgrade import Upgrades, upgraded_file
 from tests import paper_cases
-from tests.model_text import PAPER_TABLE
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.quick_folders import quick_folder
 
 CATALOG = load_catalog()
 SMALL = (
@@ -33,18 +33,21 @@ SMALL = (
 [[response]]
 omega = 1.55
 expect = "1-1-1"
-[circuit]
-saturation = 13.0
-resistors = "E24"
 """
+    + COARSE_CIRCUIT
 )
 
 
 @pytest.fixture(scope="module")
 def design(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("cure") / "design"
-    synthesise_into(parse_model_file(SMALL), out, Options(), Progress())
-    return out
+    return quick_folder(SMALL, tmp_path_factory.mktemp("cure") / "design")
+
+
+@pytest.fixture(scope="module")
+def another(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Another design; tests work on copies."""
+    text = SMALL.replace("omega = 1.55", "omega = 1.5")
+    return quick_folder(text, tmp_path_factory.mktemp("another") / "design")
 
 
 class _Worked(Exception):
@@ -92,9 +95,10 @@ def test_kinds_by_either_name_are_the_same_inputs(design: Path, tmp_path: Path) 
     assert said == [["dead zone"], ["dead zone"]]
 
 
-def test_a_place_with_a_design_is_refused_before_the_work(design: Path, tmp_path: Path) -> None:
-    other = tmp_path / "other"
-    synthesise_into(parse_model_file(SMALL.replace("1.55", "0.85")), other, Options(), Progress())
+def test_a_place_with_a_design_is_refused_before_the_work(
+    design: Path, another: Path, tmp_path: Path
+) -> None:
+    other = Path(shutil.copytree(another, tmp_path / "other"))
     before = {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()}
     own = Path(shutil.copytree(design, tmp_path / "own"))
     with pytest.raises(InputError) as refused:
@@ -110,10 +114,11 @@ def test_a_place_with_a_design_is_refused_before_the_work(design: Path, tmp_path
         cure(third, target=0.9, out=tmp_path / "free", progress=_NoWork())
 
 
-def test_a_file_in_the_way_is_refused_before_the_work(design: Path, tmp_path: Path) -> None:
+def test_a_file_in_the_way_is_refused_before_the_work(
+    design: Path, another: Path, tmp_path: Path
+) -> None:
     """Even where what the manifest lists may be overwritten."""
-    other = tmp_path / "other"
-    synthesise_into(parse_model_file(SMALL.replace("1.55", "0.85")), other, Options(), Progress())
+    other = Path(shutil.copytree(another, tmp_path / "other"))
     manifest = json.loads((other / "manifest.json").read_text())
     del manifest["files"]["setup.csv"]
     (other / "manifest.json").write_text(json.dumps(manifest))

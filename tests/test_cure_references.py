@@ -24,6 +24,7 @@ from designer.quantities import quantities
 from designer.spread import Spread, draw_many
 from designer.upgrade import Upgrades, price
 from designer.verdict import Question, StudyPlan, Yield
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 BAND = 0.05
 OTHER_SEED = 4242
@@ -31,15 +32,11 @@ OTHER_SEED = 4242
 
 @cache
 def design(p: int, omega: float, zone: str) -> Synthesis:
-    """For one 1-p-p response of the paper's model, from E24 parts of 1 %."""
-    return synthesise(
-        parse_model_file(
-            "format = 1\n[model]\nm = 0.5\nk = 0.5\nk0 = 0.95\nc = 0.5\nzeta = 0.1\nf20 = 0.0\n"
-            f'b = 0.25\n[[response]]\nomega = {omega}\nexpect = "1-{p}-{p}"\n'
-            f'[circuit]\nsaturation = 13.0\nresistors = "E24"\ndead_zone = "{zone}"\n'
-            f"[tuning]\noffset = {BAND}\n"
-        )
-    )
+    """For one 1-p-p response of the paper's model, from coarse parts of 1 %."""
+    wanted = f'[[response]]\nomega = {omega}\nexpect = "1-{p}-{p}"\n'
+    circuit = f'{COARSE_CIRCUIT}dead_zone = "{zone}"\n'
+    tuning = f"[tuning]\noffset = {BAND}\n"
+    return synthesise(parse_model_file("format = 1\n" + PAPER_TABLE + wanted + circuit + tuning))
 
 
 def only(kind: str, base: Synthesis, target: float) -> Cure:

@@ -22,7 +22,7 @@ from designer.confirmation import hear
 from designer.errors import InputError
 from designer.hearing import Hearing, Kind, ask_random
 from designer.layers import Samples
-from designer.modelfile import Expect, parse_model_file, read_model_file
+from designer.modelfile import Expect, parse_model_file
 from designer.ngspice import SimulationFailed
 from designer.orbit import Orbit, OrbitStatus, failed
 from designer.provenance import provenance
@@ -32,8 +32,9 @@ from designer.report_tables import ngspice_table
 from designer.study import Study
 from designer.verdict import Verdict
 from designer.workers import SpicePool
+from tests.paper_cases import PAPER as EXAMPLE
+from tests.paper_cases import synthesised
 
-EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
 HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
 VOID = {"meta", "img", "link", "br", "hr", "input"}
 
@@ -46,9 +47,9 @@ def catalog() -> Catalog:
 @pytest.fixture(scope="session")
 def whole(catalog: Catalog) -> ReportData:
     """A small run in which everything works: 1-1-1, its asymmetric kind, 1-2-2."""
-    modelfile = read_model_file(EXAMPLE)
-    modelfile = replace(modelfile, responses=modelfile.responses[:3])
-    found, design = pipeline.design_for(modelfile, catalog)
+    made = synthesised()
+    modelfile = replace(made.modelfile, responses=made.modelfile.responses[:3])
+    found, design = made.found[:3], made.design
     with SpicePool(2) as pool:
         checked = pipeline.check(design, found, pool)
         plan = pipeline.plan_study(modelfile, design, checked, catalog, samples=4, seed=1)

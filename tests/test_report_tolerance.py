@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +11,10 @@ import pytest
 from designer import pipeline
 from designer import report_words as words
 from designer.blame import Blame, NearLimit, ResponseBlame, Subject
-from designer.catalog import load_catalog
 from designer.corners import Corner
 from designer.exact import block
 from designer.margin_indices import Index
 from designer.margins import Prediction
-from designer.modelfile import read_model_file
 from designer.report import render_html, render_markdown
 from designer.report_data import ReportData
 from designer.report_design import condition_table
@@ -26,9 +23,9 @@ from designer.report_tables import provenance_table
 from designer.report_tolerance import facts
 from designer.verdict import Verdict
 from designer.yield_maps import Axis, YieldMap
+from tests.paper_cases import synthesised
 from tests.test_report import Page
 
-EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper.toml"
 HOSTILE = "<b>x</b> | `y`"
 
 
@@ -76,12 +73,11 @@ class Recipe:
 @pytest.fixture(scope="module")
 def plain() -> ReportData:
     """Two responses, three boards, no layers."""
-    catalog = load_catalog()
-    modelfile = read_model_file(EXAMPLE)
-    modelfile = replace(modelfile, responses=(modelfile.responses[0], modelfile.responses[2]))
-    found, design = pipeline.design_for(modelfile, catalog)
+    made = synthesised()
+    design, found = made.design, made.found[0:3:2]
+    modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
     checked = pipeline.check(design, found, None)
-    plan = pipeline.plan_study(modelfile, design, checked, catalog, samples=3, seed=1)
+    plan = pipeline.plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
     answers = tuple(block(plan, range(3), 2))
     return ReportData(
         modelfile,

@@ -41,7 +41,8 @@ from designer.study import Stores, Study, tolerance
 from designer.study_folder import NGSPICE
 from designer.study_work import Work
 from designer.verdict import BLOCK, Answer, Verdict
-from tests.model_text import PAPER_TABLE
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.quick_folders import without_starts
 from tests.test_verdict import plan
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -53,6 +54,7 @@ SMALL = (
 omega = 0.85
 expect = "1-2-2"
 """
+    + COARSE_CIRCUIT
 )
 
 
@@ -537,6 +539,7 @@ def test_a_deleted_folder_is_said_at_the_next_block(
         return rows
 
     monkeypatch.setattr(Samples, "__call__", deleted)
+    without_starts(monkeypatch)
     assert cli.status([*_words(home, out), "-q"]) == 2
     assert "the folder" in capfd.readouterr().err
     assert not out.exists()

@@ -34,7 +34,7 @@ from designer.system import Drive
 from designer.trust import Trust
 from designer.verdict import Yield
 from designer.waveform_orbit import Read
-from tests.model_text import PAPER_TABLE
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 STIFFEST = 1.0 - 2.0**-52
 """The stiffest stop but one that a double can ask for: one impact excites 7e7 of the frequency."""
@@ -310,6 +310,7 @@ SMALL = (
 omega = 0.85
 expect = "1-2-2"
 """
+    + COARSE_CIRCUIT
 )
 
 
