@@ -13,7 +13,7 @@ import pytest
 
 from designer.catalog import load_catalog
 from designer.cure import cure
-from designer.cure_branch import KINDS, PLACE
+from designer.cure_branch import KINDS, PLACE, TRIMMER
 from designer.cure_study import asked, plan_of
 from designer.folder import MODEL
 from designer.job import read_design, synthesise_into
@@ -123,3 +123,14 @@ def test_another_b_alone(tmp_path: Path) -> None:
     plan = plan_of(made, question, FRESH.seed)
     along = yield_map(plan, 0, "omega", 0.25, values=(0.2125, 0.215, 0.2175), samples=50)
     assert along.rate.max() < 0.8
+
+
+@pytest.mark.slow
+def test_the_fitted_trimmer_alone(tmp_path: Path) -> None:
+    found = whole(tmp_path, text(0.215, "1-8-8", 0.262, "rectifier"), TRIMMER, 0.9)
+    assert changed(found) == {"trimmer": True}
+    assert found.answer["price"] > 0.0
+    before, after = studied(found.design), studied(found.cured)
+    is_kept(found, before["yield"], after["trimmed"])
+    # As built, the boards of both folders are the same ones.
+    assert after["yield"] == before["yield"]
