@@ -36,7 +36,7 @@ from designer.upgrade import Upgrades
 
 CURE, STUDIES = "cure.json", "cure-studies.json"
 FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
-RULES = 4
+RULES = 5
 """Raised whenever the same inputs are to give another answer."""
 
 

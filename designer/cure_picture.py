@@ -10,7 +10,7 @@ grades. z depends a little on the choice, so it is taken again of each choice th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -239,6 +239,7 @@ def picture(
     *,
     trim: float,
     without: frozenset[str] = frozenset(),
+    missed: Collection[int] = (),
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> Picture | None:
@@ -246,7 +247,8 @@ def picture(
 
     The response that the fewest boards show is looked at first, and where all its ways are hopeless
     the branch is, and no more of it is looked at. trim : half-width of the band of the DC offset.
-    without : kinds of upgrades that are not wanted. progress : called once a piece of work.
+    without : kinds of upgrades that are not wanted. missed : responses that were measured to miss
+    the target on this branch as it is. progress : called once a piece of work.
     """
     made = branch.made
     parts = (*part_slots(made, without), *network_slots(made, without))
@@ -257,7 +259,7 @@ def picture(
     best = tuple(
         StudyPlan(*bare.spread(pick), seed, SAMPLES, ()) for pick in finest(parts, made.catalog)
     )
-    looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress)
+    looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress, missed)
     rows = [[looker.seen(Way(r, "as it is", question))] for r, question in enumerate(questions)]
     order = sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r))
     firsts = [rows[r][0] for r in order]
@@ -276,7 +278,7 @@ def picture(
         out = all(way.hopeless for way in rows[r]) and fitted() is None
         if out:
             break
-    enough = [row[0].rate >= target or any(way.certain for way in row) for row in rows]
+    enough = [looker.enough(row[0]) or any(way.certain for way in row) for row in rows]
     if not out and not all(enough) and (trimmer := fitted()) is not None:
         parts = (*parts, trimmer[0])
         for way in trimmer[1]:

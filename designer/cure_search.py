@@ -157,6 +157,7 @@ class _Search:
         while (made := self._next_branch(None if best is None else best[0])) is not None:
             self.said.stage(f"margins, {made.name}")
             step = self.said.stage(f"linear picture, {made.name}")
+            measured = self.before.measured if made.upgrades == Upgrades() else ()
             found = picture(
                 made,
                 self.target,
@@ -164,6 +165,7 @@ class _Search:
                 self.book,
                 trim=self.trim,
                 without=self.without,
+                missed=[r for r, m in enumerate(measured) if m.missed],
                 jobs=self.jobs,
                 progress=step,
             )

@@ -10,7 +10,7 @@ is needed then, nor of a branch all of whose ways to one response are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from designer.margins import Margin
 from designer.spread import Spread, draw_many
 from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
 from designer.verdict import Answer, Question, StudyPlan, Verdict, count, judge
-from designer.yield_maps import YieldMap, yield_map
+from designer.yield_maps import DOUBTED, YieldMap, yield_map
 
 SAMPLES = 250
 """Boards on which a way is looked at: their verdicts choose the limits of its picture."""
@@ -36,8 +36,6 @@ FAINT = 0.5
 """Share of boards below which the best place is sought with the best parts instead."""
 RARE = 1e-3
 """Chance of as many lost boards under the target at which a way is hopeless."""
-DOUBTED = 10
-"""Boards left open by the forecast that are settled before the others are taken for lost."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,8 @@ class Looker:
     """Looks for the ways of a branch's responses.
 
     target : yield wanted. trim : half-width of the DC offset's band. best : studies of boards with
-    the best parts that can be bought, of no question yet: single ones, then arrays.
+    the best parts that can be bought, of no question yet: single ones, then arrays. missed :
+    responses that are known to miss the target as they are, whatever the look at few boards says.
     """
 
     branch: Branch
@@ -125,6 +124,7 @@ class Looker:
     best: tuple[StudyPlan, ...]
     jobs: int
     progress: Callable[[], None]
+    missed: Collection[int] = ()
 
     @property
     def plan(self) -> StudyPlan:
@@ -184,11 +184,15 @@ class Looker:
     def _too_many(self, lost: int, total: int) -> bool:
         return bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
 
+    def enough(self, first: Way) -> bool:
+        """Whether a response needs no way but ``first``, the one as it is."""
+        return first.rate >= self.target and first.response not in self.missed
+
     def ways(self, first: Way) -> list[Way]:
         """A response's ways, ``first`` the one as it is. What asks more of people is looked for
         only where nothing before it is certain."""
         row = [self.bounded(first)]
-        if first.rate >= self.target:
+        if self.enough(first):
             return row
         plan = plan_of(self.branch.made, first.question, self.seed)
         if PLACE not in self.without:

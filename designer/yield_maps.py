@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ REACH = 0.3
 """Relative: how far from the setting in use a window is followed."""
 HALVINGS = 6
 """Of the last step, at each edge."""
+DOUBTED = 10
+"""Boards left open by a forecast that are settled before the others are taken for lost."""
 NEARLY_SYMMETRIC = 0.01
 """Of the peak: a nominal orbit below it is past its pitchfork; bias currents leave it so much."""
 SEED_SHIFT = 1_000_003
@@ -187,7 +189,8 @@ def yield_map(
 
     b : the clearance that the question's amplitude stands for. values : of ω or b; by default
     ``points`` across the nominal circuit's window and the setting in use. samples : boards at each
-    point. quick : a forecast, in which what ``Ensemble.quick`` leaves open is lost.
+    point. quick : a forecast: the boards that ``Ensemble.quick`` leaves open at a setting are lost
+    if none of the first few of them (``DOUBTED``) shows the response once it is settled.
     progress : called once an attractor.
 
     Raises
@@ -219,25 +222,28 @@ def yield_map(
     chosen: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
     shape = (len(settings), len(chosen))
     counts = {name: np.zeros(shape, dtype=np.int64) for name in _COUNTS}
+    how = question, jobs, progress
     for column, grade in enumerate(chosen):
         spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
         ensemble = Ensemble(draw_many(plan.circuit, spread, seed, range(samples)))
-        tasks = [(i, k) for k in range(samples) for i, o in enumerate(orbits) if o is not None]
-        starts = {i: o.start for i, o in enumerate(orbits) if o is not None}
         drives = [walk.drive(value) for value in settings]
-        ask: Callable[..., Sequence[Orbit | None]] = ensemble.quick if quick else ensemble.settle
-        found = ask(
-            [k for _, k in tasks],
-            [drives[i] for i, _ in tasks],
-            np.array([starts[i] for i, _ in tasks]),
-            jobs=jobs,
-            progress=progress,
-        )
-        for (i, _), orbit in zip(tasks, found, strict=True):
-            verdict = Verdict.LOST
-            if orbit is not None:
-                verdict = judge(orbit, question.spec, question.start)[0]
-            counts[str(verdict)][i, column] += 1
+        tasks = [
+            _Task(i, k, drives[i], o.start)
+            for k in range(samples)
+            for i, o in enumerate(orbits)
+            if o is not None
+        ]
+        found = _verdicts(ensemble.quick if quick else ensemble.settle, tasks, *how)
+        for i in range(len(settings)):
+            left = [t for t, task in enumerate(tasks) if task.setting == i and found[t] is None]
+            for some in (left[:DOUBTED], left[DOUBTED:]):
+                said = _verdicts(ensemble.settle, [tasks[t] for t in some], *how)
+                for t, verdict in zip(some, said, strict=True):
+                    found[t] = verdict
+                if Verdict.OK not in said:
+                    break
+        for task, verdict in zip(tasks, found, strict=True):
+            counts[str(verdict or Verdict.LOST)][task.setting, column] += 1
         walk.spent += len(tasks)
     there = np.tile(np.array([[o is not None] for o in orbits]), (1, len(chosen)))
     axes: tuple[Axis, ...] = (Axis("b" if over == "b" else "omega", tuple(settings)),)
@@ -264,6 +270,33 @@ def yield_map(
         seconds=time.perf_counter() - began,
         frequency=question.excitation.frequency,
     )
+
+
+class _Task(NamedTuple):
+    """A board to be asked, at a setting of this number."""
+
+    setting: int
+    board: int
+    drive: Drive
+    start: Array
+
+
+def _verdicts(
+    ask: Callable[..., Sequence[Orbit | None]],
+    tasks: Sequence[_Task],
+    question: Question,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Verdict | None]:
+    """Of each task; None where ``ask`` leaves it open."""
+    found = ask(
+        [t.board for t in tasks],
+        [t.drive for t in tasks],
+        np.array([t.start for t in tasks]),
+        jobs=jobs,
+        progress=progress,
+    )
+    return [None if o is None else judge(o, question.spec, question.start)[0] for o in found]
 
 
 class _Walk:

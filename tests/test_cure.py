@@ -3,12 +3,13 @@ whole one."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import itertools
 import json
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -138,10 +139,14 @@ def by_hand(nominal: float) -> float:
 
 
 def searched(
-    monkeypatch: pytest.MonkeyPatch, picture: Picture, real: Any, budget: float | None = None
+    monkeypatch: pytest.MonkeyPatch,
+    picture: Picture | Callable[..., Picture],
+    real: Any,
+    budget: float | None = None,
 ) -> Cure:
     """The search with this picture, where ``real`` is what studies measure."""
-    monkeypatch.setattr(cure_search, "picture", lambda *_, **__: picture)
+    taken = (lambda *_, **__: picture) if isinstance(picture, Picture) else picture
+    monkeypatch.setattr(cure_search, "picture", taken)
     monkeypatch.setattr(cure_search, "measure", real)
     monkeypatch.setattr(cure_study, "measure", real)  # as measure_together calls it
     monkeypatch.setattr(cure_search, "asked", lambda *_: [bench_plans.question(1)])
@@ -204,6 +209,25 @@ def test_out_of_reach_and_over_the_budget_are_told_apart(monkeypatch: pytest.Mon
     assert not dear.reached
     assert dear.why == f"the cheapest choice that may be enough costs {least:.2f} euro"
     assert searched(monkeypatch, known_picture(5.5), truth(5.5), least).reached
+
+
+@pytest.mark.parametrize(("nominal", "missed"), [(2.0, [0]), (60.0, None)])
+def test_the_picture_knows_what_missed(
+    monkeypatch: pytest.MonkeyPatch, nominal: float, missed: list[int] | None
+) -> None:
+    """None where every response is there already: no picture is taken."""
+    told = []
+
+    class _Taken(Exception):
+        pass
+
+    def taken(*_: object, missed: list[int], **__: object) -> Picture:
+        told.append(missed)
+        raise _Taken
+
+    with contextlib.suppress(_Taken):
+        searched(monkeypatch, taken, truth(nominal))
+    assert told == ([] if missed is None else [missed])
 
 
 @cache

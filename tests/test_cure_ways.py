@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -14,7 +15,8 @@ from designer import cure_ways
 from designer.attractor import settle
 from designer.circuit import nominal_board
 from designer.coefficients import coefficient_errors
-from designer.cure_study import Book
+from designer.cure_branch import PLACE
+from designer.cure_study import Book, Measured
 from designer.cure_ways import FEW, RARE, Looker, Way, drawn, forecast, foretold, settled
 from designer.deck import Excitation
 from designer.flow import Flow
@@ -22,7 +24,7 @@ from designer.model import Dimensionless
 from designer.modelfile import Expect, Response
 from designer.reduction import Reduction
 from designer.spread import Spread
-from designer.verdict import Question, StudyPlan, Verdict
+from designer.verdict import Question, StudyPlan, Verdict, Yield
 from tests.test_coefficients import exact_for_paper
 from tests.test_reduction import circuit_of
 
@@ -129,3 +131,22 @@ def test_a_way_that_lost_no_board_is_not_bounded(monkeypatch: pytest.MonkeyPatch
     sure = Way(0, "omega", cast(Any, None), rate=1.0)
     assert looker(monkeypatch, {0: FEW}, Verdict.LOST).bounded(sure) is sure
     assert sure.certain
+
+
+@pytest.mark.parametrize(("missed", "kinds"), [((), 1), ((0,), 2), ((1,), 1)])
+def test_what_was_measured_to_miss_gets_further_ways(
+    monkeypatch: pytest.MonkeyPatch, missed: tuple[int, ...], kinds: int
+) -> None:
+    """Though few boards showed it often enough."""
+    nothing = cast(Any, None)
+    monkeypatch.setattr(cure_ways, "plan_of", lambda *_: nothing)
+    monkeypatch.setattr(
+        cure_ways, "measure", lambda *_, **__: Measured(Yield(100, 0, 0, 0), TARGET)
+    )
+    branch = cast(Any, SimpleNamespace(made=nothing))
+    looker = Looker(
+        branch, TARGET, 1, Book(), 0.05, frozenset({PLACE}), (), 1, lambda: None, missed
+    )
+    found = looker.ways(Way(0, "as it is", nothing, rate=1.0))
+    assert [way.kind for way in found] == ["as it is", "trim"][:kinds]
+    assert not any(way.hopeless for way in found)

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from designer import yield_maps
 from designer.attractor import coexisting, settle, starts
 from designer.circuit import nominal_board
+from designer.ensemble import Ensemble
 from designer.errors import InputError
 from designer.flow import Flow
 from designer.map_files import files
@@ -78,6 +80,23 @@ def test_a_point_is_what_its_boards_do_from_the_nominal_orbit_there() -> None:
         counted = found.at(i)
         assert found.there[i]
         assert (counted.ok, counted.lost) == (tally[Verdict.OK], tally[Verdict.LOST])
+
+
+def test_boards_that_a_forecast_leaves_open_are_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here all of them, as in a design whose boards reach a mode that the compiled way lacks. A
+    setting at which the first board shows the response is as in the plain map; at another one
+    all are lost."""
+    monkeypatch.setattr(yield_maps, "DOUBTED", 1)
+    monkeypatch.setattr(Ensemble, "quick", lambda _, which, *__, **___: [None] * len(which))
+
+    def mapped(samples: int, quick: bool) -> YieldMap:
+        values = (*over_omega().axes[0].values, 1.06 * over_omega().axes[0].values[-1])
+        return yield_map(plan(), 0, "omega", B, values=values, samples=samples, quick=quick, jobs=2)
+
+    plain, first, found = mapped(8, False), mapped(1, False), mapped(8, True)
+    assert np.count_nonzero(first.ok) > 0
+    assert (found.ok == np.where(first.ok, plain.ok, 0)).all()
+    assert (found.ok + found.lost + found.grazing == 8 * found.there).all()
 
 
 def test_the_window_ends_where_the_nominal_circuit_loses_the_response() -> None:
