@@ -58,7 +58,8 @@ def with_trade(path: Path, rung: str, stage: StageName = "design", model: str = 
         folder.finish(stage)
     folder.begin({"trade": ({}, ["trade.json"])}, {})
     row = {"question": SHARE, "of": IDEAL, "rung": rung, "measured": 0.005, "bound": 0.01}
-    folder.write("trade.json", dumps({"format": 1, "cheapest": [row]}))
+    said = {"format": 1, "cheapest": [row], "rungs": [], "truths": []}
+    folder.write("trade.json", dumps(said))
     folder.finish("trade")
     return folder
 
