@@ -40,21 +40,13 @@ from designer.modelfile import parse_model_file
 from designer.reduction import Reduction
 from designer.stage_names import stage_names
 from designer.views import View
+from tests.model_text import PAPER_TABLE
 from tests.stages import CATALOG
 from tests.test_views import CIRCUITS
 
 CHOICE = BoardChoice()
 FITTED = replace(CHOICE, spec=replace(CHOICE.spec, dc_trim="fitted"))
-MODEL = """format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-"""
+MODEL = "format = 1\n" + PAPER_TABLE
 
 
 def of(circuit: Circuit, kind: type[Fitting]) -> list[Fitting]:

@@ -20,22 +20,11 @@ import pytest
 from designer import __version__, cli
 from designer.ngspice import open_simulator
 from designer.setup_table import COLUMNS
-from tests.model_text import COARSE_CIRCUIT
+from tests.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parent.parent
 HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [bold] ${HOME}"
-BASE = f"""\
-format = 1
-title = "{HOSTILE}"
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-"""
+BASE = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}'
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 SMALL = BASE + WANTED
 SAMPLES = 60

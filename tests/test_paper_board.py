@@ -17,22 +17,15 @@ from designer.modelfile import parse_model_file
 from designer.paper_design import MODEL, OPAMP, circuit, corrected, rounded
 from designer.rule_subject import Subject
 from tests.kicad_cases import RUN
+from tests.model_text import PAPER_TABLE
 from tests.rule_cases import subject_of
 from tests.stages import CATALOG
 from tests.test_views import CIRCUITS
 
-TEXT = """
+TEXT = f"""
 format = 1
 title = "the paper's values"
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-"""
+{PAPER_TABLE}"""
 UNSOLD = 1e-7
 """A grade at which no resistor is sold."""
 

@@ -16,18 +16,9 @@ from designer import cli, flow, parse_model_file, simulate_plots, simulation
 from designer.flow import Flow
 from designer.model import Dimensionless
 from designer.system import Drive
+from tests.model_text import PAPER_TABLE
 
-BASE = """\
-format = 1
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-"""
+BASE = "format = 1\n" + PAPER_TABLE
 REQUIRED = (
     "omega response status symmetric x1_max x1_min impact_velocities multipliers lyapunov others "
     "cost"

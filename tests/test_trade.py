@@ -61,20 +61,13 @@ from designer.trade_rungs import Answer
 from designer.trade_yield import BoardTrade, LeftOut, Tally
 from designer.waveform_orbit import Read
 from designer.workers import SpicePool
+from tests.model_text import PAPER_TABLE
 from tests.paper_cases import synthesised
 
 WAVEFORM = np.sin(2.0 * np.pi * np.arange(POINTS) / POINTS)
-MODEL = """format = 1
+MODEL = f"""format = 1
 title = "one response"
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-[[response]]
+{PAPER_TABLE}[[response]]
 omega = 1.55
 expect = "1-1-1"
 """
