@@ -213,53 +213,64 @@ def confirm(
     not settled: it is made again, longer (`longer`). Neither is done where it would take more than
     `MOST_AGAIN` periods' steps. ``progress`` is called once a query.
     """
-    queries = list(queries)
     heard: list[Heard | None] = [None] * len(queries)
-    answered: list[str | None] = [None] * len(queries)
-    halved = [0] * len(queries)
-    asked = list(range(len(queries)))
-    settings = [q.settings for q in queries]
+    asked = [_Try(k, q.subject, q.settings) for k, q in enumerate(queries)]
     while asked:
         # The longest first: the workers then end together.
-        asked.sort(key=lambda k: (-_steps(queries[k].subject, settings[k]), k))
-        tasks = [gate.task(queries[k].subject, settings[k]) for k in asked]
+        asked.sort(key=lambda one: (-one.steps, one.query))
         again = []
-        for i, outcome in remedies.run(pool, tasks):
-            k = asked[i]
-            query, before, said = queries[k], answered[k], _heard(outcome)
-            more, fine = longer(query.subject), 2 ** halved[k]
-            if (
-                said.response == OrbitStatus.NOT_SETTLED
-                and query.subject.judged < LONG
-                and fine * gate.length(more) <= MOST_AGAIN
-            ):
-                queries[k] = replace(query, subject=more)
-                again.append(k)
-                continue
-            none = not is_answer(said.response)
-            settled = not none and said.response == (before or query.expected)
-            dear = 2 * fine * gate.length(query.subject) > MOST_AGAIN
-            if settled or dear or halved[k] == query.refinements:
-                heard[k] = said if settled or none else _undecided(before, said)
-                progress()
+        for i, outcome in remedies.run(pool, [gate.task(t.subject, t.settings) for t in asked]):
+            tried = asked[i]
+            follows = _after(tried, queries[tried.query], _heard(outcome))
+            if isinstance(follows, _Try):
+                again.append(follows)
             else:
-                settings[k] = replace(settings[k], max_step=settings[k].max_step / 2.0)
-                halved[k] += 1
-                again.append(k)
-            answered[k] = before if none else said.response
+                heard[tried.query] = follows
+                progress()
         asked = again
     return [h for h in heard if h is not None]
+
+
+@dataclass(frozen=True)
+class _Try:
+    """A run to be made. query : its number. halved : how often its step has been. before : the last
+    answer at a larger step, None where there was none."""
+
+    query: int
+    subject: Subject
+    settings: SolverSettings
+    halved: int = 0
+    before: str | None = None
+
+    @property
+    def steps(self) -> float:
+        """Steps of the run, which its time goes with."""
+        return gate.length(self.subject) * self.subject.period / self.settings.max_step
+
+
+def _after(tried: _Try, query: Query, said: Heard) -> _Try | Heard:
+    """What is asked next, or what is heard in the end."""
+    none = not is_answer(said.response)
+    if not none and said.response == (tried.before or query.expected):
+        return said
+    fine, more = 2**tried.halved, longer(tried.subject)
+    if (
+        said.response == OrbitStatus.NOT_SETTLED
+        and tried.subject.judged < LONG
+        and fine * gate.length(more) <= MOST_AGAIN
+    ):
+        return replace(tried, subject=more)
+    if tried.halved < query.refinements and 2 * fine * gate.length(tried.subject) <= MOST_AGAIN:
+        half = replace(tried.settings, max_step=tried.settings.max_step / 2.0)
+        before = tried.before if none else said.response
+        return replace(tried, settings=half, halved=tried.halved + 1, before=before)
+    return said if none else _undecided(tried.before, said)
 
 
 def longer(subject: Subject) -> Subject:
     """Twice the way and `STRETCH` more, and `LONG` periods to judge: what had not settled may have
     been on its way yet, or have a period or none that a few strobes do not show."""
     return replace(subject, discard=2 * subject.discard + STRETCH, judged=LONG)
-
-
-def _steps(subject: Subject, settings: SolverSettings) -> float:
-    """Steps of a run, which its time goes with."""
-    return gate.length(subject) * subject.period / settings.max_step
 
 
 def _undecided(before: str | None, said: Heard) -> Heard:

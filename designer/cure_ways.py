@@ -24,7 +24,7 @@ from designer.margins import Margin
 from designer.spread import Spread, draw_many
 from designer.upgrade import Place, Upgrades, upgraded_file, with_parts_kept
 from designer.verdict import Answer, Question, StudyPlan, Verdict, count, judge
-from designer.yield_maps import DOUBTED, YieldMap, yield_map
+from designer.yield_maps import YieldMap, settle_open, yield_map
 
 SAMPLES = 250
 """Boards on which a way is looked at: their verdicts choose the limits of its picture."""
@@ -93,12 +93,7 @@ def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
     of the open ones have been settled and none shows the response."""
     found = forecast(boards, question, jobs)
     left = [k for k, verdict in enumerate(found) if verdict is None]
-    for some in (left[:DOUBTED], left[DOUBTED:]):
-        said = settled(boards.take(some), question, jobs) if some else []
-        for k, verdict in zip(some, said, strict=True):
-            found[k] = verdict
-        if Verdict.OK not in said:
-            break
+    settle_open(found, left, lambda some: settled(boards.take(some), question, jobs))
     nan = float("nan")
     return [
         Answer(sample, 0, verdict or Verdict.LOST, "", "", nan, nan, nan, nan, 0)

@@ -45,6 +45,15 @@ class Kind(StrEnum):
     NOMINAL = "nominal"
 
 
+class Outcome(StrEnum):
+    """What became of asking ngspice for the response that the exact rung names."""
+
+    AGREED = "agreed"
+    DIFFERED = "differed"
+    UNDECIDED = "undecided"
+    FAILED = "failed"
+
+
 class Why(StrEnum):
     """Why a sample was asked about."""
 
@@ -99,6 +108,13 @@ class Hearing:
             return self.response == answer.response
         said = _both(self.either)
         return False if said and answer.response not in said else None
+
+    def outcome(self, answer: Answer) -> Outcome:
+        """`FAILED` where there is no answer at all."""
+        same = self.agrees(answer)
+        if same is None:
+            return Outcome.UNDECIDED if self.response == UNDECIDED else Outcome.FAILED
+        return Outcome.AGREED if same else Outcome.DIFFERED
 
     def survives(self, question: Question) -> bool | None:
         """Whether the board shows the wanted response in ngspice; None where it does not say."""

@@ -13,7 +13,7 @@ from typing import Any
 from designer import report_words as words
 from designer.folder import TOLERANCE
 from designer.gate import shortest_contact
-from designer.hearing import UNDECIDED, Kind
+from designer.hearing import Kind, Outcome
 from designer.orbit import OrbitStatus
 from designer.pipeline import Checked, nominal_reduction
 from designer.report_data import ReportData
@@ -126,28 +126,17 @@ def ngspice_table(data: ReportData) -> Table | None:
             asked = [h for h in data.heard_of(i) if h.kind is kind and h.response]
             if not asked:
                 continue
-            agrees = [h.agrees(known[h.sample]) for h in asked]
-            open_ = Counter(
-                h.reason
-                for h, same in zip(asked, agrees, strict=True)
-                if h.response == UNDECIDED and same is None
-            )
-            failed = Counter(
-                h.reason or "no reason given"
-                for h in asked
-                if not h.decided and h.response != UNDECIDED
-            )
-            differ = Counter(
-                f"{known[h.sample].response} but {h.either or h.response}"
-                for h, same in zip(asked, agrees, strict=True)
-                if same is False
-            )
-            agreed = sum(same is True for same in agrees)
-            notes = [
-                f"{t} ({n})" for t, n in sorted([*differ.items(), *open_.items(), *failed.items()])
-            ]
-            counts = (agreed, *(sum(counted.values()) for counted in (differ, open_, failed)))
-            said_ = ", ".join(notes[:REASONS_SHOWN])
+            notes: dict[Outcome, Counter[str]] = {one: Counter() for one in Outcome}
+            for h in asked:
+                answer = known[h.sample]
+                outcome = h.outcome(answer)
+                differs = f"{answer.response} but {h.either or h.response}"
+                note = differs if outcome is Outcome.DIFFERED else h.reason or "no reason given"
+                notes[outcome][note] += 1
+            counts = [notes[one].total() for one in Outcome]
+            del notes[Outcome.AGREED]
+            told = sorted((t, n) for counted in notes.values() for t, n in counted.items())
+            said_ = ", ".join(f"{t} ({n})" for t, n in told[:REASONS_SHOWN])
             rows.append((words.name(c), start, *map(str, (len(asked), *counts)), said_))
     if not rows:
         return None

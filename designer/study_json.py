@@ -11,7 +11,7 @@ import numpy as np
 
 from designer.combined import Combined
 from designer.equation_check import EquationCheck
-from designer.hearing import UNDECIDED, Hearing
+from designer.hearing import Hearing, Outcome
 from designer.jsonout import FORMAT
 from designer.pipeline import Checked
 from designer.reached import Reached
@@ -171,15 +171,9 @@ def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str,
     known = {a.sample: a for a in answers}
 
     def of(kind: str) -> dict[str, Any]:
-        asked = [h for h in heard if h.kind == kind and h.response]
-        return {
-            "asked": len(asked),
-            "agreed": sum(h.agrees(known[h.sample]) is True for h in asked),
-            "failed": sum(h.response == "failed" for h in asked),
-            "undecided": sum(
-                h.response == UNDECIDED and h.agrees(known[h.sample]) is None for h in asked
-            ),
-        }
+        asked = [h.outcome(known[h.sample]) for h in heard if h.kind == kind and h.response]
+        counted = (Outcome.AGREED, Outcome.FAILED, Outcome.UNDECIDED)
+        return {"asked": len(asked), **{str(one): asked.count(one) for one in counted}}
 
     too_long = [h for h in heard if not h.response]
     return {

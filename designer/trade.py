@@ -152,15 +152,13 @@ def _competes(rung: str, of: str, picked: Sequence[Compared]) -> bool:
 
 
 def _error(question: str, of: str, row: Compared, truth: Truth) -> float:
-    """With the truth's own uncertainty; infinite where it cannot be said."""
-    board = of == BOARD
-    right = row.right[of] and (truth.sure or not board)
+    """With the uncertainty of a truth that is sure; infinite where it cannot be said."""
     if question == RESPONSE:
-        return 0.0 if right else 1.0
+        return 0.0 if row.right[of] else 1.0
     own = row.velocity if question == IMPACT else row.error
-    beside = (truth.velocity if question == IMPACT else truth.error) if board else 0.0
+    beside = (truth.velocity if question == IMPACT else truth.error) if of == BOARD else 0.0
     total = own[of] + beside
-    return total if right and total == total else math.inf
+    return total if row.right[of] and total == total else math.inf
 
 
 def _of_boards(responses: Sequence[Response]) -> list[Cheapest]:

@@ -222,7 +222,6 @@ def yield_map(
     chosen: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
     shape = (len(settings), len(chosen))
     counts = {name: np.zeros(shape, dtype=np.int64) for name in _COUNTS}
-    how = question, jobs, progress
     for column, grade in enumerate(chosen):
         spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
         ensemble = Ensemble(draw_many(plan.circuit, spread, seed, range(samples)))
@@ -233,15 +232,7 @@ def yield_map(
             for i, o in enumerate(orbits)
             if o is not None
         ]
-        found = _verdicts(ensemble.quick if quick else ensemble.settle, tasks, *how)
-        for i in range(len(settings)):
-            left = [t for t, task in enumerate(tasks) if task.setting == i and found[t] is None]
-            for some in (left[:DOUBTED], left[DOUBTED:]):
-                said = _verdicts(ensemble.settle, [tasks[t] for t in some], *how)
-                for t, verdict in zip(some, said, strict=True):
-                    found[t] = verdict
-                if Verdict.OK not in said:
-                    break
+        found = _answered(ensemble, tasks, quick, question, jobs, progress)
         for task, verdict in zip(tasks, found, strict=True):
             counts[str(verdict or Verdict.LOST)][task.setting, column] += 1
         walk.spent += len(tasks)
@@ -270,6 +261,43 @@ def yield_map(
         seconds=time.perf_counter() - began,
         frequency=question.excitation.frequency,
     )
+
+
+def _answered(
+    ensemble: Ensemble,
+    tasks: Sequence[_Task],
+    quick: bool,
+    question: Question,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Verdict | None]:
+    """Of each task; None where a forecast left it open to the last."""
+
+    def settle(some: Sequence[int]) -> list[Verdict | None]:
+        return _verdicts(ensemble.settle, [tasks[t] for t in some], question, jobs, progress)
+
+    if not quick:
+        return settle(range(len(tasks)))
+    found = _verdicts(ensemble.quick, tasks, question, jobs, progress)
+    for setting in dict.fromkeys(task.setting for task in tasks):
+        left = [t for t, task in enumerate(tasks) if task.setting == setting and found[t] is None]
+        settle_open(found, left, settle)
+    return found
+
+
+def settle_open(
+    found: list[Verdict | None],
+    left: Sequence[int],
+    settle: Callable[[Sequence[int]], Sequence[Verdict | None]],
+) -> None:
+    """Of the verdicts that a forecast leaves open, at these places, the first `DOUBTED` are put in
+    by ``settle``; the others too if one of those is ok."""
+    for some in (left[:DOUBTED], left[DOUBTED:]):
+        said = settle(some) if some else []
+        for k, verdict in zip(some, said, strict=True):
+            found[k] = verdict
+        if Verdict.OK not in said:
+            break
 
 
 class _Task(NamedTuple):
