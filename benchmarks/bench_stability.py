@@ -172,7 +172,7 @@ def board_lines(rows: Sequence[Row]) -> list[str]:
         if boards is None:
             continue
         same = sum(a == b for a, b in zip(boards["asked"], boards["ngspice"], strict=True))
-        rms = f"; RMS of the wave at most {boards['rms'][-1]:.1g}" if boards["rms"] else ""
+        rms = f"; RMS of the wave at most {_up(boards['rms'][-1])}" if boards["rms"] else ""
         shown = ", ".join(f"{r} ({n})" for r, n in Counter(boards["exact"]).most_common())
         out.append(
             f"- {100 * row['value']:g} %: {len(boards['exact'])} boards show "
@@ -312,6 +312,8 @@ def _short(reason: str) -> str:
 
 def _up(value: float) -> str:
     """To one figure, never less than it is."""
+    if value == 0.0:
+        return "0"
     power = math.floor(math.log10(value))
     return f"{math.ceil(value / 10.0**power - 1e-9) * 10.0**power:.1g}"
 

@@ -137,6 +137,14 @@ def test_agreement_and_survival() -> None:
         open_ = replace(HEARD, response="undecided", either=either)
         assert open_.survives(question()) is shown
         assert open_.agrees(BLANK) is shown  # which is what is wanted
+    for said, outcome in (
+        ("1-2-2", "agreed"),
+        ("1-1-1", "differed"),
+        ("undecided", "undecided"),
+        ("failed", "failed"),
+        ("not settled", "failed"),
+    ):
+        assert replace(HEARD, response=said).outcome(BLANK) == outcome
     third = replace(HEARD, response="undecided", either="1-1-1 or 1-2-2")
     assert third.agrees(replace(BLANK, response="1-3-3")) is False
     assert third.survives(question()) is None
