@@ -18,19 +18,21 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
-from designer import exact, gate, remedies
-from designer.api import synthesise
-from designer.combined import Explanation, differences
-from designer.hearing import SLOW, Hearing, Kind
-from designer.jsonout import dumps
-from designer.modelfile import ModelFile, read_model_file
-from designer.ngspice import SimulationFailed
-from designer.preconditions import cores
-from designer.proportion import wilson
-from designer.study import Study, tolerance
-from designer.study_job import SPICE_TIMEOUT
-from designer.verdict import Answer
-from designer.workers import SpicePool
+from designer.base.checks import cores
+from designer.base.plain_json import dumps
+from designer.base.proportion import wilson
+from designer.check.synthesis_result import synthesise
+from designer.jobs.study_job import SPICE_TIMEOUT
+from designer.model.model_file import ModelFile, read_model_file
+from designer.spice import convergence_aids, numerics_gate
+from designer.spice.pool import SpicePool
+from designer.spice.simulator import SimulationFailed
+from designer.yields import exact_rung as exact
+from designer.yields.ngspice_sampling import SLOW, Hearing, Kind
+from designer.yields.study import Study
+from designer.yields.tolerance_study import tolerance
+from designer.yields.two_engine_yield import Explanation, differences
+from designer.yields.verdict import Answer
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "agreement"
@@ -163,7 +165,7 @@ def _at_finer_step(study: Study, number: int, said: Hearing, pool: SpicePool) ->
     assert subject is not None
     subject = replace(subject, start=question.start.start, discard=said.periods)
     settings = replace(question.settings, max_step=question.settings.max_step / FINER)
-    ((_, outcome),) = remedies.run(pool, [gate.task(subject, settings)])
+    ((_, outcome),) = convergence_aids.run(pool, [numerics_gate.task(subject, settings)])
     if isinstance(outcome.result, SimulationFailed):
         return f"failed: {outcome.result.reason}"
     return outcome.result.orbit.response

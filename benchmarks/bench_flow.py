@@ -24,9 +24,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.references import Heyoka, Problem, rk4, scipy_with_events, truth
-from designer.flow import Flow
-from designer.model import Dimensionless
-from designer.system import Array, Drive
+from designer.base.arrays import Array
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.model import Dimensionless
 
 FREQUENCIES = {1.55: 1, 0.54: 3, 0.215: 8}
 """Drive frequency and p of its 1-p-p response."""
@@ -139,9 +140,9 @@ def cold_compilation() -> tuple[float, float]:
     """Seconds to the first answer of both engines with an empty cache, and with a full one."""
     code = (
         "import numpy as np, time\n"
-        "from designer.flow import Flow\n"
-        "from designer.model import Dimensionless\n"
-        "from designer.system import Drive\n"
+        "from designer.dynamics.flow import Flow\n"
+        "from designer.model.model import Dimensionless\n"
+        "from designer.dynamics.piecewise_linear import Drive\n"
         "model = Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25)\n"
         "system = model.second_order().piecewise_linear()\n"
         "start = time.perf_counter()\n"

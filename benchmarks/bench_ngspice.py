@@ -29,19 +29,20 @@ from benchmarks.ngspice_figures import (
     warm,
     warm_job,
 )
-from designer import gate, pipeline
-from designer.api import Synthesis, synthesise
-from designer.deck import Excitation
-from designer.gate import WAVE_BOUND, GateResult, Subject
-from designer.jsonout import dumps
-from designer.modelfile import read_model_file
-from designer.ngspice import ngspice_version
-from designer.opamp_model import RUNGS
-from designer.preconditions import cores
-from designer.responses import on_circuit
-from designer.spread import Spread
-from designer.waveform_orbit import STROBE_TOLERANCE, Read
-from designer.workers import SpicePool
+from designer.base.checks import cores
+from designer.base.plain_json import dumps
+from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit import nominal
+from designer.circuit.netlist import Excitation
+from designer.circuit.nominal import on_circuit
+from designer.model.model_file import read_model_file
+from designer.spice import numerics_gate as gate
+from designer.spice.backends import ngspice_version
+from designer.spice.numerics_gate import WAVE_BOUND, GateResult, Subject
+from designer.spice.opamp_model import RUNGS
+from designer.spice.pool import SpicePool
+from designer.spice.read_orbit import STROBE_TOLERANCE, Read
+from designer.spread.spread import Spread
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "ngspice"
@@ -95,7 +96,7 @@ class Measured:
 
 def subjects(made: Synthesis) -> dict[int, tuple[float, Subject]]:
     """Drive frequency and nominal subject of each 1-p-p response, by p; the first where several."""
-    reduction = pipeline.nominal_reduction(made.design)
+    reduction = nominal.nominal_reduction(made.design)
     system = reduction.system()
     out: dict[int, tuple[float, Subject]] = {}
     for r in made.found:

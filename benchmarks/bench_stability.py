@@ -22,10 +22,10 @@ from benchmarks import stability_flow, stability_spice
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.stability_flow import SHOWN, by_axis, ratio, trusted
 from benchmarks.stability_pictures import flow_picture, spice_picture
-from designer.case_store import CaseStore
-from designer.jsonout import dumps, plain
-from designer.orbit import OrbitStatus
-from designer.workers import SpicePool
+from designer.base.plain_json import dumps, plain
+from designer.base.report_pieces import CaseStore
+from designer.dynamics.orbit import OrbitStatus
+from designer.spice.pool import SpicePool
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "stability"

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bench_flow import commit, machine, table
-from designer import parameter_map, sweep
-from designer.model import Dimensionless
-from designer.parameter_map import MapPlan
-from designer.preconditions import cores
-from designer.steady import Course, by_flow
-from designer.sweep import SweepPlan
-from designer.sweep_subject import ModelSubject
+from designer.base.checks import cores
+from designer.bifurcations import parameter_map, sweep
+from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.sweep import SweepPlan
+from designer.dynamics.steady_state import Course, by_flow
+from designer.model.model import Dimensionless
+from designer.model.swept_model import ModelSubject
 
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 COURSE = Course(settle=500, keep=30)

@@ -21,16 +21,16 @@ from matplotlib.figure import Figure
 import designer
 from benchmarks import rivals
 from benchmarks.bench_flow import commit, machine, table
-from designer.completion import Bounds, rules_of
-from designer.errors import InputError
-from designer.eseries import series_values
-from designer.linear_block import PARTS, Targets, catalogue
-from designer.linear_kernel import Rules, Values
-from designer.linear_search import LinearBlock, best
-from designer.model import Dimensionless
-from designer.modelfile import CircuitSpec, ModelFile, Response
-from designer.system import Array, Index
-from designer.wishes import NO_WISHES
+from designer.base.arrays import Array, Index
+from designer.base.errors import InputError
+from designer.base.eseries import series_values
+from designer.model.model import Dimensionless
+from designer.model.model_file import CircuitSpec, ModelFile, Response
+from designer.synthesis.kernel_linear import Rules, Values
+from designer.synthesis.linear_block import PARTS, Targets, catalogue
+from designer.synthesis.linear_rules import Bounds, rules_of
+from designer.synthesis.linear_search import LinearBlock, best
+from designer.synthesis.preferences import NO_WISHES
 
 TARGETS, SEED = 20, 2026
 SERIES = {"E24": ("E24",), "E96": ("E96",), "E192": ("E192",), "E24 ∪ E96": ("E24", "E96")}

@@ -22,20 +22,20 @@ from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.spicelib_runs import seconds_a_board
-from designer import exact, pipeline
-from designer.api import synthesise
-from designer.attractor import describe, shoot
-from designer.circuit import nominal_board
-from designer.deck import Excitation
-from designer.flow import Flow
-from designer.jsonout import dumps
-from designer.layers import Here, Samples
-from designer.modelfile import Expect, Response, read_model_file
-from designer.preconditions import cores
-from designer.reduction import Reduction
-from designer.responses import on_circuit
-from designer.spread import Spread, draw
-from designer.verdict import BLOCK, Question, StudyPlan, Verdict
+from designer.base.checks import cores
+from designer.base.plain_json import dumps
+from designer.check.synthesis_result import synthesise
+from designer.circuit import nominal
+from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.nominal import on_circuit
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import describe, shoot
+from designer.dynamics.flow import Flow
+from designer.model.model_file import Expect, Response, read_model_file
+from designer.spread.spread import Spread, draw
+from designer.yields import exact_rung, study_plan
+from designer.yields.layers import Here, Samples
+from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "tolerance-speed"
@@ -93,7 +93,7 @@ def plan_of(stage: str, most: int) -> StudyPlan:
     )
     file = replace(read_model_file(ROOT / "examples" / f"{stage}.toml"), responses=wanted)
     made = synthesise(file)
-    system = pipeline.nominal_reduction(made.design).system()
+    system = nominal.nominal_reduction(made.design).system()
     questions = tuple(
         Question(
             r.spec,
@@ -103,7 +103,7 @@ def plan_of(stage: str, most: int) -> StudyPlan:
         )
         for r in made.found
     )
-    plan = pipeline.plan_study(file, made.design, [], made.catalog, samples=0, seed=SEED)
+    plan = study_plan.plan_study(file, made.design, [], made.catalog, samples=0, seed=SEED)
     fine = FINE[stage]
     return replace(plan, questions=questions, spread=plan.spread if fine is None else fine)
 
@@ -148,7 +148,7 @@ def measure(
     for stage, plan in plans.items():
         for number, question in enumerate(plan.questions):
             asked = replace(plan, questions=(question,))
-            exact.block(asked, range(2), 1)  # compiled code, tables of the nominal board
+            exact_rung.block(asked, range(2), 1)  # compiled code, tables of the nominal board
             began, spent = time.perf_counter(), time.process_time()
             verdicts: Counter[Verdict] = Counter()
             longest = 0

@@ -11,17 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from designer import gate, warm_start
-from designer.circuit import Circuit
-from designer.deck import SolverSettings
-from designer.ensemble import Ensemble
-from designer.gate import Subject
-from designer.ngspice import SimulationFailed, Waveforms
-from designer.orbit import MAX_PERIOD
-from designer.spread import Spread, draw_many
-from designer.system import Array
-from designer.waveform_orbit import STROBE_TOLERANCE, Read
-from designer.workers import SpiceJob, SpicePool
+from designer.base.arrays import Array
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import Circuit
+from designer.dynamics.orbit import MAX_PERIOD
+from designer.spice import numerics_gate, settling_periods
+from designer.spice.deck import SolverSettings
+from designer.spice.job import SpiceJob
+from designer.spice.numerics_gate import Subject
+from designer.spice.pool import SpicePool
+from designer.spice.read_orbit import STROBE_TOLERANCE, Read
+from designer.spice.simulator import SimulationFailed, Waveforms
+from designer.spread.spread import Spread, draw_many
 
 SETTLED = 400
 """Drive periods of the run that a warm start is held against."""
@@ -59,7 +60,7 @@ def warm_job(subject: Subject, settings: SolverSettings, periods: int = SETTLED)
     """The run of a warm start; every strobe comes back."""
     n = max(subject.orbit.n, 1)
     long = replace(subject, discard=periods - 4 * n)
-    return gate.job(long, settings, whole=True)
+    return numerics_gate.job(long, settings, whole=True)
 
 
 def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
@@ -70,8 +71,8 @@ def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
     settled = np.median(strobes[: -last - 1 : -n], axis=0)
     gaps = (np.abs(strobes - settled) / peak).max(axis=1)
     far = np.flatnonzero(gaps > STROBE_TOLERANCE)
-    short = strobes[: warm_start.PROBE * n + 1]
-    predicted, _ = warm_start.periods(short, n, subject.orbit.radius, peak)
+    short = strobes[: settling_periods.PROBE * n + 1]
+    predicted, _ = settling_periods.periods(short, n, subject.orbit.radius, peak)
     moves = (np.abs(strobes[2 * n] - strobes[n]) / peak).max() / (1.0 - subject.orbit.radius)
     alone = max(np.log(STROBE_TOLERANCE / moves) / np.log(subject.orbit.radius), 0.0)
     return WarmStart(
@@ -122,13 +123,13 @@ def throughput(
     """All subjects through the pool, as the study does it (without its refinements)."""
     began = time.perf_counter()
     agreed = failed = 0
-    for i, heard in pool.map(gate.job(s, settings) for s in subjects):
+    for i, heard in pool.map(numerics_gate.job(s, settings) for s in subjects):
         if isinstance(heard, SimulationFailed):
             failed += 1
         else:
             agreed += heard.orbit.response == subjects[i].orbit.response
     seconds = time.perf_counter() - began
-    periods = float(np.mean([gate.length(s) for s in subjects]))
+    periods = float(np.mean([numerics_gate.length(s) for s in subjects]))
     return Throughput(len(subjects), jobs, seconds, agreed, failed, periods)
 
 
@@ -162,7 +163,7 @@ def resident_megabytes(waves: Waveforms, reduce: Callable[[Waveforms], object]) 
 
 def memory(subject: Subject, settings: SolverSettings, runs: int) -> list[float]:
     """Resident memory [MB] of one worker after each of so many runs."""
-    todo = gate.job(subject, settings)
+    todo = numerics_gate.job(subject, settings)
     look = partial(resident_megabytes, reduce=todo.reduce)
     one = SpiceJob(todo.netlist, todo.signals, todo.stop_time, look)
     out = []

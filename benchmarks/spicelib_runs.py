@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from designer.circuit import nominal_board
-from designer.deck import Excitation, SolverSettings, write
-from designer.gate import RELTOL, STEPS_PER_PERIOD
-from designer.verdict import StudyPlan
+from designer.circuit.netlist import Excitation, nominal_board
+from designer.spice.deck import SolverSettings, write
+from designer.spice.numerics_gate import RELTOL, STEPS_PER_PERIOD
+from designer.yields.verdict import StudyPlan
 
 
 def seconds_a_board(

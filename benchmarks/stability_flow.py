@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.references import Problem, truth
-from designer import trust
-from designer.attractor import peaks_near, settle
-from designer.flow import Flow, FlowStatus
-from designer.model import Dimensionless
-from designer.orbit import Orbit, OrbitStatus
-from designer.system import Array, Drive
+from designer.base.arrays import Array
+from designer.check import trust
+from designer.dynamics.attractors import peaks_near, settle
+from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.model import Dimensionless
 
 BASE = Problem(0.85)
 """The paper's case where it shows 1-2-2."""
@@ -115,7 +116,7 @@ def measure(scene: Scene) -> dict[str, Any]:
 
     error : of the last state, in units of each state's peak. magnification : the largest ‖Φ(t, s)‖
     between two events, times what a contact makes of a rounding error of the displacement. bound,
-    first_error : what ``designer.trust`` states of the first period, and its true error.
+    first_error : what ``check.trust`` states of the first period, and its true error.
     """
     start = scene.scale * START
     flow = flow_of(scene.problem)

@@ -11,16 +11,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from designer import equation_check, exact, gate, pipeline, remedies, trust
-from designer.api import Synthesis, synthesise
-from designer.deck import Excitation
-from designer.errors import InputError
-from designer.modelfile import parse_model_file
-from designer.ngspice import SimulationFailed
-from designer.opamp_model import Rung
-from designer.orbit import OrbitStatus
-from designer.responses import circuit_flow, on_circuit
-from designer.workers import SpicePool
+from designer.base.errors import InputError
+from designer.check import checked_design, trust
+from designer.check.synthesis_result import Synthesis, synthesise
+from designer.circuit import nominal
+from designer.circuit.netlist import Excitation
+from designer.circuit.nominal import circuit_flow, on_circuit
+from designer.dynamics.orbit import OrbitStatus
+from designer.model.model_file import parse_model_file
+from designer.spice import convergence_aids, equation_check, numerics_gate
+from designer.spice.opamp_model import Rung
+from designer.spice.pool import SpicePool
+from designer.spice.simulator import SimulationFailed
+from designer.yields import exact_rung, study_plan
 
 MODEL: dict[str, Any] = {
     "m": 0.5, "k": 0.5, "k0": 0.95, "c": 0.5, "zeta": 0.1, "f20": 0.0, "b": 0.25, "sides": "both",
@@ -155,7 +158,7 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
     if made is None:
         return row
     (response,) = made.found
-    reduction = pipeline.nominal_reduction(made.design)
+    reduction = nominal.nominal_reduction(made.design)
     orbit = on_circuit(reduction.system(), made.design, response)
     excitation = Excitation(
         made.design.errors.scales.frequency(response.omega), made.design.amplitude(response.b)
@@ -171,16 +174,16 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
     row["equation"] = {"passed": found.passed, "worst": str(found.worst)}
     row["rungs"] = {}
     for rung in case.rungs:
-        levels = gate.LEVELS if rung == "ideal" else LEVELS
-        subject = gate.Subject(reduction, excitation, orbit, rung=rung)
-        (result,) = gate.check(pool, [subject], levels)
+        levels = numerics_gate.LEVELS if rung == "ideal" else LEVELS
+        subject = numerics_gate.Subject(reduction, excitation, orbit, rung=rung)
+        (result,) = numerics_gate.check(pool, [subject], levels)
         row["rungs"][rung] = _of_gate(result)
         if rung == "ideal" and result.passed and case.spread is not None:
             row["boards"] = _boards(made, response, orbit, excitation, result, pool)
     return row
 
 
-def _of_gate(result: gate.GateResult) -> dict[str, Any]:
+def _of_gate(result: numerics_gate.GateResult) -> dict[str, Any]:
     read = result.read
     return {
         "passed": result.passed,
@@ -201,25 +204,25 @@ def _boards(
     response: Any,
     orbit: Any,
     excitation: Excitation,
-    result: gate.GateResult,
+    result: numerics_gate.GateResult,
     pool: SpicePool,
 ) -> dict[str, Any]:
     """A few boards of the spread, each from its own orbit on the exact circuit."""
-    checked = pipeline.Checked(response, orbit, excitation, result)
-    plan = pipeline.plan_study(
+    checked = checked_design.Checked(response, orbit, excitation, result)
+    plan = study_plan.plan_study(
         made.modelfile, made.design, [checked], made.catalog, samples=BOARDS, seed=SEED
     )
-    drawn = exact.subjects(plan, range(BOARDS), 1)
+    drawn = exact_rung.subjects(plan, range(BOARDS), 1)
     asked = [(a, s) for a, s in drawn if s is not None and s.orbit.status is OrbitStatus.PERIODIC]
-    tasks = [gate.task(replace(s), result.settings, keep=True) for _, s in asked]
+    tasks = [numerics_gate.task(replace(s), result.settings, keep=True) for _, s in asked]
     said, waves, needed = ["not asked"] * len(asked), [], set()
-    for k, outcome in remedies.run(pool, tasks):
+    for k, outcome in convergence_aids.run(pool, tasks):
         needed |= set(outcome.tried)
         if isinstance(outcome.result, SimulationFailed):
             said[k] = f"failed: {outcome.result.reason}"
             continue
         said[k] = outcome.result.orbit.response
-        waves.append(gate.wave_error(asked[k][1], outcome.result))
+        waves.append(numerics_gate.wave_error(asked[k][1], outcome.result))
     return {
         "exact": [a.response for a, _ in drawn],
         "asked": [a.response for a, _ in asked],

@@ -10,20 +10,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from designer.api import (
-        RunResult,
-        Synthesis,
-        run,
-        synthesise,
-    )
-    from designer.catalog import Catalog, load_catalog
-    from designer.errors import DesignerError, EnvironmentMissing, InputError, Unreachable
-    from designer.model import Dimensionless, Mechanical
-    from designer.modelfile import ModelFile, Response, parse_model_file, read_model_file
-    from designer.simulation import Simulated, simulate
-    from designer.study import Study, tolerance
+    from designer.base.errors import DesignerError, EnvironmentMissing, InputError, Unreachable
+    from designer.catalog.catalog import Catalog, load_catalog
+    from designer.check.simulation import Simulated, simulate
+    from designer.check.synthesis_result import Synthesis, synthesise
+    from designer.jobs.study_job import run
+    from designer.model.model import Dimensionless, Mechanical
+    from designer.model.model_file import ModelFile, Response, parse_model_file, read_model_file
+    from designer.yields.run_result import RunResult
+    from designer.yields.study import Study
+    from designer.yields.tolerance_study import tolerance
 
-__version__ = "0.1.0"
 
 __all__ = [
     "Catalog",
@@ -49,18 +46,18 @@ __all__ = [
 ]
 
 _HOMES = {
-    "designer.api": (
+    "designer.check.synthesis_result": (
         "RunResult",
         "Synthesis",
         "run",
         "synthesise",
     ),
-    "designer.catalog": ("Catalog", "load_catalog"),
-    "designer.errors": ("DesignerError", "EnvironmentMissing", "InputError", "Unreachable"),
-    "designer.model": ("Dimensionless", "Mechanical"),
-    "designer.modelfile": ("ModelFile", "Response", "parse_model_file", "read_model_file"),
-    "designer.simulation": ("Simulated", "simulate"),
-    "designer.study": ("Study", "tolerance"),
+    "designer.catalog.catalog": ("Catalog", "load_catalog"),
+    "designer.base.errors": ("DesignerError", "EnvironmentMissing", "InputError", "Unreachable"),
+    "designer.model.model": ("Dimensionless", "Mechanical"),
+    "designer.model.model_file": ("ModelFile", "Response", "parse_model_file", "read_model_file"),
+    "designer.check.simulation": ("Simulated", "simulate"),
+    "designer.yields.study": ("Study", "tolerance"),
 }
 
 

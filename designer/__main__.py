@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from designer.cli import main
+from designer.cli.entry import main
 
 if __name__ == "__main__":
     main()

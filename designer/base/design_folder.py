@@ -1,0 +1,374 @@
+"""The design folder on disk: its manifest, what may be replaced, what is complete.
+
+``manifest.json`` lists every file that the tool wrote, with its hash, and the stages (``design``,
+``kicad``, ``study``, ``comparison``) with the hash of their inputs. A stage with the same inputs is
+not done again; one with others only with ``--overwrite``, which touches listed files and no others.
+Where only a list among the inputs has grown (``layers`` of a study) the stage is extended. A
+stage's files are listed before the first of them is written, so that interrupted work can be told
+from foreign files; a name that ends in "/" stands for a folder of blocks until the stage is
+finished.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from designer.base.atomic_write import partial_of
+from designer.base.errors import InputError
+from designer.base.manifest import MANIFEST as MANIFEST
+from designer.base.manifest import OF_DESIGN, Manifest, Stage, State, grown, read_manifest
+from designer.base.manifest import StageName as StageName
+from designer.base.manifest import file_hash as file_hash
+from designer.base.manifest import read_json as read_json
+from designer.base.plain_json import dumps
+
+MODEL = "model.toml"
+DESIGN = "design.json"
+TOLERANCE = "tolerance.json"
+REPORTS = ("report.html", "report.md")
+COMPARISON, COMPARISON_PICTURES = "compare.json", ("compare.svg", "compare.png")
+BLOCKS = "block-*.parquet"
+"""Files of a folder of blocks; others in it are not ours."""
+DESIGN_FILES = (MODEL, DESIGN, "circuit.cir", "setup.csv", "scales.csv")
+"""Of every design; ``board_files.names`` has those of its board."""
+
+
+class Folder:
+    """A design folder at ``path``, which need not exist yet.
+
+    Raises
+    ------
+    InputError : there is something else at that place, or its manifest cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.manifest = read_manifest(path)
+        if self.manifest is None:
+            _check_free(path)
+
+    def __truediv__(self, name: str) -> Path:
+        return self.path / name
+
+    def state(self, stage: StageName, inputs: Mapping[str, Any]) -> State:
+        """What there is of a stage with these inputs."""
+        known = None if self.manifest is None else self.manifest.stages.get(stage)
+        if known is None:
+            return "new"
+        if known.hash == Stage(dict(inputs)).hash:
+            return "same" if known.complete else "unfinished"
+        if not grown(known.inputs, inputs):
+            return "other"
+        return "more" if known.complete else "unfinished"
+
+    def decide(
+        self,
+        wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]],
+        *,
+        overwrite: bool,
+        resume: bool,
+    ) -> list[StageName]:
+        """Which of the wanted stages (inputs, names of files) are to be done.
+
+        Raises
+        ------
+        InputError : what is there is of other inputs, unfinished or changed, or a file that the
+            manifest does not list stands in the way, and the options do not say what to do.
+        """
+        todo: list[StageName] = []
+        for stage, (inputs, _) in wanted.items():
+            state = self.state(stage, inputs)
+            if state == "other" and not overwrite:
+                self._refuse(stage, inputs)
+            if state == "unfinished" and not (overwrite or resume):
+                raise InputError(
+                    self / MANIFEST,
+                    f"stages.{stage}",
+                    "unfinished work with the same inputs",
+                    "--resume to go on with it, or --overwrite to begin anew",
+                )
+            changed = self.changed(stage) if state == "same" else None
+            if changed is not None and not overwrite:
+                raise InputError(
+                    self / changed,
+                    "its sha256",
+                    "another than in manifest.json, or no file",
+                    "the file as it was written, or --overwrite to make it again",
+                )
+            if state != "same" or changed is not None or ("design" in todo and stage in OF_DESIGN):
+                todo.append(stage)
+        listed = {} if self.manifest is None else self.manifest.files
+        for stage in todo:
+            for name in wanted[stage][1]:
+                for found in [] if name in listed else self._there(name):
+                    if found in listed:
+                        continue
+                    raise InputError(
+                        self / found,
+                        "the file",
+                        "a file that manifest.json does not list",
+                        "no file of this name: --overwrite replaces listed files only",
+                    )
+        return todo
+
+    def changed(self, stage: StageName) -> str | None:
+        """The first file of a finished stage that is not what the manifest says."""
+        assert self.manifest is not None
+        for name, (owner, digest) in sorted(self.manifest.files.items()):
+            if owner != stage or digest is None:  # None: a later stage was about to improve it
+                continue
+            try:
+                content = (self / name).read_bytes()
+            except OSError:
+                return name
+            if digest != file_hash(name, content):
+                return name
+        return None
+
+    def begin(
+        self,
+        wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]],
+        provenance: Any,
+        kept: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Create the folder if need be, and mark these stages as unfinished.
+
+        kept : what they are to know again when they go on. A stage that depends on one that begins
+        anew is forgotten; its files stay listed until ``finish`` removes them.
+        """
+        manifest = self.manifest or Manifest()
+        with _writing(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+        if "design" in wanted:
+            for stage in OF_DESIGN:
+                manifest.stages.pop(stage, None)
+            manifest.files = {
+                n: ("replaced" if s in OF_DESIGN else s, d) for n, (s, d) in manifest.files.items()
+            }
+        for stage, (inputs, names) in wanted.items():
+            manifest.files = {
+                n: ("replaced" if s == stage else s, d) for n, (s, d) in manifest.files.items()
+            }
+            manifest.stages[stage] = Stage(inputs, kept=dict(kept or {}))
+            manifest.files |= dict.fromkeys(names, (stage, None))
+        for name in manifest.files:  # what a killed process left behind
+            if name.endswith("/"):
+                for left in (self / name).glob(f".{BLOCKS}.part"):
+                    left.unlink(missing_ok=True)
+            else:
+                partial_of(self / name).unlink(missing_ok=True)
+        manifest.provenance = provenance
+        self.manifest = manifest
+        self._save()
+
+    def write(self, name: str, content: str | bytes) -> None:
+        """Write one listed file, all at once."""
+        assert self.manifest is not None
+        stage, _ = self.manifest.files[name]
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        path = self / name
+        with _writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial = partial_of(path)
+            partial.write_bytes(data)
+            os.replace(partial, path)
+        self.manifest.files[name] = (stage, file_hash(name, data))
+
+    def rewrite(self, name: str, content: str | bytes) -> None:
+        """Write a file of a finished stage anew, unless it is that already; at no time does the
+        manifest state a hash that is not the file's."""
+        assert self.manifest is not None
+        stage, known = self.manifest.files[name]
+        data = content.encode("utf-8") if isinstance(content, str) else content
+        path = self / name
+        if known == file_hash(name, data) and path.is_file() and path.read_bytes() == data:
+            return
+        self.manifest.files[name] = (stage, None)
+        self._save()
+        self.write(name, content)
+        self._save()
+
+    def finish(self, stage: StageName, blocks: Iterable[str] = ()) -> None:
+        """Mark a stage as complete and remove listed files that nothing writes any more.
+
+        blocks : files in its folders of blocks that belong to it.
+        """
+        manifest = self.manifest
+        assert manifest is not None
+        folders = [
+            name
+            for name, (owner, _) in manifest.files.items()
+            if name.endswith("/") and owner in (stage, "replaced")
+        ]
+        manifest.files |= dict.fromkeys(blocks, (stage, None))
+        for name, (owner, _) in list(manifest.files.items()):
+            if owner != stage or name in folders:
+                continue
+            if (self / name).exists():
+                manifest.files[name] = (owner, file_hash(name, (self / name).read_bytes()))
+            else:  # planned and not needed: a study of no response has no samples
+                del manifest.files[name]
+        manifest.stages[stage].complete = True
+        manifest.stages[stage].kept = {}
+        gone = [n for n, (owner, _) in manifest.files.items() if owner == "replaced"]
+        for name in folders:
+            del manifest.files[name]
+            gone += [n for n in self._there(name) if n not in manifest.files]
+        for name in gone:
+            if not name.endswith("/"):
+                (self / name).unlink(missing_ok=True)
+            manifest.files.pop(name, None)
+            with contextlib.suppress(OSError):  # a folder that is empty now
+                if "/" in name:
+                    (self / name).parent.rmdir()
+        self._save()
+
+    def watch(self) -> Callable[[], None]:
+        """A check that the folder is still the one that work began in: to be called before each
+        write of long work.
+
+        It raises InputError where the folder is gone, or somebody has changed its manifest, its
+        model or its design.
+        """
+        assert self.manifest is not None
+        ours = {name: stage.hash for name, stage in self.manifest.stages.items()}
+        digests = {name: self.manifest.files[name][1] for name in (MODEL, DESIGN)}
+        seen: list[object] = []
+
+        def look() -> None:
+            try:
+                now = [
+                    (s.st_mtime_ns, s.st_size, s.st_ino)
+                    for s in ((self / name).stat() for name in (MANIFEST, MODEL, DESIGN))
+                ]
+                if now == seen:
+                    return
+                for name, digest in digests.items():
+                    if file_hash(name, (self / name).read_bytes()) != digest:
+                        raise self._changed_under_work(name)
+                manifest = read_manifest(self.path)
+            except OSError as error:
+                raise InputError(
+                    self.path,
+                    "the folder",
+                    error.strerror or str(error),
+                    "the design folder that this work began in: was it moved or deleted?",
+                ) from None
+            if manifest is None or {n: s.hash for n, s in manifest.stages.items()} != ours:
+                raise self._changed_under_work(MANIFEST)
+            seen[:] = now
+
+        return look
+
+    def _changed_under_work(self, name: str) -> InputError:
+        return InputError(
+            self / name,
+            "the file",
+            "another than when this work began",
+            "a folder that nobody changes meanwhile; finished blocks of the earlier design are "
+            "not used for the new one",
+        )
+
+    def _there(self, name: str) -> Iterator[str]:
+        """Files of this name, or the blocks in a folder of this name."""
+        if name.endswith("/"):
+            yield from (f"{name}{p.name}" for p in sorted((self / name).glob(BLOCKS)))
+        elif (self / name).exists():
+            yield name
+
+    def json(self, name: str) -> dict[str, Any]:
+        """The object in one of the folder's JSON files."""
+        return read_json(self / name)
+
+    def _save(self) -> None:
+        assert self.manifest is not None
+        path = self / MANIFEST
+        with _writing(path):
+            partial = partial_of(path)
+            with partial.open("w", encoding="ascii") as stream:
+                stream.write(dumps(self.manifest.as_dict()))
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.replace(partial, path)
+
+    def _refuse(self, stage: StageName, inputs: Mapping[str, Any]) -> None:
+        assert self.manifest is not None
+        known = self.manifest.stages[stage].inputs
+        differ = sorted(k for k in {*known, *inputs} if known.get(k) != inputs.get(k))
+        shown = ", ".join(f"{k} {_short(known.get(k))}" for k in differ)
+        wanted = ", ".join(f"{k} {_short(inputs.get(k))}" for k in differ)
+        raise InputError(
+            self / MANIFEST,
+            f"stages.{stage}.inputs",
+            shown,
+            f"{wanted}; or another folder, or --overwrite to replace what manifest.json lists",
+        )
+
+
+def is_design_folder(path: Path) -> bool:
+    """Whether there is a folder with a manifest."""
+    return (path / MANIFEST).is_file()
+
+
+def _check_free(path: Path) -> None:
+    """InputError unless a folder can be made here, or an empty one is here."""
+    if path.is_dir():
+        try:
+            taken = any(p.name != partial_of(path / MANIFEST).name for p in path.iterdir())
+        except OSError as error:
+            raise _cannot_write(path, error) from None
+        if taken:
+            raise InputError(
+                path,
+                "--out",
+                "a folder with files and no manifest.json",
+                "a design folder, an empty folder, or a name that is free",
+            )
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputError(path, "--out", "a folder without write access", "one to write into")
+        return
+    nearest = path
+    while not _exists(nearest) and nearest != nearest.parent:
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise InputError(
+            path, "--out", f"{nearest} is no folder", "a path at which a folder can be made"
+        )
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise InputError(
+            path, "--out", f"no write access to {nearest}", "a path at which a folder can be made"
+        )
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists() or path.is_symlink()
+    except OSError:
+        return False
+
+
+class _writing:  # noqa: N801 - reads as a word in a with statement
+    """Turns a failure to write into an InputError that names the place."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, OSError):
+            raise _cannot_write(self._path, error) from None
+
+
+def _cannot_write(path: Path, error: OSError) -> InputError:
+    return InputError(path, "--out", error.strerror or str(error), "a place that can be written")
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text[:12] + "…" if len(text) > 40 else text

@@ -1,0 +1,10 @@
+"""Hashes of content."""
+
+from __future__ import annotations
+
+import hashlib
+
+
+def sha256(content: bytes) -> str:
+    """Hash of some bytes, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,172 @@
+"""What ``manifest.json`` of a design folder says: stages and inputs, files and hashes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal, get_args
+
+from designer.base.errors import InputError
+from designer.base.hashing import sha256
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+StageName = Literal[
+    "search",
+    "design",
+    "kicad",
+    "study",
+    "comparison",
+    "trade",
+    "confirmation",
+    "cure",
+    "sweep",
+    "map",
+    "basins",
+    "rules",
+]
+STAGES: tuple[StageName, ...] = get_args(StageName)
+OF_DESIGN: tuple[StageName, ...] = (
+    "kicad",
+    "study",
+    "comparison",
+    "trade",
+    "confirmation",
+    "cure",
+    "rules",
+)
+"""Stages that depend on the design, and on it alone."""
+State = Literal["new", "same", "more", "unfinished", "other"]
+_MAX_MANIFEST = 20_000_000
+
+
+@dataclass
+class Stage:
+    """inputs : what decides the stage's files; equal inputs give equal files. kept : what the stage
+    found when it began and is to know again when it goes on; gone once it is complete."""
+
+    inputs: dict[str, Any]
+    complete: bool = False
+    kept: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def hash(self) -> str:
+        return sha256(json.dumps(self.inputs, sort_keys=True).encode("ascii"))
+
+
+@dataclass
+class Manifest:
+    """stages by name; files: name → (stage, hash or None while unfinished)."""
+
+    stages: dict[str, Stage] = field(default_factory=dict)
+    files: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def complete(self) -> bool:
+        return bool(self.stages) and all(s.complete for s in self.stages.values())
+
+    def as_dict(self) -> dict[str, Any]:
+        files = {
+            name: {
+                "stage": stage,
+                "format": 1,
+                "sha256": digest,
+                **({"sha256_without": "cost"} if name.endswith(".json") else {}),
+            }
+            for name, (stage, digest) in sorted(self.files.items())
+        }
+        stages = {
+            name: {
+                "inputs": s.inputs,
+                "inputs_sha256": s.hash,
+                "complete": s.complete,
+                **({"kept": s.kept} if s.kept else {}),
+            }
+            for name, s in sorted(self.stages.items())
+        }
+        return {
+            "format": FORMAT,
+            "tool": "designer",
+            "complete": self.complete,
+            "stages": stages,
+            "files": files,
+            "provenance": self.provenance,
+        }
+
+
+def grown(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+    """Whether the inputs differ by longer lists alone."""
+    if known.keys() != wanted.keys():
+        return False
+    return all(
+        mine == theirs
+        or (isinstance(mine, list) and isinstance(theirs, list) and set(mine) <= set(theirs))
+        for mine, theirs in ((known[key], wanted[key]) for key in known)
+    )
+
+
+def file_hash(name: str, content: bytes) -> str:
+    """Hash of a file as the manifest states it: a JSON file's without its object ``cost``."""
+    if name.endswith(".json"):
+        try:
+            value = json.loads(content)
+            value.pop("cost", None)
+            content = json.dumps(value, sort_keys=True).encode("ascii")
+        except (ValueError, AttributeError):
+            pass
+    return sha256(content)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file of a folder; InputError where there is none."""
+    try:
+        value = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(path, "the file", error.strerror or str(error), "JSON") from None
+    except ValueError as error:
+        raise InputError(path, "the file", str(error), "JSON") from None
+    if not isinstance(value, dict):
+        raise InputError(path, "the file", type(value).__name__, "a JSON object")
+    if value.get("format") != FORMAT:
+        raise InputError(path, "format", value.get("format"), f"{FORMAT}")
+    return value
+
+
+def read_manifest(path: Path) -> Manifest | None:
+    file = path / MANIFEST
+    if not file.is_file():
+        return None
+    if file.stat().st_size > _MAX_MANIFEST:
+        raise InputError(file, "the file", "too large a file", "a manifest")
+    value = read_json(file)
+    try:
+        if value["tool"] != "designer":
+            raise ValueError
+        stages: dict[str, Stage] = {
+            name: _stage(value["stages"][name]) for name in STAGES if name in value["stages"]
+        }
+        files = {
+            _inside(path, name): (str(said["stage"]), said["sha256"])
+            for name, said in value["files"].items()
+        }
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise InputError(file, "the file", "something else", "a manifest of this tool") from None
+    return Manifest(stages, files, value.get("provenance", {}))
+
+
+def _stage(said: Mapping[str, Any]) -> Stage:
+    return Stage(dict(said["inputs"]), said["complete"], dict(said.get("kept", {})))
+
+
+def _inside(root: Path, name: str) -> str:
+    """The name of a listed file, if it lies inside the folder: a manifest is untrusted input."""
+    pure = PurePosixPath(name)
+    if pure.is_absolute() or ".." in pure.parts or not pure.parts or name == MANIFEST:
+        raise InputError(root / MANIFEST, "files", name, "names of files inside the folder")
+    place = (root / pure).parent.resolve()
+    if not place.is_relative_to(root.resolve()):
+        raise InputError(root / MANIFEST, "files", name, "names of files inside the folder")
+    return f"{pure}/" if name.endswith("/") else str(pure)

@@ -1,0 +1,158 @@
+"""Basins of attraction on a plane of initial states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.threads import parallel
+from designer.bifurcations.parameter_map import COURSE, Cell, CellStore, cell_of
+from designer.circuit.swept_board import Subject
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import Course, Setting
+
+SAME = 1e-5
+"""Of the largest state: strobes of one orbit, from different starts, lie nearer than this."""
+
+
+@dataclass(frozen=True)
+class BasinPlan:
+    """x, y : names of the two states that span the plane; xs, ys : their values, ascending.
+
+    start : (states,) the others as they are here; changes : the parameters.
+    """
+
+    subject: Subject
+    changes: dict[str, float]
+    x: str
+    xs: Array
+    y: str
+    ys: Array
+    start: Array
+    course: Course = COURSE
+
+    def as_dict(self) -> dict[str, Any]:
+        """What decides the result."""
+        return {
+            "subject": self.subject.as_dict(),
+            "changes": dict(self.changes),
+            "x": [self.x, float(self.xs[0]), float(self.xs[-1]), len(self.xs)],
+            "y": [self.y, float(self.ys[0]), float(self.ys[-1]), len(self.ys)],
+            "start": self.start.tolist(),
+            "periods": dict(self.course.__dict__),
+        }
+
+    def state(self, i: int, j: int) -> Array:
+        """The initial state of row i, column j."""
+        out = self.start.copy()
+        out[self.subject.states.index(self.x)] = self.xs[j]
+        out[self.subject.states.index(self.y)] = self.ys[i]
+        return out
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """One that was met. twin : number of its mirror twin, or None. share : of the starts."""
+
+    number: int
+    response: str
+    symmetric: bool | None
+    strobe: tuple[float, ...]
+    twin: int | None
+    share: float
+
+
+@dataclass(frozen=True)
+class Basins:
+    """cells : row by row, each with the number of its attractor; attractors : most frequent first,
+    numbered from 0. Aperiodic ones are not told apart: they are one."""
+
+    plan: BasinPlan
+    cells: tuple[Cell, ...]
+    attractors: tuple[Attractor, ...]
+
+
+def run(
+    plan: BasinPlan,
+    jobs: int = 1,
+    store: CellStore | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Basins:
+    """Make the basins, or what of them ``store`` has not; ``progress`` is called once a row."""
+    (setting,) = plan.subject.settings([plan.changes])
+
+    def row(i: int) -> list[Cell]:
+        cells = None if store is None else store.read(i)
+        if cells is None:
+            cells = [
+                cell_of(i, j, setting.steady(plan.state(i, j), plan.course))
+                for j in range(len(plan.xs))
+            ]
+            if store is not None:
+                store.write(i, cells)
+        progress()
+        return cells
+
+    rows = parallel(row, range(len(plan.ys)), jobs)
+    return _named(plan, setting, [cell for cells in rows for cell in cells])
+
+
+def _named(plan: BasinPlan, setting: Setting, cells: list[Cell]) -> Basins:
+    """Number the attractors: one orbit, whichever of its strobes a start came to."""
+    flow = setting.flow()
+    known: list[tuple[str, bool | None, Array]] = []
+    numbers = np.empty(len(cells), dtype=int)
+    for k, cell in enumerate(cells):
+        x = np.array(cell.strobe)
+        label = (cell.response, cell.symmetric)
+        for number, (response, symmetric, laps) in enumerate(known):
+            if (response, symmetric) != label:
+                continue
+            near = np.abs(laps - x).max(axis=1) <= SAME * np.abs(laps).max()
+            if cell.status is not OrbitStatus.PERIODIC or near.any():
+                numbers[k] = number
+                break
+        else:
+            periodic = cell.status is OrbitStatus.PERIODIC
+            laps = flow.run(x, cell.n).strobes[:-1] if periodic else x[None]
+            numbers[k] = len(known)
+            known.append((*label, laps))
+    counted = np.bincount(numbers, minlength=len(known))
+    order = np.argsort(-counted, kind="stable")
+    rank = np.empty(len(known), dtype=int)
+    rank[order] = np.arange(len(known))
+    twins = {int(rank[k]): _twin(flow, known, k) for k in range(len(known))}
+    attractors = tuple(
+        Attractor(
+            number,
+            known[k][0],
+            known[k][1],
+            tuple(float(v) for v in known[k][2][0]),
+            None if twins[number] is None else int(rank[twins[number]]),
+            float(counted[k] / len(cells)),
+        )
+        for number, k in enumerate(order)
+    )
+    named = tuple(
+        replace(cell, attractor=int(rank[k])) for cell, k in zip(cells, numbers, strict=True)
+    )
+    return Basins(plan, named, attractors)
+
+
+def _twin(flow: Flow, known: list[tuple[str, bool | None, Array]], k: int) -> int | None:
+    """Index of the mirror twin of attractor k among those that are known."""
+    _, symmetric, laps = known[k]
+    if flow.system.mirror is None or symmetric is not False:
+        return None
+    n = len(laps)
+    image = flow.run(laps[0], n, points=2).strobes[1:-1:2] @ flow.system.mirror.T
+    for other, (_, _, strobes) in enumerate(known):
+        near = len(strobes) == n and other != k
+        if near and (np.abs(strobes - image[0]).max(axis=1) <= SAME * np.abs(laps).max()).any():
+            return other
+    return None

@@ -1,0 +1,133 @@
+"""Maps of n-p-q over two parameters: what one start leads to at every point of a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.threads import parallel
+from designer.circuit.swept_board import Subject
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import Course, Steady
+
+COURSE = Course(settle=134, keep=16, patience=1000)
+"""150 periods a point, and up to a thousand more where they leave the motion undecided."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a grid point shows; the fields are those of ``Steady``.
+
+    i, j : row and column. strobe : a state of the motion at drive phase 0. attractor : its number
+    in a basin, 0 in a map.
+    """
+
+    i: int
+    j: int
+    status: OrbitStatus
+    n: int
+    p: int
+    q: int
+    symmetric: bool | None
+    lyapunov: float
+    strobe: tuple[float, ...]
+    attractor: int = 0
+
+    @property
+    def response(self) -> str:
+        """ "n-p-q" of a periodic motion, otherwise its status."""
+        if self.status is OrbitStatus.PERIODIC:
+            return f"{self.n}-{self.p}-{self.q}"
+        return str(self.status)
+
+
+class CellStore(Protocol):
+    """Where finished rows of a grid are kept."""
+
+    def read(self, row: int) -> list[Cell] | None:
+        """The cells of a row; None where there is none."""
+
+    def write(self, row: int, cells: list[Cell]) -> None:
+        """Keep a finished row."""
+
+
+@dataclass(frozen=True)
+class MapPlan:
+    """x, y : names of the two parameters; xs (columns,), ys (rows,) : their values, ascending.
+
+    start : (states,) of every point.
+    """
+
+    subject: Subject
+    x: str
+    xs: Array
+    y: str
+    ys: Array
+    start: Array = field(default_factory=lambda: np.zeros(4))
+    course: Course = COURSE
+
+    def as_dict(self) -> dict[str, Any]:
+        """What decides the result."""
+        return {
+            "subject": self.subject.as_dict(),
+            "x": [self.x, float(self.xs[0]), float(self.xs[-1]), len(self.xs)],
+            "y": [self.y, float(self.ys[0]), float(self.ys[-1]), len(self.ys)],
+            "start": self.start.tolist(),
+            "periods": dict(self.course.__dict__),
+        }
+
+
+@dataclass(frozen=True)
+class ParameterMap:
+    """cells : (rows · columns,) row by row."""
+
+    plan: MapPlan
+    cells: tuple[Cell, ...]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many points show each response, most frequent first."""
+        return count(self.cells)
+
+
+def run(
+    plan: MapPlan,
+    jobs: int = 1,
+    store: CellStore | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> ParameterMap:
+    """Make the map, or what of it ``store`` has not; ``progress`` is called once a row."""
+
+    def row(i: int) -> list[Cell]:
+        cells = None if store is None else store.read(i)
+        if cells is None:
+            y = float(plan.ys[i])
+            settings = plan.subject.settings([{plan.x: float(x), plan.y: y} for x in plan.xs])
+            cells = [
+                cell_of(i, j, s.steady(plan.start, plan.course)) for j, s in enumerate(settings)
+            ]
+            if store is not None:
+                store.write(i, cells)
+        progress()
+        return cells
+
+    rows = parallel(row, range(len(plan.ys)), jobs)
+    return ParameterMap(plan, tuple(cell for cells in rows for cell in cells))
+
+
+def cell_of(i: int, j: int, steady: Steady) -> Cell:
+    """The cell that shows this motion."""
+    s = steady
+    return Cell(i, j, s.status, s.n, s.p, s.q, s.symmetric, s.lyapunov, tuple(s.start.tolist()))
+
+
+def count(cells: tuple[Cell, ...]) -> dict[str, int]:
+    """How many cells show each response, most frequent first."""
+    out: dict[str, int] = {}
+    for cell in cells:
+        out[cell.response] = out.get(cell.response, 0) + 1
+    return dict(sorted(out.items(), key=lambda item: (-item[1], item[0])))

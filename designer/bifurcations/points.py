@@ -1,0 +1,229 @@
+"""Bifurcation points on a branch of periodic orbits, located to 1e-8 of the parameter or better.
+
+Each kind has a test function of the orbit that changes sign where it happens; between two points of
+a branch with different signs the root is found by Brent's method along the branch, every value of
+it on a converged orbit.
+
+- fold: the branch turns back, dλ/ds = 0 (a multiplier +1).
+- pitchfork: the half-period map of a symmetric orbit has the multiplier -1. Its square is +1 in
+  the whole period, and its eigenvector changes sign under the mirror half a period later: that is
+  what leaves the symmetric orbits. (Half-period multiplier +1: a fold among symmetric orbits. A
+  period doubling of one would need ±i, a pair: Swift and Wiesenfeld, Phys. Rev. Lett. 52, 1984.)
+- period doubling: a multiplier -1.
+- torus: a pair of complex multipliers crosses the unit circle.
+- grazing: a turning point of a displacement lies on a stop (``dynamics.turning_points``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.optimize import brentq
+
+from designer.bifurcations.continuation import Branch, BranchPoint, at, joined, parted
+from designer.bifurcations.orbit_curve import CONVERGED, Curve
+from designer.dynamics.turning_points import heights
+
+ROUNDING = 1e-11
+"""Of the parameter's size: no error is stated below it. Where an orbit stalled before
+``orbit_curve.CONVERGED`` of its peak, as many times more."""
+ZERO = 1e-3
+"""Of its values on either side: a test function that is more than this at its root jumped."""
+
+
+class Kind(StrEnum):
+    """What happens at a bifurcation point."""
+
+    PITCHFORK = "pitchfork"
+    DOUBLING = "period-doubling"
+    FOLD = "fold"
+    GRAZING = "grazing"
+    TORUS = "torus"
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A bifurcation point.
+
+    parameter, value : its name and where. kind : see ``Kind``. error : half the width of an
+    interval of the parameter that was seen to hold the point: the test function has different signs
+    (for grazing: the counts of impacts differ) at its ends. point : the orbit there. before,
+    after : the branch's responses on either side, in its own order; stable : whether stable there.
+    position : where along the branch: whole part, the number of the point before it. branch :
+    number of the branch among those it was found with.
+    """
+
+    parameter: str
+    value: float
+    kind: Kind
+    error: float
+    point: BranchPoint
+    before: str
+    after: str
+    stable: tuple[bool, bool]
+    direction: int
+    position: float
+    branch: int = 0
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain, for JSON."""
+        return {
+            "parameter": self.parameter,
+            "kind": str(self.kind),
+            "value": self.value,
+            "error": self.error,
+            "before": self.before,
+            "after": self.after,
+            "stable_before": self.stable[0],
+            "stable_after": self.stable[1],
+            "direction": self.direction,
+            "branch": self.branch,
+        }
+
+
+def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:
+    """Every bifurcation point on a branch, in its order; ``number`` is what ``branch`` is called.
+
+    What happens twice between two neighbouring points is not seen.
+    """
+    found = []
+    for index, (a, b) in enumerate(zip(branch.points, branch.points[1:], strict=False)):
+        for kind, test in _tests(branch.curve, a, b):
+            located = _locate(branch.curve, a, b, kind, test, index, number)
+            if located is not None:
+                found.append(located)
+    return sorted(found, key=lambda p: p.position)
+
+
+Test = Callable[[BranchPoint], float]
+
+
+def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[Kind, Test]]:
+    """The test functions that change sign between two points of a branch."""
+    if joined(curve, a, b):
+        return []  # the branch joined its parent: that is where the point is located
+    chord = (b.solved.y - a.solved.y) / curve.scale
+    eye = np.eye(len(chord) - 1)
+
+    def fold(p: BranchPoint) -> float:
+        tangent = p.solved.tangent
+        return float(tangent[-1] if tangent @ chord > 0.0 else -tangent[-1])
+
+    def flip(p: BranchPoint) -> float:
+        return float(np.linalg.det(eye + p.solved.jacobian))
+
+    flips = Kind.PITCHFORK if curve.symmetric else Kind.DOUBLING
+    tests: list[tuple[Kind, Test]] = [(Kind.FOLD, fold), (flips, flip)]
+    if _pair(a) * _pair(b) < 0.0:
+        tests.append((Kind.TORUS, _pair))
+    out = [(kind, test) for kind, test in tests if test(a) * test(b) < 0.0]
+    if not curve.symmetric and not (parted(curve, a) and parted(curve, b)):
+        # Where it leaves its parent λ turns: that is no fold, and rounding decides the sign.
+        out = [(kind, test) for kind, test in out if kind is not Kind.FOLD]
+    if a.counts != b.counts:
+        out.append((Kind.GRAZING, _gap(curve)))
+    return out
+
+
+def _pair(p: BranchPoint) -> float:
+    """ln of the greatest modulus of a complex multiplier; 0 without one: no change of sign."""
+    multipliers = p.orbit.multipliers
+    pairs = multipliers[np.abs(multipliers.imag) > 1e-9 * np.abs(multipliers)]
+    return float(np.log(np.abs(pairs).max())) if len(pairs) else 0.0
+
+
+def _gap(curve: Curve) -> Test:
+    """Signed distance to its stop of the turning point that lies nearest to one."""
+
+    def gap(p: BranchPoint) -> float:
+        found = heights(curve.family.flow(p.value), p.orbit)
+        return float(found[np.argmin(np.abs(found))])
+
+    return gap
+
+
+def _locate(
+    curve: Curve,
+    a: BranchPoint,
+    b: BranchPoint,
+    kind: Kind,
+    test: Test,
+    index: int,
+    number: int,
+) -> Bifurcation | None:
+    """The root of a test function between two points of a branch; None where orbits fail."""
+    known: dict[float, BranchPoint] = {0.0: a, 1.0: b}
+
+    def point(s: float) -> BranchPoint:
+        if s not in known:
+            solved = curve.between(a.solved, b.solved, s)
+            found = None if solved is None else at(curve, solved)
+            if found is None:
+                raise ArithmeticError(f"no orbit at {s} between two points")
+            known[s] = found
+        return known[s]
+
+    def left(p: BranchPoint) -> bool:
+        """Whether a point lies on a's side."""
+        return p.counts == a.counts if kind is Kind.GRAZING else test(p) * test(a) > 0.0
+
+    try:
+        if test(a) * test(b) < 0.0:
+            root = float(brentq(lambda s: test(point(s)), 0.0, 1.0, xtol=1e-15, rtol=1e-14))
+        elif kind is Kind.GRAZING:
+            root = _bisect(lambda s: left(point(s)))
+        else:
+            return None
+        middle = point(root)
+        if kind is not Kind.GRAZING and abs(test(middle)) > ZERO * max(abs(test(a)), abs(test(b))):
+            return None  # a jump over zero: two complex multipliers that became real
+        stalled = max(1.0, middle.solved.residual / CONVERGED)
+        error = _width(point, left, root, stalled * ROUNDING * float(curve.scale[-1]))
+    except ArithmeticError:
+        return None
+    return Bifurcation(
+        parameter=curve.family.parameter,
+        value=middle.value,
+        kind=kind,
+        error=error,
+        point=middle,
+        before=a.response,
+        after=b.response,
+        stable=(a.stable, b.stable),
+        direction=0 if kind is Kind.FOLD else int(np.sign(b.value - a.value)),
+        position=index + root,
+        branch=number,
+    )
+
+
+def _bisect(left: Callable[[float], bool]) -> float:
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if left(middle):
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def _width(
+    point: Callable[[float], BranchPoint],
+    left: Callable[[BranchPoint], bool],
+    root: float,
+    least: float,
+) -> float:
+    """Half the width in the parameter of the least bracket around the root that is seen as one, or
+    ``least`` if that is more."""
+    reach = 1e-12
+    while reach < 1.0:
+        low, high = max(root - reach, 0.0), min(root + reach, 1.0)
+        before, after = point(low), point(high)
+        if left(before) and not left(after):
+            ends = [before.value, after.value, point(root).value]
+            return max(0.5 * (max(ends) - min(ends)), least)
+        reach *= 8.0
+    return 0.5 * abs(point(1.0).value - point(0.0).value)

@@ -1,0 +1,222 @@
+"""Finished blocks of a sweep, a map or a basin on disk, as Parquet.
+
+Every file says which work it belongs to and carries the provenance; it appears whole or not at
+all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from designer.base.arrays import Array
+from designer.base.atomic_write import appearing
+from designer.bifurcations.parameter_map import Cell
+from designer.bifurcations.sweep import Sweep
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import Steady
+
+FORMAT = 1
+RULES = 2
+"""Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
+_KEY = b"designer"
+_COLUMNS = [
+    ("status", pa.string()),
+    ("n", pa.int64()),
+    ("p", pa.int64()),
+    ("q", pa.int64()),
+    ("symmetric", pa.bool_()),
+    ("lyapunov", pa.float64()),
+    ("radius", pa.float64()),
+    ("start", pa.list_(pa.float64())),
+    ("end", pa.list_(pa.float64())),
+    ("minima", pa.list_(pa.float64())),
+    ("velocities", pa.list_(pa.float64())),
+    ("periods", pa.int64()),
+]
+
+
+def work_hash(said: Mapping[str, Any]) -> str:
+    """Hash of what decides a result."""
+    text = json.dumps({"rules": RULES, **said}, sort_keys=True)
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def write_sweep(path: Path, made: Sweep, provenance: Mapping[str, Any]) -> None:
+    """A whole sweep as one Parquet file, with the columns of the blocks: track after track, the
+    values ascending.
+
+    Raises
+    ------
+    InputError : it cannot be written.
+    """
+    parameter = made.plan.parameter
+    rows = [
+        row
+        for track, steps in made.steps.items()
+        for row in _rows(parameter, track, [float(v) for v in made.plan.values], steps)
+    ]
+    said = {"format": FORMAT, "work": work_hash(made.plan.as_dict())}
+    write_rows(path, rows, _sweep_schema(parameter), said, provenance)
+
+
+def _sweep_schema(parameter: str) -> pa.Schema:
+    return pa.schema([("track", pa.string()), (parameter, pa.float64()), *_COLUMNS])
+
+
+def _rows(
+    parameter: str, track: str, values: Sequence[float], steps: Sequence[Steady]
+) -> list[dict[str, Any]]:
+    return [
+        {"track": track, parameter: v, **s.__dict__, "status": str(s.status)}
+        for v, s in zip(values, steps, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class SweepStore:
+    """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``.
+
+    parameter : name of the swept parameter's column. work : hash of the plan. provenance : goes
+    into every file.
+    """
+
+    root: Path
+    parameter: str
+    work: str
+    provenance: Mapping[str, Any]
+
+    @staticmethod
+    def name(track: str, block: int) -> str:
+        """File name of a block, inside root."""
+        return f"sweep.parquet/{track.replace(' ', '-')}-{block:06d}.parquet"
+
+    def read(self, track: str, block: int) -> list[Steady] | None:
+        """The steps of a finished block of this very work, or None."""
+        schema = _sweep_schema(self.parameter)
+        rows = read_rows(self.root / self.name(track, block), schema, self._said(track, block))
+        if rows is None:
+            return None
+        out = []
+        for row in rows:
+            del row["track"], row[self.parameter]
+            row["status"] = OrbitStatus(row["status"])
+            for key in ("start", "end", "minima", "velocities"):
+                row[key] = np.array(row[key], dtype=float)
+            out.append(Steady(**row))
+        return out
+
+    def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
+        """Keep a finished block; rows in the order in which the steps were made."""
+        schema = _sweep_schema(self.parameter)
+        rows = _rows(self.parameter, track, values, steps)
+        said = self._said(track, block)
+        write_rows(self.root / self.name(track, block), rows, schema, said, self.provenance)
+
+    def _said(self, track: str, block: int) -> dict[str, Any]:
+        return {"format": FORMAT, "work": self.work, "track": track, "block": block}
+
+
+@dataclass(frozen=True)
+class GridStore:
+    """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in ``root``.
+
+    kind : "map" or "basins". x, y : names of the axes' columns; xs, ys : their values.
+    """
+
+    root: Path
+    kind: str
+    x: str
+    xs: Array
+    y: str
+    ys: Array
+    work: str
+    provenance: Mapping[str, Any]
+
+    @staticmethod
+    def name(kind: str, row: int) -> str:
+        """File name of a row, inside root."""
+        return f"{kind}.parquet/row-{row:06d}.parquet"
+
+    def read(self, row: int) -> list[Cell] | None:
+        """The cells of a finished row of this very work, or None."""
+        rows = read_rows(self.root / self.name(self.kind, row), self._schema, self._said(row))
+        if rows is None or len(rows) != len(self.xs):
+            return None
+        out = []
+        for each in rows:
+            del each[self.x], each[self.y]
+            each["status"] = OrbitStatus(each["status"])
+            each["strobe"] = tuple(each["strobe"])
+            out.append(Cell(**each))
+        return out
+
+    def write(self, row: int, cells: list[Cell]) -> None:
+        """Keep a finished row."""
+        rows = []
+        for cell in cells:
+            said = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
+            rows.append({**said, **cell.__dict__, "status": str(cell.status)})
+        path = self.root / self.name(self.kind, row)
+        write_rows(path, rows, self._schema, self._said(row), self.provenance)
+
+    @property
+    def _schema(self) -> pa.Schema:
+        return pa.schema(
+            [
+                ("i", pa.int64()),
+                ("j", pa.int64()),
+                (self.x, pa.float64()),
+                (self.y, pa.float64()),
+                *_COLUMNS[:6],
+                ("strobe", pa.list_(pa.float64())),
+            ]
+        )
+
+    def _said(self, row: int) -> dict[str, Any]:
+        return {"format": FORMAT, "work": self.work, "row": row}
+
+
+def read_rows(
+    path: Path, schema: pa.Schema, said: Mapping[str, Any]
+) -> list[dict[str, Any]] | None:
+    """Rows of a file that says ``said`` of itself; None where there is none such."""
+    if not path.is_file():
+        return None
+    try:
+        table = pq.read_table(path, schema=schema, partitioning=None)
+        found = json.loads((pq.read_schema(path).metadata or {}).get(_KEY, b"{}"))
+    except (OSError, ValueError, pa.ArrowException):
+        return None
+    if {k: found.get(k) for k in said} != dict(said):
+        return None
+    rows: list[dict[str, Any]] = table.to_pylist()
+    return rows
+
+
+def write_rows(
+    path: Path,
+    rows: Sequence[Mapping[str, Any]],
+    schema: pa.Schema,
+    said: Mapping[str, Any],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Write a Parquet file all at once.
+
+    Raises
+    ------
+    InputError : it cannot be written.
+    """
+    known = json.dumps({**said, "provenance": provenance}, sort_keys=True)
+    with appearing(path) as partial:
+        path.parent.mkdir(exist_ok=True)
+        table = pa.Table.from_pylist([dict(r) for r in rows], schema=schema)
+        pq.write_table(table.replace_schema_metadata({_KEY: known}), partial)

@@ -1,0 +1,230 @@
+"""Brute-force bifurcation data over one parameter, in blocks of steps.
+
+A track is one way through the parameter: down or up, following the attractor (each step starts
+where the one before ended), or one start that is the same at every step. Followed tracks are
+sequential, and run beside each other; the steps of a fixed start are independent. Blocks end where
+the step number says, so an interrupted sweep goes on from what it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.threads import parallel
+from designer.circuit.swept_board import Subject
+from designer.dynamics.attractors import starts
+from designer.dynamics.steady_state import Course, Steady
+
+BLOCK = 64
+"""Steps of a block."""
+KICK = 1e-6
+"""Of the peak of the shown periods: how far a followed state is pushed before each step. A state
+that is symmetric to the last digit would stay on a symmetric orbit long after that lost its
+stability; which twin it leaves for is decided here."""
+DOWN, UP = "down", "up"
+
+
+class Store(Protocol):
+    """Where finished blocks are kept."""
+
+    def read(self, track: str, block: int) -> list[Steady] | None:
+        """The steps of a block, in the order they were made; None where there is none."""
+
+    def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
+        """Keep a finished block."""
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What is swept.
+
+    subject, parameter : what changes. values : (N,) ascending. tracks : "down", "up", or "start
+    K" for row K of starts (K, states). course : periods of each step.
+    """
+
+    subject: Subject
+    parameter: str
+    values: Array
+    tracks: tuple[str, ...] = (DOWN,)
+    starts: Array = field(default_factory=lambda: np.zeros((1, 4)))
+    course: Course = field(default_factory=Course)
+
+    @property
+    def followed(self) -> bool:
+        """Whether each step starts where the one before ended."""
+        return self.tracks[0] in (DOWN, UP)
+
+    def order(self, track: str) -> Array:
+        """The values in the order in which this track meets them."""
+        return self.values[::-1] if track == DOWN else self.values
+
+    def blocks(self, track: str) -> list[Array]:
+        """The same, cut into blocks."""
+        order = self.order(track)
+        return [order[k : k + BLOCK] for k in range(0, len(order), BLOCK)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """What decides the result."""
+        return {
+            "subject": self.subject.as_dict(),
+            "parameter": self.parameter,
+            "from": float(self.values[0]),
+            "to": float(self.values[-1]),
+            "steps": len(self.values),
+            "tracks": list(self.tracks),
+            "starts": [] if self.followed else self.starts.tolist(),
+            "periods": dict(self.course.__dict__),
+        }
+
+
+@dataclass(frozen=True)
+class Window:
+    """Neighbouring steps that show one response.
+
+    low, high : parameter at the first and the last of them; steps : how many. track : on which
+    track; "starts" where several starts are taken together.
+    """
+
+    low: float
+    high: float
+    response: str
+    symmetric: bool | None
+    steps: int
+    track: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """By the keys of the contract."""
+        return {
+            "from": self.low,
+            "to": self.high,
+            "response": self.response,
+            "symmetric": self.symmetric,
+            "steps": self.steps,
+            "track": self.track,
+        }
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """steps : for each track one ``Steady`` per value, in the order of ``plan.values``."""
+
+    plan: SweepPlan
+    steps: Mapping[str, tuple[Steady, ...]]
+
+    @property
+    def windows(self) -> list[Window]:
+        """Of every followed track by itself; of fixed starts together. Ascending."""
+        if self.plan.followed:
+            return [w for t in self.plan.tracks for w in _windows(self, (t,), t)]
+        track = self.plan.tracks[0] if len(self.plan.tracks) == 1 else "starts"
+        return _windows(self, self.plan.tracks, track)
+
+    @property
+    def periods(self) -> int:
+        """Drive periods that were run in all."""
+        return sum(s.periods for steps in self.steps.values() for s in steps)
+
+
+def follow(*directions: str) -> dict[str, Any]:
+    """The fields of a plan that follows the attractor, "down" or "up" or both."""
+    return {"tracks": tuple(directions)}
+
+
+def from_starts(subject: Subject, changes: Sequence[Mapping[str, float]], count: int) -> Any:
+    """The fields of a plan with ``count`` starts: rest, then a Sobol set in a box of a few static
+    deflections, as in ``dynamics.attractors.starts``. changes : the ends of the sweep."""
+    box = starts(subject.scale(changes), count)
+    return {"tracks": tuple(f"start {k}" for k in range(count)), "starts": box}
+
+
+def run(
+    plan: SweepPlan,
+    jobs: int = 1,
+    store: Store | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Sweep:
+    """Make the sweep, or what of it ``store`` has not.
+
+    ``progress`` is called once a block.
+
+    Raises
+    ------
+    KeyboardInterrupt : finished blocks are in the store by then.
+    """
+    tasks: list[list[tuple[str, int]]] = []
+    for track in plan.tracks:
+        numbers = [(track, k) for k in range(len(plan.blocks(track)))]
+        tasks += [numbers] if plan.followed else [[each] for each in numbers]
+
+    def work(task: list[tuple[str, int]]) -> list[tuple[str, list[Steady]]]:
+        out, x = [], np.zeros(len(plan.subject.states))
+        for track, number in task:
+            block = plan.blocks(track)[number]
+            steps = None if store is None else store.read(track, number)
+            if steps is None:
+                if plan.followed:
+                    steps = _followed(plan, block, x)
+                else:
+                    steps = _fixed(plan, block, plan.starts[int(track.split()[1])])
+                if store is not None:
+                    store.write(track, number, [float(v) for v in block], steps)
+            x = next_start(steps[-1])
+            out.append((track, steps))
+            progress()
+        return out
+
+    found: dict[str, list[Steady]] = {track: [] for track in plan.tracks}
+    for blocks in parallel(work, tasks, jobs):
+        for track, steps in blocks:
+            found[track] += steps
+    return Sweep(
+        plan,
+        {t: tuple(s[::-1] if t == DOWN else s) for t, s in found.items()},
+    )
+
+
+def next_start(step: Steady) -> Array:
+    """Where the next followed step starts: the end of this one, slightly pushed; rest where this
+    one had no end."""
+    if not len(step.minima):
+        return np.zeros(len(step.end))
+    size = np.abs(step.end).max()
+    return np.asarray(step.end + KICK * size * (-1.0) ** np.arange(len(step.end)))
+
+
+def _followed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[Steady]:
+    out = []
+    for setting in plan.subject.settings([{plan.parameter: float(v)} for v in values]):
+        out.append(setting.steady(x, plan.course))
+        x = next_start(out[-1])
+    return out
+
+
+def _fixed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[Steady]:
+    settings = plan.subject.settings([{plan.parameter: float(v)} for v in values])
+    return [setting.steady(x, plan.course) for setting in settings]
+
+
+def _windows(sweep: Sweep, tracks: Sequence[str], name: str) -> list[Window]:
+    """Runs of steps at which one of the tracks shows a response; ordered by where they begin."""
+    values = sweep.plan.values
+    out: list[Window] = []
+    running: dict[tuple[str, bool | None], int] = {}
+    shown: set[tuple[str, bool | None]]
+    for i in range(len(values) + 1):
+        shown = set()
+        if i < len(values):
+            seen = [sweep.steps[t][i] for t in tracks]
+            shown = {(s.response, s.symmetric) for s in seen}
+        for key in [k for k in running if k not in shown]:
+            first = running.pop(key)
+            low, high = float(values[first]), float(values[i - 1])
+            out.append(Window(low, high, *key, i - first, name))
+        for key in shown:
+            running.setdefault(key, i)
+    return sorted(out, key=lambda w: (w.low, w.high, w.response, str(w.symmetric)))

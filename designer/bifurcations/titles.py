@@ -1,0 +1,85 @@
+"""Names and titles of sweeps, maps and basins, so that a picture can be read alone."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+
+from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.sweep import DOWN, UP, SweepPlan
+from designer.circuit.swept_board import Subject
+from designer.model.swept_model import ModelSubject
+
+NAMES = {
+    "omega": "ω",
+    "zeta": "ζ",
+    "k0": "k₀",
+    "f20": "f₂₀",
+    "frequency": "generator frequency",
+    "amplitude": "generator amplitude (peak)",
+    "offset": "generator offset",
+    "x1": "x₁",
+    "x1'": "x₁′",
+    "x2": "x₂",
+    "x2'": "x₂′",
+    "v1": "v₁",
+    "v2": "v₂",
+    "v3": "v₃",
+    "v4": "v₄",
+}
+
+
+def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) -> str:
+    """What a picture shows: whose motion, over what, from which starts, and what is held.
+
+    name : the model's title, or "". width : characters of a line.
+    """
+    whose = "model" if isinstance(plan.subject, ModelSubject) else "nominal board"
+    if isinstance(plan, SweepPlan):
+        what = f"bifurcation diagram of the {whose} over {_name(plan.parameter)}, {_way(plan)}"
+        changed: Mapping[str, float | None] = {plan.parameter: None}
+    elif isinstance(plan, MapPlan):
+        over = f"{_name(plan.x)} and {_name(plan.y)}"
+        what = f"responses n-p-q of the {whose} over {over}, from rest"
+        changed = {plan.x: None, plan.y: None}
+    else:
+        what = f"basins of attraction of the {whose}, by the initial {_name(plan.x)} and "
+        what += f"{_name(plan.y)}, other states 0"
+        changed = plan.changes
+    lines = [name, what, "held: " + ", ".join(_held(plan.subject, changed))]
+    return "\n".join(part for line in lines for part in textwrap.wrap(line, width))
+
+
+def _way(plan: SweepPlan) -> str:
+    """How the values are gone through."""
+    if plan.followed:
+        said = {DOWN: "followed down", UP: "followed up"}
+        return " and ".join(said[t] for t in plan.tracks)
+    count = len(plan.tracks)
+    return "from rest at each value" if count == 1 else f"from {count} starts at each value"
+
+
+def _held(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[str]:
+    """The parameters that stand still, with their values. changed : None where one is swept."""
+    if isinstance(subject, ModelSubject):
+        model = subject.model
+        known = {"omega": subject.omega}
+        known |= {f.name: getattr(model, f.name) for f in fields(model) if f.name != "sides"}
+        if model.sides != "both":
+            yield f"{model.sides} stop only"
+    else:
+        known = {
+            "frequency": None if "omega" in changed else subject.frequency,
+            "amplitude": subject.amplitude,
+            "offset": subject.offset,
+        }
+    for name, value in {**known, **changed}.items():
+        if value is not None:
+            unit = subject.units.get(name, "")
+            yield f"{_name(name)} = {value:.6g}" + (f" {unit}" if unit else "")
+
+
+def _name(name: str) -> str:
+    return NAMES.get(name, name)

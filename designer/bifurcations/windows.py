@@ -1,0 +1,170 @@
+"""Windows: the intervals of a parameter over which a response is stable, and what ends them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from designer.bifurcations.branch_survey import Survey
+from designer.bifurcations.continuation import Branch, BranchPoint, End, start, trace
+from designer.bifurcations.flow_family import Family
+from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.dynamics.attractors import settle
+from designer.dynamics.orbit import Orbit
+
+OUTSIDE = 5e-4
+"""Of the parameter's size: how far past the end of a window its orbit is let go."""
+NOT_LOCATED = "not located"
+"""Why a window ends between two points of a branch where no bifurcation point was located."""
+
+
+@dataclass(frozen=True)
+class WindowEnd:
+    """An end of a window.
+
+    value, error : of the parameter. why : the bifurcation's kind, or why the branch stops there.
+    point : the bifurcation, if it is one. orbit : at the end, or the last one before it.
+    """
+
+    value: float
+    error: float
+    why: str
+    point: Bifurcation | None
+    orbit: Orbit
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of a branch on which a response is stable.
+
+    response : "n-p-q". symmetric : by the branch it lies on. low, high : its ends. branch : the
+    number of the branch.
+    """
+
+    parameter: str
+    response: str
+    symmetric: bool
+    low: WindowEnd
+    high: WindowEnd
+    branch: int
+
+    @property
+    def width(self) -> float:
+        return self.high.value - self.low.value
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain, for JSON."""
+        return {
+            "response": self.response,
+            "symmetric": self.symmetric,
+            "from": self.low.value,
+            "to": self.high.value,
+            "from_error": self.low.error,
+            "to_error": self.high.error,
+            "from_kind": self.low.why,
+            "to_kind": self.high.why,
+            "branch": self.branch,
+        }
+
+
+def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> list[Window]:
+    """The windows on a branch, in its order.
+
+    points : the branch's bifurcation points (``points.locate``). A stretch between two of
+    them that holds no point of the branch is too short to be judged, and is left out. Where
+    stability or the counts change within a stretch, the window ends there as ``NOT_LOCATED``.
+    """
+    out = []
+    # Where branches meet a multiplier is 1 but for rounding: that orbit judges nothing.
+    meets = [int(end is End.JOINED) for end in branch.ends]
+    ends = [None, *sorted(points, key=lambda p: p.position), None]
+    for before, after in itertools.pairwise(ends):
+        first = meets[0] if before is None else int(before.position) + 1
+        last = len(branch.points) - 1 - meets[1] if after is None else int(after.position)
+        for i, j in _alike(branch, first, last):
+            if not branch.points[i].stable:
+                continue
+            a = _end(branch, before, 0) if i == first else _unlocated(branch, i - 1, i)
+            b = _end(branch, after, 1) if j == last else _unlocated(branch, j + 1, j)
+            low, high = (a, b) if a.value <= b.value else (b, a)
+            response, symmetric = branch.points[j].response, branch.curve.symmetric
+            out.append(Window(branch.parameter, response, symmetric, low, high, number))
+    return out
+
+
+def _alike(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
+    """First and last number of each run of points that agree in stability and counts."""
+
+    def key(i: int) -> tuple[bool, tuple[int, int, int]]:
+        return branch.points[i].stable, branch.points[i].counts
+
+    runs = [list(run) for _, run in itertools.groupby(range(first, last + 1), key)]
+    return [(run[0], run[-1]) for run in runs]
+
+
+def all_windows(found: Survey) -> list[Window]:
+    """The windows on every branch; one that reaches to the parent branch ends at its point."""
+    out: list[Window] = []
+    for number, branch in enumerate(found.branches):
+        out += [
+            replace(w, low=_met(w.low, found.points), high=_met(w.high, found.points))
+            for w in windows(branch, found.on(number), number)
+        ]
+    return sorted(out, key=lambda w: w.low.value)
+
+
+def _met(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
+    """The bifurcation point that a branch was led on to where it joins another."""
+    if end.why != End.JOINED:
+        return end
+    for p in points:
+        if p.value == end.value and p.kind in (Kind.PITCHFORK, Kind.DOUBLING):
+            return WindowEnd(p.value, p.error, str(p.kind), p, p.point.orbit)
+    return end
+
+
+def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> Window:
+    """The window of a stable orbit that is known at a value, within [low, high].
+
+    Raises
+    ------
+    ArithmeticError : there is no such orbit, or it is not stable.
+    """
+    origin = start(family, orbit, value)
+    counts = origin.points[0].counts
+
+    def over(p: BranchPoint) -> bool:
+        return not p.stable or p.counts != counts
+
+    branch = trace(origin, low, high, until=over)
+    for found in windows(branch, locate(branch)):
+        if found.low.value <= value <= found.high.value:
+            return found
+    raise ArithmeticError(f"{orbit.response} at {family.parameter} = {value:g} is not stable")
+
+
+def outside(family: Family, end: WindowEnd, direction: float) -> tuple[float, Orbit]:
+    """What the orbit at a window's end settles to just past it, and at which value.
+
+    direction : 1 past the upper end, -1 past the lower.
+    """
+    size = abs(end.value) if end.value else 1.0
+    value = end.value + direction * OUTSIDE * size
+    return value, settle(family.flow(value), end.orbit.start)
+
+
+def _unlocated(branch: Branch, outer: int, inner: int) -> WindowEnd:
+    """Between two neighbouring points, the second of which still belongs to the window."""
+    a, b = branch.points[outer], branch.points[inner]
+    half = 0.5 * abs(a.value - b.value)
+    return WindowEnd(0.5 * (a.value + b.value), half, NOT_LOCATED, None, b.orbit)
+
+
+def _end(branch: Branch, where: Bifurcation | None, side: int) -> WindowEnd:
+    if where is None:
+        point, inner = branch.points[-side], side * (len(branch.points) - 3) + 1
+        if branch.ends[side] is End.JOINED and branch.points[inner].counts != point.counts:
+            return _unlocated(branch, -side, inner)
+        return WindowEnd(point.value, 0.0, str(branch.ends[side]), None, point.orbit)
+    return WindowEnd(where.value, where.error, str(where.kind), where, where.point.orbit)

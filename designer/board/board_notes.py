@@ -1,0 +1,188 @@
+"""``board.md`` of a design folder: how its board is connected, protected and trimmed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from designer.base.units import format_quantity
+from designer.base.views import View
+from designer.board.board_parts import (
+    GENERATOR_MOST,
+    drive_resistance,
+    driven_nodes,
+    fault_current,
+    protection_offset,
+    trim_reach,
+)
+from designer.board.component import Component
+from designer.catalog.catalog import Catalog
+from designer.check.synthesis_result import Synthesis
+from designer.circuit.board_arrays import Boards
+from designer.circuit.board_parts_only import Connector, Trimmer
+from designer.circuit.netlist import Circuit, Section, nominal_board
+from designer.circuit.rest_point import at_rest
+from designer.model.board_table import BoardChoice
+
+PROBE = 100e-12
+"""Capacitance [F] of a metre of coaxial cable, as the notes assume for a probe."""
+
+
+def markdown(
+    made: Synthesis, circuit: Circuit, choice: BoardChoice, found: Sequence[Component]
+) -> str:
+    """The notes as Markdown; nothing in them is text of the model file."""
+    parts = [
+        "# The board",
+        "What to buy is in `bom.csv`, the drawing in `schematic.svg`. The generator is set as "
+        "`setup.csv` says.",
+        _mounting(choice, found),
+        "## Connections",
+        _connections(circuit, found),
+        _supply(circuit, made.catalog),
+        _outputs(circuit, choice),
+        *_protection(made, circuit, choice),
+        *_trim(made, circuit, choice),
+        *_spare(circuit),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _q(value: float, unit: str, digits: int = 3) -> str:
+    return format_quantity(value, unit, digits)
+
+
+def _mounting(choice: BoardChoice, found: Sequence[Component]) -> str:
+    said = {
+        "mixed": "Parts are in the cases that the catalogue names first, soldered on the surface "
+        "or through holes.",
+        "smd": "All but connectors are soldered on the surface.",
+        "tht": "All parts are soldered through holes.",
+    }[choice.spec.mounting]
+    pads = [c.reference for c in found if c.bought is None]
+    inside = {name for array in choice.arrays for name in array.parts}
+    bare = [c.reference for c in found if not c.fitted and c.reference not in inside]
+    for array in choice.arrays:
+        said += (
+            f" {array.name}, {array.bought.part_number}, takes the places of "
+            f"{', '.join(array.parts)}: the board has their single pads, and its elements are "
+            "wired to these."
+        )
+    if pads:
+        said += f" Bare pads: {', '.join(pads)}."
+    if bare:
+        said += f" Not fitted: {', '.join(bare)}."
+    return said
+
+
+def _connections(circuit: Circuit, found: Sequence[Component]) -> str:
+    rows = ["| connector | pin | net |", "|---|---|---|"]
+    held = {p.name for p in circuit.fittings if isinstance(p, Connector)}
+    for component in found:
+        if component.reference in held:
+            for pin in component.pins:
+                net = "ground" if pin.net == "0" else pin.net
+                rows.append(f"| {component.reference}, {component.role} | {pin.number} | {net} |")
+    return "\n".join(rows)
+
+
+def _supply(circuit: Circuit, catalog: Catalog) -> str:
+    opamp = catalog.opamp(circuit.opamp)
+    sections = opamp.sections * len(circuit.packages)
+    current = opamp.supply_current
+    most = current.max if current.max is not None else current.nominal
+    return (
+        f"Supply: ± {circuit.supply:g} V at `vcc` and `vee`. The {sections} amplifiers draw "
+        f"{_q(sections * current.nominal, 'A')} from each rail, {_q(sections * most, 'A')} at "
+        "most; what they deliver comes on top."
+    )
+
+
+def _outputs(circuit: Circuit, choice: BoardChoice) -> str:
+    ohms = choice.spec.probe_resistor
+    corner = 1.0 / (2.0 * math.pi * ohms * PROBE)
+    return (
+        f"Each output is shown through {_q(ohms, 'Ω')}: with {_q(PROBE, 'F')} of cable the signal "
+        f"is right up to {_q(corner / 10.0, 'Hz')} or so, and the amplifier does not feel the "
+        "cable. Keep probes off the summing nodes: a few picofarads there move the circuit."
+    )
+
+
+def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
+    opamp = made.catalog.opamp(circuit.opamp)
+    most = None if opamp.input_current is None else opamp.input_current.max
+    lines = []
+    for node in driven_nodes(circuit):
+        ohms = drive_resistance(circuit, node)
+        current = fault_current(circuit, node, GENERATOR_MOST)
+        said = (
+            f"`{node}`: {_q(GENERATOR_MOST, 'V')} from the generator, the most that a usual one "
+            f"gives, drive {_q(current, 'A')} through {_q(ohms, 'Ω')}."
+        )
+        if most is not None:
+            word = "below" if current < most else "above"
+            said += f" That is {word} the {_q(most, 'A')} that an input of the op-amp stands."
+        if choice.spec.input_protection:
+            level = protection_offset(circuit, node, choice, made.catalog, opamp.offset_limit)
+            said += (
+                f" The two diodes take it to ground. With {_q(opamp.offset_limit, 'V')} of input "
+                f"offset across them they leak as much as {_q(level, 'V')} of DC at the generator."
+            )
+        lines.append(f"- {said}")
+    if not lines:
+        return []
+    head = "If the generator is on while the supply is off, its current goes into the inputs."
+    return ["## Generator before supply", head, "\n".join(lines)]
+
+
+def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
+    trimmers = [p for p in circuit.fittings if isinstance(p, Trimmer)]
+    if not trimmers:
+        return []
+    name = trimmers[0].name
+    series = next(
+        p for p in circuit.fittings if trimmers[0].wiper in p.nets and p is not trimmers[0]
+    )
+    reach = trim_reach(circuit)
+    fit = (
+        "It is fitted."
+        if View.BOM in trimmers[0].views
+        else f"It is not fitted, and not on the bill: the generator's DC offset does the same. Fit "
+        f"{name} and {series.name} where the generator has none."
+    )
+    steps = [
+        f"Turn {name} until its wiper, net `trim`, is at 0 V.",
+        "Start the board as the first line of `setup.csv` says. On the X-Y display, `v1` against "
+        "`fv`, read where `fv` leaves zero.",
+        "Switch the generator off, leave it connected, and wait until `v1` rests.",
+        f"Turn the scale of `v1` up ten times, and {name} until {_centred(circuit)}. If {name} "
+        "comes to its end first, leave it there.",
+        "This one setting is for all responses.",
+    ]
+    head = (
+        f"{name} and {series.name} add to the summing node what a DC of up to ± {_q(reach, 'V')} "
+        f"at the generator would (the design asks for ± {_q(choice.trim, 'V')}). They cancel the "
+        "constant force of offsets, bias currents and unequal limits."
+    )
+    numbered = "\n".join(f"{i}. {step}" for i, step in enumerate(steps, start=1))
+    return ["## DC trim", f"{head} {fit}", numbered]
+
+
+def _centred(circuit: Circuit) -> str:
+    """Where v1 is to rest."""
+    rest, stops = at_rest(Boards.of(circuit, [nominal_board(circuit)]))
+    if len(stops) == 2:
+        return "`v1` rests in the middle of the two voltages"
+    away = [f"{_q(abs(float(rest[0] - v[0])), 'V', 4)} from that voltage" for v in stops.values()]
+    return f"`v1` rests {away[0] if away else 'at ' + _q(float(rest[0]), 'V', 3)}"
+
+
+def _spare(circuit: Circuit) -> list[str]:
+    names = [p.name for p in circuit.fittings if isinstance(p, Section)]
+    if not names:
+        return []
+    return [
+        "## Spare amplifiers",
+        f"{', '.join(names)}: a follower with its input at ground, so that neither input nor "
+        "output floats or sits at a limit.",
+    ]

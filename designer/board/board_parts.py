@@ -1,0 +1,223 @@
+"""What a board needs that no equation knows of: supplies, connectors, probes, trim, protection.
+
+Everything is added to ``Circuit.fittings``; the simulated parts stay as they are, and every
+addition is neutral while the circuit works (docs/board.md says why).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from designer.base.errors import Unreachable
+from designer.base.views import View
+from designer.catalog.catalog import Catalog
+from designer.catalog.diode_curve import THERMAL, diode_model
+from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.design import Design
+from designer.circuit.netlist import (
+    GROUND,
+    NEGATIVE,
+    POSITIVE,
+    Circuit,
+    Diode,
+    Fitting,
+    Resistor,
+    Section,
+)
+from designer.model.board_table import BoardChoice
+from designer.model.find_responses import ModelResponse
+from designer.model.model_file import ModelFile
+from designer.spread.part_grades import arrays, bought
+
+if TYPE_CHECKING:
+    from designer.check.synthesis_result import Synthesis
+    from designer.yields.run_result import RunResult
+
+LEAST_TRIM = 0.01
+"""Least reach of the DC trim, as a share of the generator's amplitude."""
+TRIMMER = 10e3
+"""The trimmer's resistance [Ω]: it lies between the rails and loads them with some milliamperes."""
+LEAST_SERIES = 10e3
+"""Least resistance [Ω] after the wiper, so that the trimmer's own does not count."""
+MOST_SERIES = 10e6
+"""Most resistance [Ω] after the wiper: beyond it a board's own leakage counts."""
+GENERATOR_MOST = 10.0
+"""Most [V peak] that a usual function generator gives without a load."""
+
+
+def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
+    """The circuit with everything that its board needs; what was fitted before is replaced.
+
+    Raises
+    ------
+    InputError : an op-amp, a diode or a connector that the catalogue does not have.
+    Unreachable : no resistor for a trim that is to be fitted can be bought. Footprints that stay
+        empty are left out then.
+    """
+    bare = replace(circuit, fittings=())
+    spec = choice.spec
+    parts: list[Fitting] = [*_spare(bare, catalog), *_supply(bare, choice)]
+    parts.append(Connector("J2", (bare.generator.net, GROUND), "generator"))
+    parts += _probes(bare, choice)
+    if spec.input_protection:
+        parts += _protection(bare, choice, catalog)
+    if spec.dc_trim != "none":
+        parts += _trim(bare, choice, catalog)
+    return replace(bare, fittings=tuple(parts))
+
+
+def board_choice(
+    modelfile: ModelFile, design: Design, found: Sequence[ModelResponse] = ()
+) -> BoardChoice:
+    """The choices of a model file for its design.
+
+    The trim reaches as far as the DC offset that a bench may set at the largest amplitude of the
+    wanted responses (``[tuning]``, ``offset``), and at least ``LEAST_TRIM`` of that amplitude.
+    """
+    amplitude = max((design.amplitude(r.b) for r in found), default=design.amplitude())
+    reach = amplitude * max(modelfile.tuning.offset, LEAST_TRIM)
+    return replace(BoardChoice.of(modelfile.circuit, modelfile.board), trim=reach)
+
+
+def board_circuit(made: Synthesis | RunResult) -> tuple[Circuit, BoardChoice]:
+    """The circuit of a design with its fittings, and the choices that they were made by."""
+    choice = board_choice(made.modelfile, made.design, made.found)
+    grades = bought(made.modelfile, made.design.circuit, made.catalog)
+    inside = arrays(made.modelfile, made.design.circuit, made.catalog)
+    choice = replace(choice, grades=grades, arrays=inside)
+    return fitted(made.design.circuit, choice, made.catalog), choice
+
+
+def outputs(circuit: Circuit) -> tuple[str, ...]:
+    """The nets that are shown: the states, and the dead zone's output where there is one."""
+    return (*circuit.state_nets, *([OUTPUT] if circuit.stops else []))
+
+
+def driven_nodes(circuit: Circuit) -> dict[str, tuple[Resistor, ...]]:
+    """The summing nodes that the generator drives, each with the resistors of its path."""
+    found: dict[str, tuple[Resistor, ...]] = {}
+    nodes = {s.inverting for s in circuit.sections}
+    for first in circuit.resistors:
+        if circuit.generator.net not in first.nets:
+            continue
+        net, path = _far(first, circuit.generator.net), [first]
+        while net not in nodes:  # the middle of a composite
+            second = next(r for r in circuit.resistors if net in r.nets and r not in path)
+            path.append(second)
+            net = _far(second, net)
+        found[net] = (*found.get(net, ()), *path)
+    return found
+
+
+def _far(resistor: Resistor, net: str) -> str:
+    return resistor.b if resistor.a == net else resistor.a
+
+
+def drive_resistance(circuit: Circuit, node: str) -> float:
+    """Resistance [Ω] between the generator and a driven summing node."""
+    path = driven_nodes(circuit)[node]
+    if all(set(r.nets) == {circuit.generator.net, node} for r in path):
+        return 1.0 / sum(1.0 / r.value for r in path)
+    return sum(r.value for r in path)
+
+
+def fault_current(circuit: Circuit, node: str, volts: float) -> float:
+    """Current [A] into a driven summing node that is at 0 V, from so many volts at the generator:
+    what the inputs of an unpowered op-amp, or the diodes before them, have to take."""
+    return volts / drive_resistance(circuit, node)
+
+
+def protection_offset(
+    circuit: Circuit, node: str, choice: BoardChoice, catalog: Catalog, across: float
+) -> float:
+    """DC at the generator [V] that acts as the leakage of the two diodes does, with ``across``
+    volts of input offset at the node: 2 Is sinh(V/nVt) through the drive's resistance."""
+    model = diode_model(catalog.diode(choice.diode))
+    leakage = 2.0 * model.saturation_current * math.sinh(across / (model.emission * THERMAL))
+    return leakage * drive_resistance(circuit, node)
+
+
+def trim_reach(circuit: Circuit) -> float:
+    """DC at the generator [V] that the trim stands for at either end of its travel; 0 without."""
+    trimmer = next((p for p in circuit.fittings if isinstance(p, Trimmer)), None)
+    if trimmer is None:
+        return 0.0
+    series = next(
+        p for p in circuit.fittings if isinstance(p, Resistor) and trimmer.wiper in p.nets
+    )
+    return circuit.supply * drive_resistance(circuit, series.b) / series.value
+
+
+def _spare(circuit: Circuit, catalog: Catalog) -> Iterator[Section]:
+    """Sections of a package that the circuit has no use for: followers of ground."""
+    used = {s.name for s in circuit.sections}
+    for package in circuit.packages:
+        for pin in catalog.opamp(circuit.opamp).pins:
+            name = f"{package}{pin.name}"
+            if name not in used:
+                net = f"{name.lower()}x"
+                yield Section(name, net, GROUND, net, "spare, tied off", views=View.BOARD)
+
+
+def _supply(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
+    yield Connector("J1", (POSITIVE, GROUND, NEGATIVE), "supply")
+    number = 901
+    for package in ("", *circuit.packages):
+        value = choice.spec.decoupling if package else choice.spec.bulk
+        role = f"decoupling of {package}" if package else "bulk of the supply"
+        for plus, minus in ((POSITIVE, GROUND), (GROUND, NEGATIVE)):
+            yield SupplyCapacitor(f"C{number}", plus, minus, value, role, package)
+            number += 1
+
+
+def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
+    """A resistor for each output, its pad behind it, and one connector for all."""
+    behind = []
+    for i, net in enumerate(outputs(circuit), start=1):
+        out = f"{net}_out"
+        behind.append(out)
+        value, role = choice.spec.probe_resistor, f"probe of {net}"
+        yield Resistor(f"R{900 + i}", net, out, value, role, View.FITTED)
+        if choice.spec.test_points:
+            yield TestPoint(f"TP{i}", out, f"probe of {net}")
+    if choice.spec.test_points:
+        yield TestPoint(f"TP{len(behind) + 1}", GROUND, "ground of the probes")
+    yield Connector("J3", (*behind, GROUND), "outputs")
+
+
+def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Diode]:
+    """Two diodes, opposed, from each driven summing node to ground."""
+    model = diode_model(catalog.diode(choice.diode))
+    number = 901
+    for node in driven_nodes(circuit):
+        role = f"protects {node} while the supply is off"
+        for anode, cathode in ((node, GROUND), (GROUND, node)):
+            yield Diode(f"D{number}", anode, cathode, model, False, role, View.FITTED)
+            number += 1
+
+
+def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Fitting]:
+    """A trimmer between the rails, and a resistor from its wiper into the driven summing node.
+
+    Where the resistor that is wanted lies outside what is used, the nearest end of that range is
+    taken: ``trim_reach`` says how far it goes.
+    """
+    views = View.FITTED if choice.spec.dc_trim == "fitted" else View.BOARD
+    node = next(iter(driven_nodes(circuit)), None)
+    if node is None:
+        return
+    wanted = circuit.supply * drive_resistance(circuit, node) / choice.trim
+    try:
+        sold = catalog.values("resistor", ["E24"], LEAST_SERIES, MOST_SERIES, choice.resistor_grade)
+    except Unreachable:
+        if views & View.BOM:
+            raise
+        return  # footprints that nobody could fill
+    value = float(max((v for v in sold if v <= wanted), default=sold[0]))
+    role = "DC trim"
+    yield Trimmer("RV901", NEGATIVE, "trim", POSITIVE, TRIMMER, role, views)
+    yield Resistor("R911", "trim", node, value, role, views)

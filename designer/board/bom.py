@@ -1,0 +1,105 @@
+"""The bill of materials: one row for each thing to buy, in our columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from designer.base.csv_tables import csv_text
+from designer.base.natural_sort import natural
+from designer.base.views import View
+from designer.board.component import Component
+
+COLUMNS = (
+    "quantity",
+    "designators",
+    "value",
+    "description",
+    "manufacturer",
+    "part_number",
+    "footprint",
+    "rating",
+    "price_class",
+    "grade",
+    "substitute",
+)
+KINDS = (
+    "resistor",
+    "array",
+    "capacitor",
+    "diode",
+    "reference",
+    "op-amp",
+    "trimmer",
+    "connector",
+    "test point",
+)
+"""Kinds of components in the order of the bill."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """quantity pieces of one part; designators name where they go."""
+
+    quantity: int
+    designators: tuple[str, ...]
+    value: str
+    description: str
+    manufacturer: str
+    part_number: str
+    footprint: str
+    rating: str
+    price_class: int
+    grade: str
+    substitute: str = ""
+
+    def cells(self) -> dict[str, str]:
+        row = {name: str(getattr(self, name)) for name in COLUMNS}
+        return {**row, "designators": " ".join(self.designators)}
+
+
+def bill(found: Iterable[Component]) -> tuple[Line, ...]:
+    """What is bought of these components, like parts together: by kind, then by value.
+
+    The generator is an instrument and stands on no bill; nor does what is not fitted.
+    """
+    groups: dict[tuple[str, str, str], list[Component]] = {}
+    for component in found:
+        if View.BOM in component.views and component.bought is not None:
+            bought = component.bought
+            key = (component.kind, bought.manufacturer, bought.part_number)
+            groups.setdefault(key, []).append(component)
+    lines = [(_place(here[0]), _line(here)) for here in groups.values()]
+    return tuple(line for _, line in sorted(lines, key=lambda pair: pair[0]))
+
+
+def _place(component: Component) -> tuple[object, ...]:
+    number = component.bought.part_number if component.bought else ""
+    return KINDS.index(component.kind), component.quantity or 0.0, number
+
+
+def _line(here: Sequence[Component]) -> Line:
+    first = here[0]
+    bought = first.bought
+    assert bought is not None
+    said = [] if first.kind in ("resistor", "capacitor") else [c.description for c in here]
+    if first.kind != "op-amp":
+        said += [c.role for c in here]
+    return Line(
+        quantity=len(here),
+        designators=tuple(sorted((c.reference for c in here), key=natural)),
+        value=first.value,
+        description="; ".join(dict.fromkeys(said)),
+        manufacturer=bought.manufacturer,
+        part_number=bought.part_number,
+        footprint=first.footprint,
+        rating=bought.rating,
+        price_class=bought.price_class,
+        grade="" if bought.grade is None else f"{bought.grade:.3g}",
+        substitute=bought.substitute,
+    )
+
+
+def bill_csv(lines: Iterable[Line]) -> str:
+    """The bill as CSV."""
+    return csv_text(COLUMNS, (line.cells() for line in lines))

@@ -1,0 +1,152 @@
+"""Bills of materials in the columns of others: KiCad's, an assembler's, one's own.
+
+A layout is a TOML file in a folder ``bom-layouts`` beside the catalogue's files, named after it
+(docs/board.md); folders are searched as the catalogue's are, so a user's own comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+from designer.base.csv_tables import csv_text
+from designer.base.errors import InputError
+from designer.base.schema import (
+    STRICT,
+    Accepts,
+    checked,
+    choice,
+    exactly,
+    line,
+    lines,
+    one_of,
+    parse_toml,
+)
+from designer.board.bom import COLUMNS, Line
+from designer.catalog.catalog import LAYOUTS
+
+FIELDS = (*COLUMNS, "package", "comment")
+"""What a column may show: a field of the bill; the footprint's name; value, grade and number."""
+_MAX_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class Column:
+    """title : its heading. field : of ``FIELDS``; None for a column of one text."""
+
+    title: str
+    field: str | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A bill's columns; ``separator`` stands between designators."""
+
+    name: str
+    separator: str
+    columns: tuple[Column, ...]
+
+    @property
+    def file(self) -> str:
+        """Name of the bill in this layout."""
+        return file_of(self.name)
+
+    def csv(self, bought: Iterable[Line]) -> str:
+        """The bill as CSV."""
+        titles = [column.title for column in self.columns]
+        rows = [
+            {column.title: self._cell(column, one) for column in self.columns} for one in bought
+        ]
+        return csv_text(titles, rows)
+
+    def _cell(self, column: Column, one: Line) -> str:
+        if column.field is None:
+            return column.text
+        if column.field == "designators":
+            return self.separator.join(one.designators)
+        if column.field == "package":
+            return one.footprint.rpartition(":")[2]
+        if column.field == "comment":
+            grade = f"{100.0 * float(one.grade):g}%" if one.grade else ""
+            return " ".join(dict.fromkeys(w for w in (one.value, grade, one.part_number) if w))
+        return one.cells()[column.field]
+
+
+def file_of(name: str) -> str:
+    """Name of the bill in the layout of this name."""
+    return f"bom-{name}.csv"
+
+
+def layouts(names: Sequence[str], folders: Sequence[Path]) -> tuple[Layout, ...]:
+    """The layouts of these names, from the first folder that has each.
+
+    Raises
+    ------
+    InputError : no folder has one; or anything in its file is wrong.
+    """
+    return tuple(_layout(name, folders) for name in names)
+
+
+def _layout(name: str, folders: Sequence[Path]) -> Layout:
+    for folder in folders:
+        path = folder / LAYOUTS / f"{name}.toml"
+        if path.is_file():
+            return _read(name, path)
+    known = {p.stem for folder in folders for p in (folder / LAYOUTS).glob("*.toml")}
+    raise InputError(None, "board.bom", name, one_of(name, sorted(known)))
+
+
+def _read(name: str, path: Path) -> Layout:
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(_MAX_BYTES + 1)
+        text = content.decode("utf-8-sig")
+    except OSError as error:
+        reason = error.strerror or "unreadable"
+        raise InputError(path, "the file", reason, "a layout that can be read") from None
+    except UnicodeDecodeError:
+        raise InputError(path, "the file", "other bytes", "text in UTF-8") from None
+    if len(content) > _MAX_BYTES:
+        raise InputError(path, "the file", f"more than {_MAX_BYTES} bytes", "a layout")
+    table = checked(_LayoutTable, parse_toml(text, str(path)), str(path))
+    for number, column in enumerate(table.columns, start=1):
+        if (column.field is None) == (column.text is None):
+            found = "neither" if column.field is None else "both"
+            raise InputError(path, f"columns[{number}]", found, "field or text")
+    titles = [column.title for column in table.columns]
+    twice = next((title for title in titles if titles.count(title) > 1), None)
+    if twice is not None or not titles:
+        raise InputError(path, "columns", twice or "nothing", "columns, each title once")
+    columns = tuple(Column(c.title, c.field, c.text or "") for c in table.columns)
+    return Layout(name, table.separator, columns)
+
+
+def _text() -> Accepts:
+    def check(value: object) -> str:
+        if not isinstance(value, str) or not value.isprintable() or len(value) > 200:
+            raise ValueError
+        return value
+
+    return Accepts("text of one line, possibly empty", check)
+
+
+class _ColumnTable(BaseModel):
+    model_config = STRICT
+    title: Annotated[str, line("a heading of one line")]
+    field: Annotated[str | None, choice(*FIELDS)] = None
+    text: Annotated[str | None, _text()] = None
+
+
+class _LayoutTable(BaseModel):
+    model_config = STRICT
+    format: Annotated[int, exactly(1, "1, the format that this version reads")]
+    separator: Annotated[str, _text()] = " "
+    columns: tuple[_ColumnTable, ...] = Field(
+        strict=False, description="a list of tables of title and field, or title and text"
+    )
+    sources: Annotated[tuple[str, ...], lines("a list of where the columns are described")] = ()

@@ -1,0 +1,235 @@
+"""What is drawn together: cells of a schematic, read from a circuit's parts and nets.
+
+A chain is two-pin parts in a row that only meet each other: the two halves of a series composite, a
+clamp and its resistor. Each amplifier is a cell of its input chains, its feedback chains and what
+hangs on its output; what is left (a reference and its feed) is a cell of rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from designer.base.units import format_quantity
+from designer.base.views import View
+from designer.board.pins import SUPPLY_UNIT
+from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.netlist import (
+    GROUND,
+    NEGATIVE,
+    POSITIVE,
+    Capacitor,
+    Circuit,
+    Diode,
+    Fitting,
+    Reference,
+    Resistor,
+    Section,
+)
+from designer.circuit.stage_title import section_stages
+
+TwoPin = Resistor | Capacitor | Diode | Reference | SupplyCapacitor
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Parts from net ``start`` to net ``end``."""
+
+    start: str
+    end: str
+    parts: tuple[TwoPin, ...]
+
+    @property
+    def turned(self) -> Chain:
+        return Chain(self.end, self.start, self.parts[::-1])
+
+    @property
+    def nets(self) -> frozenset[str]:
+        return frozenset((self.start, self.end))
+
+    def forward(self, index: int) -> bool:
+        """Whether the first pin of a part (its plus, its anode) is on the side of ``start``."""
+        net = self.start
+        for part in self.parts[:index]:
+            net = next(n for n in part.nets if n != net)
+        part = self.parts[index]
+        first = part.anode if isinstance(part, Diode | Reference) else part.nets[0]
+        return first == net
+
+
+@dataclass(frozen=True)
+class Amplifier:
+    """A cell around one section. series, shunts : from its output on, and from there to ground."""
+
+    section: Section
+    title: str
+    inputs: tuple[Chain, ...]
+    feedback: tuple[Chain, ...]
+    series: Chain | None
+    shunts: tuple[Chain, ...]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A cell of rows: each a chain, or a line of text. at : pads that carry a net."""
+
+    title: str
+    rows: tuple[Chain | str, ...]
+    at: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+
+Cell = Amplifier | Rows
+
+
+def chains(parts: Iterable[TwoPin], shown: frozenset[str]) -> list[Chain]:
+    """The parts joined to chains; nets of ``shown``, and where other than two meet, are ends."""
+    left = list(parts)
+    counts: dict[str, int] = {}
+    for part in left:
+        for net in part.nets:
+            counts[net] = counts.get(net, 0) + 1
+    inner = {net for net, count in counts.items() if count == 2 and net not in shown}
+    out = []
+    while left:
+        ends = [p for p in left if not set(p.nets) <= inner]
+        first = (ends or left)[0]
+        left.remove(first)
+        start, net = first.nets if first.nets[0] not in inner else first.nets[::-1]
+        found = [first]
+        while net in inner:
+            following = next((p for p in left if net in p.nets), None)
+            if following is None:
+                break
+            left.remove(following)
+            found.append(following)
+            net = following.nets[1] if following.nets[0] == net else following.nets[0]
+        out.append(Chain(start, net, tuple(found)))
+    order = {part: i for i, part in enumerate(parts)} if isinstance(parts, Sequence) else {}
+    return sorted(out, key=lambda chain: min((order.get(p, 0) for p in chain.parts), default=0))
+
+
+def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
+    """Rows of cells: for each mass its velocity, displacement and inverses; then the dead zone."""
+    pins = {net for s in circuit.sections for net in s.nets}
+    shown = frozenset(pins | {GROUND, POSITIVE, NEGATIVE, OUTPUT, circuit.generator.net})
+    two_pin = [p for p in circuit.parts if not isinstance(p, Section)]
+    left = chains(two_pin, shown)
+    stages = section_stages(circuit)
+    cells = {s.name: _amplifier(circuit, s, stages[s.name], left) for s in circuit.sections}
+    rows: list[tuple[Cell, ...]] = []
+    by_stage = {stages[name]: cell for name, cell in cells.items() if not cell.section.limits}
+    for mass in range(len(circuit.state_nets) // 2):
+        wanted = [f"{kind} {2 * mass + s}" for s in (2, 1) for kind in ("integrator", "inverter")]
+        rows.append(tuple(by_stage.pop(name) for name in wanted if name in by_stage))
+    rows.append(tuple(by_stage.values()))  # amplifiers of no known kind
+    zone = [cell for cell in cells.values() if cell.section.limits]
+    rest = tuple(Rows(f"dead zone · {net}", tuple(group)) for net, group in _groups(left))
+    rows.append((*rest, *zone))
+    return tuple(row for row in rows if row)
+
+
+def _amplifier(circuit: Circuit, section: Section, stage: str, left: list[Chain]) -> Amplifier:
+    """The cell of a section; takes its chains out of ``left``."""
+    node, out = section.inverting, section.output
+    nodes = {s.inverting for s in circuit.sections}
+    # Behind its diode a rectifier's output is the stage's.
+    beyond = {OUTPUT for chain in left if chain.nets == {out, OUTPUT}}
+    ends = {out, *beyond} - nodes
+    inputs: list[Chain] = []
+    feedback: list[Chain] = []
+    shunts: list[Chain] = []
+    series: Chain | None = None
+    for chain in list(left):
+        if node in chain.nets:
+            turned = chain if chain.end == node else chain.turned
+            (feedback if turned.start in ends else inputs).append(turned)
+        elif out in chain.nets and not (chain.nets & nodes):
+            turned = chain if chain.start == out else chain.turned
+            if series is None and turned.end != GROUND:
+                series = turned
+            else:
+                shunts.append(turned)
+        else:
+            continue
+        left.remove(chain)
+    if series is not None:
+        for chain in [c for c in left if c.nets == {series.end, GROUND}]:
+            shunts.append(chain if chain.start == series.end else chain.turned)
+            left.remove(chain)
+    return Amplifier(
+        section, f"{stage} · {section.name}", tuple(inputs), tuple(feedback), series, tuple(shunts)
+    )
+
+
+def _groups(left: Sequence[Chain]) -> Iterator[tuple[str, list[Chain]]]:
+    """What no amplifier took, by the net that it makes."""
+    rails = {GROUND, POSITIVE, NEGATIVE}
+    groups: dict[str, list[Chain]] = {}
+    for chain in left:
+        net = next((n for n in (chain.start, chain.end) if n not in rails), chain.end)
+        groups.setdefault(net, []).append(chain if chain.end == net else chain.turned)
+    yield from groups.items()
+
+
+def board_cells(
+    circuit: Circuit, numbers: Mapping[str, Mapping[str, str]] = MappingProxyType({})
+) -> tuple[Cell, ...]:
+    """What the board has beside the circuit: outputs, generator and trim, supply, decoupling.
+
+    numbers : pads by name of the pin, by unit of a package (``drawing.Numbers``).
+    """
+    fittings = circuit.fittings
+    if not fittings:
+        return ()
+    pads = _pads(fittings)
+    shown: list[Chain | str] = []
+    drive: list[Chain | str] = []
+    said: list[str] = []
+    for part in fittings:
+        if isinstance(part, Resistor):
+            (shown if part.b in pads else drive).append(Chain(part.a, part.b, (part,)))
+        elif isinstance(part, Diode):
+            drive.append(Chain(part.anode, part.cathode, (part,)))
+        elif isinstance(part, Trimmer):
+            value = format_quantity(part.value, "Ω")
+            said.append(f"{part.name} {value}: {part.low} … {part.wiper} … {part.high}")
+            if View.BOM not in part.views:
+                said.append("the DC trim is not fitted")
+    tied = [p.name for p in fittings if isinstance(p, Section)]
+    supply = [f"{_said(n)}: {', '.join(pads[n])}" for n in (POSITIVE, GROUND, NEGATIVE)]
+    supply.insert(0, f"{circuit.generator.net}: {', '.join(pads[circuit.generator.net])}")
+    for package in circuit.packages:
+        pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})
+        if pads_of:
+            said_of = ", ".join(f"{_said(pin)} {pad}" for pin, pad in pads_of.items())
+            supply.append(f"{package}: {said_of}")
+    if tied:
+        supply.append(f"spare, followers of ground: {', '.join(tied)}")
+    cells = [
+        Rows("board: outputs", tuple(shown), pads),
+        Rows("board: generator", (*drive, *said)),
+        Rows("board: connectors", tuple(supply)),
+    ]
+    for rail in (NEGATIVE, POSITIVE):
+        near = [p for p in fittings if isinstance(p, SupplyCapacitor) and rail in p.nets]
+        rows = tuple(Chain(p.plus, p.minus, (p,)) for p in near)
+        cells.insert(2, Rows(f"board: decoupling of {rail}", rows))
+    return tuple(cell for cell in cells if cell.rows)
+
+
+def _pads(fittings: Sequence[Fitting]) -> dict[str, list[str]]:
+    """The test points and connector pins of each net."""
+    where: dict[str, list[str]] = {}
+    for part in fittings:
+        if isinstance(part, TestPoint):
+            where.setdefault(part.net, []).append(part.name)
+        if isinstance(part, Connector):
+            for way, net in enumerate(part.ways, start=1):
+                where.setdefault(net, []).append(f"{part.name}-{way}")
+    return where
+
+
+def _said(net: str) -> str:
+    return "GND" if net == GROUND else net

@@ -1,0 +1,135 @@
+"""The board file: every component placed, every pad with its net, nothing routed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from designer.base.sexpr import Expression, expression, word
+from designer.board.kicad_footprint import FILE_VERSION, on_board
+from designer.board.kicad_items import Entry
+from designer.board.kicad_layout import PAPERS
+from designer.board.kicad_names import LIBRARY, identifier, kicad_net, safe_text
+from designer.board.kicad_placement import Placement
+from designer.board.kicad_sheet import symbol_id
+
+LAYERS = (
+    (0, "F.Cu", "signal"),
+    (2, "B.Cu", "signal"),
+    (9, "F.Adhes", "user"),
+    (11, "B.Adhes", "user"),
+    (13, "F.Paste", "user"),
+    (15, "B.Paste", "user"),
+    (5, "F.SilkS", "user"),
+    (7, "B.SilkS", "user"),
+    (1, "F.Mask", "user"),
+    (3, "B.Mask", "user"),
+    (17, "Dwgs.User", "user"),
+    (19, "Cmts.User", "user"),
+    (21, "Eco1.User", "user"),
+    (23, "Eco2.User", "user"),
+    (25, "Edge.Cuts", "user"),
+    (27, "Margin", "user"),
+    (31, "F.CrtYd", "user"),
+    (29, "B.CrtYd", "user"),
+    (35, "F.Fab", "user"),
+    (33, "B.Fab", "user"),
+)
+"""KiCad 9's numbers of the layers of a board with two sides."""
+THICKNESS = 1.6
+"""Of the board [mm]."""
+
+
+def board(project: str, title: str, entries: Sequence[Entry], placement: Placement) -> Expression:
+    """The file ``.kicad_pcb``. title : from the model file, as it is."""
+    by_reference = {e.item.reference: e for e in entries}
+    pads = {
+        spot.component.reference: _pad_nets(by_reference[spot.component.reference])
+        for spot in placement.spots
+    }
+    names = sorted({net for found in pads.values() for net in found.values() if net})
+    nets = {"": 0} | {name: i for i, name in enumerate(names, start=1)}
+    return expression(
+        "kicad_pcb",
+        expression("version", FILE_VERSION),
+        expression("generator", LIBRARY),
+        expression("generator_version", "9.0"),
+        expression(
+            "general", expression("thickness", THICKNESS), expression("legacy_teardrops", False)
+        ),
+        expression("paper", _paper(placement)),
+        expression("title_block", expression("title", safe_text(title))),
+        expression(
+            "layers",
+            *(_layer(number, name, kind) for number, name, kind in LAYERS),
+        ),
+        expression(
+            "setup",
+            expression("pad_to_mask_clearance", 0),
+            expression("allow_soldermask_bridges_in_footprints", False),
+        ),
+        *(expression("net", number, name) for name, number in nets.items()),
+        *(
+            on_board(
+                spot,
+                owner=(project, spot.component.reference),
+                path=symbol_id(project, spot.component.reference),
+                sheet=f"{project}.kicad_sch",
+                fields=_fields(by_reference[spot.component.reference]),
+                nets=nets,
+                names=pads[spot.component.reference],
+            )
+            for spot in placement.spots
+        ),
+        _outline(project, placement),
+        expression("embedded_fonts", False),
+    )
+
+
+def _layer(number: int, name: str, kind: str) -> Expression:
+    return expression(str(number), name, word(kind))
+
+
+def _paper(placement: Placement) -> str:
+    """The smallest sheet on which the board stands clear of the title block."""
+    box = placement.outline
+    for name, (width, height) in PAPERS.items():
+        if box.right < width - 15.0 and box.bottom < height - 50.0:
+            return name
+    return "A0"
+
+
+def _pad_nets(entry: Entry) -> dict[str, str]:
+    """KiCad's name of the net of each pad."""
+    component = entry.component
+    assert component is not None
+    return {
+        pin.number: kicad_net(pin.net)
+        if pin.net
+        else open_net(component.reference, pin.name, pin.number)
+        for pin in component.pins
+    }
+
+
+def open_net(reference: str, name: str, number: str) -> str:
+    """What KiCad calls the net of a pin that is not connected."""
+    pad = f"Pad{number}" if not name or name == number else f"{name}-Pad{number}"
+    return f"unconnected-({reference}-{pad})"
+
+
+def _fields(entry: Entry) -> list[tuple[str, str]]:
+    """Fields of the symbol that the board repeats."""
+    held = {"Datasheet": "", "Description": "", **dict(entry.fields)}
+    return [(key, text) for key, text in held.items() if key != "Footprint"]
+
+
+def _outline(project: str, placement: Placement) -> Expression:
+    box = placement.outline
+    return expression(
+        "gr_rect",
+        expression("start", box.left, box.top),
+        expression("end", box.right, box.bottom),
+        expression("stroke", expression("width", 0.05), expression("type", word("default"))),
+        expression("fill", False),
+        expression("layer", "Edge.Cuts"),
+        expression("uuid", identifier(project, "outline")),
+    )

@@ -1,0 +1,204 @@
+"""Footprints as KiCad writes them: in the project's library, and on the board."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from designer.base.sexpr import Expression, expression, word
+from designer.board.footprint_shapes import Footprint, Pad
+from designer.board.kicad_names import LIBRARY, identifier
+from designer.board.kicad_placement import TEXT, Spot
+from designer.board.pins import Pin
+
+FILE_VERSION = 20241229
+"""Of footprints and boards, as KiCad 9 writes them."""
+ROUND = 0.25
+"""Radius of a pad's corners, of its shorter side."""
+
+
+def module(shape: Footprint) -> Expression:
+    """The file ``.kicad_mod`` of the project's library."""
+    return expression(
+        "footprint",
+        shape.name,
+        expression("version", FILE_VERSION),
+        expression("generator", LIBRARY),
+        expression("generator_version", "9.0"),
+        expression("layer", "F.Cu"),
+        *_texts(shape, "REF**", shape.name, 0, (shape.name,)),
+        _attributes(shape),
+        *_drawing(shape, (shape.name,)),
+        *(_pad(pad, 0, (shape.name,)) for pad in shape.pads),
+        expression("embedded_fonts", False),
+    )
+
+
+def on_board(
+    spot: Spot,
+    *,
+    owner: tuple[str, str],
+    path: str,
+    sheet: str,
+    fields: Iterable[tuple[str, str]],
+    nets: Mapping[str, int],
+    names: Mapping[str, str],
+) -> Expression:
+    """The footprint of a component at its place.
+
+    owner : project and reference, which the ids are made from; path : id of its symbol; sheet :
+    the schematic's file. fields : of its symbol. nets : number of each net by its KiCad name;
+    names : KiCad's name of the net of each pad.
+    """
+    component, shape = spot.component, spot.footprint
+    ids = ("board", *owner)
+    pins = {pin.number: pin for pin in component.pins}
+    return expression(
+        "footprint",
+        f"{LIBRARY}:{shape.name}",
+        expression("layer", "F.Cu"),
+        _id(*ids),
+        _at(spot.x, spot.y, spot.angle),
+        *_texts(shape, component.reference, component.value, spot.angle, ids),
+        *_fields(fields, spot.angle, ids),
+        expression("path", f"/{path}"),
+        expression("sheetname", "/"),
+        expression("sheetfile", sheet),
+        _attributes(shape, bought=component.bought is not None, fitted=component.fitted),
+        *_drawing(shape, ids),
+        *(
+            _pad(pad, spot.angle, ids, pins.get(pad.number), names.get(pad.number, ""), nets)
+            for pad in shape.pads
+        ),
+        expression("embedded_fonts", False),
+    )
+
+
+def _texts(
+    shape: Footprint, reference: str, value: str, angle: int, ids: tuple[str, ...]
+) -> Iterator[Expression]:
+    """The reference above the courtyard as it is seen, the value on the drawing below it."""
+    _, top, _, bottom = shape.courtyard
+    above, below = top - 0.25 - TEXT / 2.0, bottom + 0.25 + TEXT / 2.0
+    if angle == 180:
+        above, below = bottom + 0.25 + TEXT / 2.0, top - 0.25 - TEXT / 2.0
+    yield _property("Reference", reference, above, angle, "F.SilkS", ids)
+    yield _property("Value", value, below, angle, "F.Fab", ids)
+
+
+def _fields(
+    fields: Iterable[tuple[str, str]], angle: int, ids: tuple[str, ...]
+) -> Iterator[Expression]:
+    for key, text in fields:
+        yield _property(key, text, 0.0, angle, "F.Fab", ids, hide=True)
+
+
+def _property(
+    key: str, text: str, y: float, angle: int, layer: str, ids: tuple[str, ...], hide: bool = False
+) -> Expression:
+    font = expression("font", expression("size", TEXT, TEXT), expression("thickness", 0.12))
+    return expression(
+        "property",
+        key,
+        text,
+        _at(0.0, y, angle),
+        expression("layer", layer),
+        *([expression("hide", True)] if hide else []),
+        _id(*ids, "field", key),
+        expression("effects", font),
+    )
+
+
+def _attributes(shape: Footprint, *, bought: bool = True, fitted: bool = True) -> Expression:
+    kind = [] if not shape.soldered else ["through_hole" if shape.through_hole else "smd"]
+    left_out = [] if shape.soldered else ["exclude_from_pos_files"]
+    left_out += [] if bought and fitted and shape.soldered else ["exclude_from_bom"]
+    left_out += [] if fitted else ["dnp"]
+    return expression("attr", *map(word, [*kind, *left_out]))
+
+
+def _drawing(shape: Footprint, ids: tuple[str, ...]) -> Iterator[Expression]:
+    """Body, courtyard, an outline in silk, and a dot at pin 1 where it matters."""
+    wide, high = shape.body[0] / 2.0, shape.body[1] / 2.0
+    if wide and high:
+        yield _box("F.Fab", (-wide, -high, wide, high), 0.1, ids)
+    yield _box("F.CrtYd", shape.courtyard, 0.05, ids)
+    left, top, right, bottom = shape.extent
+    if shape.soldered:
+        outline = (left - 0.17, top - 0.17, right + 0.17, bottom + 0.17)
+        yield _box("F.SilkS", outline, 0.12, ids)
+    if shape.mark:
+        first = next(pad for pad in shape.pads if pad.number == "1")
+        # Beside the outline, within the courtyard.
+        if first.x < 0.0 or len(shape.pads) == 2 or first.x == 0.0:
+            centre = (left - 0.34, first.y)
+        else:
+            centre = (right + 0.34, first.y)
+        yield expression(
+            "fp_circle",
+            expression("center", *centre),
+            expression("end", centre[0] + 0.08, centre[1]),
+            _stroke(0.16),
+            expression("fill", True),
+            expression("layer", "F.SilkS"),
+            _id(*ids, "first"),
+        )
+
+
+def _box(
+    layer: str, box: tuple[float, float, float, float], width: float, ids: tuple[str, ...]
+) -> Expression:
+    return expression(
+        "fp_rect",
+        expression("start", box[0], box[1]),
+        expression("end", box[2], box[3]),
+        _stroke(width),
+        expression("fill", False),
+        expression("layer", layer),
+        _id(*ids, "box", layer),
+    )
+
+
+def _pad(
+    pad: Pad,
+    angle: int,
+    ids: tuple[str, ...],
+    pin: Pin | None = None,
+    net: str = "",
+    nets: Mapping[str, int] | None = None,
+) -> Expression:
+    hole = pad.drill > 0.0
+    bare = not hole and pad.width == pad.height
+    form = "rect" if pad.first else "circle" if hole or bare else "roundrect"
+    if hole and pad.width != pad.height and not pad.first:
+        form = "oval"
+    layers = ["*.Cu", "*.Mask"] if hole else ["F.Cu", "F.Mask"]
+    if not hole and not bare:
+        layers.append("F.Paste")
+    return expression(
+        "pad",
+        pad.number,
+        word("thru_hole" if hole else "smd"),
+        word(form),
+        _at(pad.x, pad.y, angle),
+        expression("size", pad.width, pad.height),
+        *([expression("drill", pad.drill)] if hole else []),
+        expression("layers", *layers),
+        *([expression("remove_unused_layers", False)] if hole else []),
+        *([expression("roundrect_rratio", ROUND)] if form == "roundrect" else []),
+        *([expression("net", nets[net], net)] if nets is not None and net else []),
+        *([expression("pinfunction", pin.name)] if pin is not None and nets is not None else []),
+        *([expression("pintype", pin.electrical)] if pin is not None and nets is not None else []),
+        _id(*ids, "pad", pad.number),
+    )
+
+
+def _at(x: float, y: float, angle: int) -> Expression:
+    return expression("at", x, y, angle) if angle else expression("at", x, y)
+
+
+def _stroke(width: float) -> Expression:
+    return expression("stroke", expression("width", width), expression("type", word("solid")))
+
+
+def _id(*what: str) -> Expression:
+    return expression("uuid", identifier(*what))

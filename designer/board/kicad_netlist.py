@@ -1,0 +1,70 @@
+"""The netlist of the board, ``.net``: written from the components, not from the sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from designer.base.sexpr import Expression, expression
+from designer.base.views import View
+from designer.board.component import Component, joined
+from designer.board.kicad_board import open_net
+from designer.board.kicad_items import Entry
+from designer.board.kicad_names import kicad_net
+from designer.board.kicad_sheet import symbol_id
+
+Pads = Mapping[str, tuple[tuple[str, str], ...]]
+
+
+def netlist(project: str, entries: Sequence[Entry]) -> Expression:
+    """The file ``.net``: components of the board with their fields, and what each net joins."""
+    held = [e for e in entries if e.component is not None and e.placed]
+    found = [e.component for e in held if e.component is not None]
+    return expression(
+        "export",
+        expression("version", "E"),
+        expression("design", expression("source", f"{project}.kicad_sch")),
+        expression("components", *(_component(project, entry) for entry in held)),
+        expression(
+            "nets",
+            *(_net(code, name, pads) for code, (name, pads) in enumerate(nets(found).items(), 1)),
+        ),
+    )
+
+
+def nets(components: Sequence[Component]) -> Pads:
+    """KiCad's name of each net of the board → its (reference, pad); open pins have one each."""
+    placed = [c for c in components if View.BOARD in c.views]
+    out = {kicad_net(net): pads for net, pads in joined(placed).items()}
+    for component in placed:
+        for pin in component.pins:
+            if not pin.net:
+                name = open_net(component.reference, pin.name, pin.number)
+                out[name] = ((component.reference, pin.number),)
+    return dict(sorted(out.items()))
+
+
+def _component(project: str, entry: Entry) -> Expression:
+    fields = dict(entry.fields)
+    reference = entry.item.reference
+    shown = {key: text for key, text in fields.items() if not key.startswith("Sim.")}
+    return expression(
+        "comp",
+        expression("ref", reference),
+        expression("value", entry.item.value),
+        expression("footprint", fields["Footprint"]),
+        expression(
+            "fields",
+            *(
+                expression("field", expression("name", key), text)
+                for key, text in shown.items()
+                if key != "Footprint"
+            ),
+        ),
+        expression("sheetpath", expression("names", "/"), expression("tstamps", "/")),
+        expression("tstamps", symbol_id(project, reference)),
+    )
+
+
+def _net(code: int, name: str, pads: Sequence[tuple[str, str]]) -> Expression:
+    nodes = (expression("node", expression("ref", r), expression("pin", p)) for r, p in pads)
+    return expression("net", expression("code", str(code)), expression("name", name), *nodes)

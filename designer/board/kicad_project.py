@@ -1,0 +1,112 @@
+"""A KiCad project: every file of it, as text, from a circuit and its components."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from designer.base.sexpr import expression, write
+from designer.board import kicad_sim
+from designer.board.component import Component
+from designer.board.kicad_board import board
+from designer.board.kicad_footprint import module
+from designer.board.kicad_items import entries
+from designer.board.kicad_names import LIBRARY, kicad_net, project_name
+from designer.board.kicad_netlist import netlist
+from designer.board.kicad_placement import place
+from designer.board.kicad_sheet import layout, schematic, shapes, sheet_id
+from designer.board.kicad_symbols import library
+from designer.check.first_responses import FirstRun
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
+
+SUMMING, SUPPLY = "summing", "supply"
+"""Net classes beside the default: an op-amp's inverting input; ground and the rails."""
+CLASSES: Mapping[str, Mapping[str, float]] = {
+    "Default": {"clearance": 0.2, "track_width": 0.25},
+    SUMMING: {"clearance": 0.3, "track_width": 0.2},
+    SUPPLY: {"clearance": 0.2, "track_width": 0.5},
+}
+"""Millimetres."""
+VIA: Mapping[str, float] = {"via_diameter": 0.6, "via_drill": 0.3}
+
+
+@dataclass(frozen=True)
+class Project:
+    """What a project is made from.
+
+    title : the model file's. rules : text of the ``.kicad_dru``.
+    """
+
+    title: str
+    circuit: Circuit
+    components: tuple[Component, ...]
+    run: FirstRun
+    rules: str
+
+    @property
+    def name(self) -> str:
+        """Of its files."""
+        return project_name(self.title)
+
+
+def files(project: Project) -> dict[str, str]:
+    """Every file by its name inside the project's folder.
+
+    Raises
+    ------
+    InputError : a footprint that is not known here.
+    """
+    name, circuit = project.name, project.circuit
+    models = f"{name}.lib"
+    made = entries(circuit, project.components, project.run, models)
+    sheet = layout(made, kicad_sim.directives(circuit, project.run))
+    placed = place(circuit, [c for e in made if e.placed and (c := e.component) is not None])
+    cases = {spot.footprint.name: spot.footprint for spot in placed.spots}
+    out = {
+        f"{name}.kicad_sch": write(schematic(name, project.title, made, sheet)),
+        f"{name}.kicad_pcb": write(board(name, project.title, made, placed)),
+        f"{name}.kicad_pro": settings(name, circuit),
+        f"{name}.net": write(netlist(name, made)),
+        models: kicad_sim.models(circuit, project.components),
+        f"{LIBRARY}.kicad_sym": write(library(shapes(sheet))),
+        "sym-lib-table": _table("sym_lib_table", f"{LIBRARY}.kicad_sym"),
+        "fp-lib-table": _table("fp_lib_table", f"{LIBRARY}.pretty"),
+        f"{name}.kicad_dru": project.rules,
+    }
+    for case, shape in sorted(cases.items()):
+        out[f"{LIBRARY}.pretty/{case}.kicad_mod"] = write(module(shape))
+    return out
+
+
+def settings(name: str, circuit: Circuit) -> str:
+    """The file ``.kicad_pro``: net classes, and which nets are in them."""
+    summing = sorted({s.inverting for s in circuit.sections} - {GROUND})
+    patterns = [(SUMMING, kicad_net(net)) for net in summing]
+    patterns += [(SUPPLY, kicad_net(net)) for net in (GROUND, POSITIVE, NEGATIVE)]
+    value: dict[str, Any] = {
+        "board": {"design_settings": {"defaults": {}, "rules": {}, "track_widths": []}},
+        "meta": {"filename": f"{name}.kicad_pro", "version": 3},
+        "net_settings": {
+            "classes": [{"name": n, **width, **VIA} for n, width in CLASSES.items()],
+            "meta": {"version": 4},
+            "netclass_patterns": [{"netclass": n, "pattern": p} for n, p in patterns],
+        },
+        "schematic": {"legacy_lib_dir": "", "legacy_lib_list": []},
+        "sheets": [[sheet_id(name), "Root"]],
+        "text_variables": {},
+    }
+    return json.dumps(value, indent=2, sort_keys=True) + "\n"
+
+
+def _table(kind: str, file: str) -> str:
+    row = expression(
+        "lib",
+        expression("name", LIBRARY),
+        expression("type", "KiCad"),
+        expression("uri", f"${{KIPRJMOD}}/{file}"),
+        expression("options", ""),
+        expression("descr", "of this project alone"),
+    )
+    return write(expression(kind, expression("version", 7), row))

@@ -1,0 +1,276 @@
+"""A KiCad board as the rules read it: what stands where, what is on which net, what is routed.
+
+A board file is foreign input: what is not as KiCad 9 writes it is refused with its place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from designer.base.errors import InputError
+from designer.base.natural_sort import natural
+from designer.base.sexpr import Expression, read
+from designer.base.units import parse_quantity
+from designer.base.views import View
+from designer.board.component import Component
+from designer.board.kicad_footprint import FILE_VERSION
+from designer.board.kicad_names import circuit_net
+from designer.board.outline import Outline, read_outline
+from designer.board.pad_shape import corners, turned
+
+OLDEST, NEWEST = 20221018, FILE_VERSION
+"""Versions of board files that are read: KiCad 7 to 9."""
+LARGEST = 50_000_000
+"""Bytes of a board file."""
+SHOWN = 5
+"""Differences that a message lists."""
+COURTYARDS = ("F.CrtYd", "B.CrtYd")
+EXPECTED = "a board of KiCad 7 to 9 (.kicad_pcb)"
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Pad:
+    """net : the circuit's name of it, "" where none is connected. at : on the board [mm].
+
+    corners : of the copper, or of the rectangle around it, in order [mm]; a circle's are many, and
+    a shape that is not read has none.
+    """
+
+    number: str
+    net: str
+    at: Point
+    corners: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """reference : its designator. value : as written. courtyard : whether it has one."""
+
+    reference: str
+    value: str
+    pads: tuple[Pad, ...]
+    courtyard: bool
+
+    @property
+    def wired(self) -> bool:
+        """Whether any pad is on a net: a mounting hole's is not."""
+        return any(pad.net for pad in self.pads)
+
+
+@dataclass(frozen=True)
+class Track:
+    """A piece of track [mm]."""
+
+    net: str
+    width: float
+    length: float
+
+
+@dataclass(frozen=True)
+class BoardFile:
+    """path : where it was read. text : as it stands there. vias, zones : the net of each.
+
+    outline : the board's edge.
+    """
+
+    path: Path
+    text: str
+    footprints: tuple[Footprint, ...]
+    tracks: tuple[Track, ...]
+    vias: tuple[str, ...]
+    zones: tuple[str, ...]
+    outline: Outline
+
+    def pads(self, reference: str) -> tuple[Pad, ...]:
+        """Pads of one component."""
+        return next((f.pads for f in self.footprints if f.reference == reference), ())
+
+    @property
+    def routed(self) -> frozenset[str]:
+        """Nets that have a track, a via or a zone."""
+        return frozenset([*(t.net for t in self.tracks), *self.vias, *self.zones])
+
+
+def read_board(path: Path) -> BoardFile:
+    """Read a ``.kicad_pcb``.
+
+    Raises
+    ------
+    InputError : it cannot be read, is cut off, is no board, or is newer than KiCad 9.
+    """
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise InputError(path, "--board", f"{size} bytes", f"{EXPECTED}, up to {LARGEST}")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(path, "--board", error.strerror or str(error), EXPECTED) from None
+    except ValueError:
+        raise InputError(path, "--board", "bytes that are no text in UTF-8", EXPECTED) from None
+    board = read(text, path)
+    if board.name != "kicad_pcb":
+        raise InputError(path, "--board", f"({board.name[:40]} …)", EXPECTED)
+    _check_version(board)
+    names = {net.text(0): net.text(1) for net in board.all("net")}
+    return BoardFile(
+        path=path,
+        text=text,
+        footprints=tuple(_footprint(each) for each in board.all("footprint")),
+        tracks=(
+            *(_segment(each, names) for each in board.all("segment")),
+            *(_arc(each, names) for each in board.all("arc")),
+        ),
+        vias=tuple(_net(each, names) for each in board.all("via")),
+        zones=tuple(_net(each, names) for each in board.all("zone")),
+        outline=read_outline(board),
+    )
+
+
+def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
+    """Whether a board is one of these components, of their values, on these nets.
+
+    Footprints without any net, such as mounting holes, may be there besides.
+
+    Raises
+    ------
+    InputError : designators, nets or values differ; says which.
+    """
+    wanted = {c.reference: c for c in components if View.BOARD in c.views}
+    there: dict[str, Footprint] = {}
+    for footprint in board.footprints:
+        if footprint.reference in there and footprint.reference in wanted:
+            raise InputError(
+                board.path, "footprints", f"{footprint.reference} twice", "each designator once"
+            )
+        there[footprint.reference] = footprint
+    missing = sorted(wanted.keys() - there.keys(), key=natural)
+    foreign = sorted((n for n in there.keys() - wanted.keys() if there[n].wired), key=natural)
+    if missing or foreign:
+        said = [f"without {_few(missing)}"] if missing else []
+        said += [f"with {_few(foreign)}"] if foreign else []
+        raise InputError(
+            board.path, "footprints", "; ".join(said), "the components of this design, all of them"
+        )
+    differ = []
+    for reference, component in wanted.items():
+        pads = {pad.number: pad.net for pad in there[reference].pads}
+        for number, net in component.nets.items():
+            if pads.get(number, "no such pad") != net:
+                found = pads.get(number, "no such pad") or "no net"
+                differ.append(f"{reference}.{number} on {found}, not on {net or 'no net'}")
+    if differ:
+        raise InputError(board.path, "nets", _few(differ, "; "), "the nets of this design")
+    other = [
+        f"{reference} is {there[reference].value or 'nothing'}, not {component.value}"
+        for reference, component in wanted.items()
+        if not _same_value(there[reference].value, component)
+    ]
+    if other:
+        raise InputError(board.path, "values", _few(other), "the values of this design")
+
+
+def _same_value(words: str, component: Component) -> bool:
+    """Whether a resistor or a capacitor has its value, however that is written."""
+    unit = {"resistor": "Ω", "capacitor": "F"}.get(component.kind)
+    if unit is None or component.quantity is None:
+        return True
+    try:
+        return math.isclose(parse_quantity(words, unit), component.quantity, rel_tol=1e-6)
+    except ValueError:
+        return False
+
+
+def _few(words: Sequence[str], between: str = ", ") -> str:
+    more = len(words) - SHOWN
+    return between.join(words[:SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
+def _check_version(board: Expression) -> None:
+    found = board.get("version").text()
+    if not found.isdigit():
+        raise board.get("version").error(found, "the number of a file version")
+    version = int(found)
+    if version > NEWEST:
+        raise InputError(
+            board.file,
+            "version",
+            found,
+            f"at most {NEWEST}, KiCad 9: this board is from a newer one",
+        )
+    if version < OLDEST:
+        raise InputError(
+            board.file, "version", found, f"at least {OLDEST}, KiCad 7: save the board with KiCad 9"
+        )
+
+
+def _footprint(found: Expression) -> Footprint:
+    at = found.get("at")
+    x, y = at.number(0), at.number(1)
+    turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
+    return Footprint(
+        _field(found, "Reference"),
+        _field(found, "Value"),
+        tuple(_pad(pad, (x, y), turn) for pad in found.all("pad")),
+        any(layer.text() in COURTYARDS for each in found.children for layer in each.all("layer")),
+    )
+
+
+def _field(found: Expression, name: str) -> str:
+    for each in found.all("property"):
+        if each.text(0) == name:
+            return each.text(1)
+    for each in found.all("fp_text"):  # KiCad 7
+        if each.text(0) == name.lower():
+            return each.text(1)
+    return ""
+
+
+def _pad(found: Expression, origin: Point, turn: float) -> Pad:
+    at = found.get("at")
+    place = turned((at.number(0), at.number(1)), origin, turn)
+    net = found.find("net")
+    return Pad(
+        found.text(0),
+        circuit_net(net.text(1)) if net is not None and not _unconnected(net.text(1)) else "",
+        place,
+        corners(found, place, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
+    )
+
+
+def _unconnected(net: str) -> bool:
+    """KiCad gives a pin that is marked as not connected a net of its own."""
+    return net.startswith("unconnected-(")
+
+
+def _net(found: Expression, names: dict[str, str]) -> str:
+    net = found.find("net")
+    return "" if net is None else circuit_net(names.get(net.text(), ""))
+
+
+def _segment(found: Expression, names: dict[str, str]) -> Track:
+    start, end = (_point(found.get(name)) for name in ("start", "end"))
+    return Track(_net(found, names), found.get("width").number(), math.dist(start, end))
+
+
+def _arc(found: Expression, names: dict[str, str]) -> Track:
+    start, mid, end = (_point(found.get(name)) for name in ("start", "mid", "end"))
+    return Track(_net(found, names), found.get("width").number(), arc_length(start, mid, end))
+
+
+def _point(found: Expression) -> Point:
+    return found.number(0), found.number(1)
+
+
+def arc_length(start: Point, mid: Point, end: Point) -> float:
+    """Length of the arc through three points [mm]; of the way along them where they are in line."""
+    a, b, c = math.dist(start, mid), math.dist(mid, end), math.dist(start, end)
+    cross = (mid[0] - start[0]) * (end[1] - start[1]) - (mid[1] - start[1]) * (end[0] - start[0])
+    if abs(cross) < 1e-9:
+        return a + b
+    radius = a * b * c / (2.0 * abs(cross))
+    # Each half is seen from the centre under twice the angle that it has at the circle.
+    return sum(2.0 * radius * math.asin(min(half / (2.0 * radius), 1.0)) for half in (a, b))

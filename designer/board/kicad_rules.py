@@ -1,0 +1,137 @@
+"""The rules of a board as KiCad's custom rules: the text of a ``.kicad_dru`` file.
+
+Conditions name nets, not net classes: these vanish with the project file. Of two rules that fit,
+KiCad takes the later one, so the general rule stands first. Past a syntax error KiCad drops every
+rule of the file without a word, and a condition that it does not know never holds; so
+``board_specimen`` makes a board that breaks each rule, for whoever runs them to see that they
+work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from designer.base.errors import InputError
+from designer.base.sexpr import Expression, expression, number_text, word, write_all
+from designer.board.kicad_names import kicad_net
+from designer.catalog.design_rule import Override
+from designer.catalog.design_rules import BY_ID
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
+
+SPACING: tuple[tuple[float, float, float], ...] = (
+    (15.0, 0.1, 0.13),
+    (30.0, 0.1, 0.25),
+    (50.0, 0.6, 0.4),
+    (100.0, 0.6, 0.5),
+    (150.0, 0.6, 0.8),
+    (170.0, 1.25, 0.8),
+    (300.0, 1.25, 0.8),
+    (500.0, 2.5, 1.5),
+)
+"""IPC-2221, table 6-1: up to [V], columns B2 and A6 [mm]."""
+MADE = 0.2
+"""Gap [mm] that board makers etch without extra cost, and KiCad's own default."""
+CANARY = "canary"
+CANARY_WIDTH, CANARY_LIMIT = 0.0371, 7.3371
+"""A track of a width [mm] that no board has, and the least that its rule asks for."""
+NONE: Mapping[str, Override] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class CustomRule:
+    """A rule in KiCad's words. id : of the rule that it says. limit [mm], or a count.
+
+    constraint : its type; least : whether the limit is from below; condition : "" for everything.
+    nets : KiCad's names of the nets that it speaks of, none for every net.
+    """
+
+    id: str
+    constraint: str
+    limit: float
+    least: bool
+    condition: str = ""
+    nets: tuple[str, ...] = ()
+
+    @property
+    def expression(self) -> Expression:
+        """The rule for a ``.kicad_dru`` file."""
+        counted = self.constraint == "via_count"
+        text = number_text(self.limit) if counted else f"{number_text(self.limit)}mm"
+        bound = expression("min" if self.least else "max", word(text))
+        parts = [expression("constraint", word(self.constraint), bound)]
+        if self.condition:
+            parts.append(expression("condition", self.condition))
+        return expression("rule", self.id, *parts)
+
+
+def spacing(volts: float) -> tuple[float, float]:
+    """Gap [mm] between conductors and between component leads at this voltage.
+
+    Raises
+    ------
+    InputError : more than the table's 500 V.
+    """
+    for upto, conductors, leads in SPACING:
+        if volts <= upto:
+            return conductors, leads
+    raise InputError(None, "circuit.supply", f"{volts:g} V between the rails", "at most 500 V")
+
+
+def summing_nets(circuit: Circuit) -> tuple[str, ...]:
+    """Inverting inputs of the op-amps, in order, of the circuit's own nets."""
+    return tuple(dict.fromkeys(s.inverting for s in circuit.sections))
+
+
+def board_rules(
+    circuit: Circuit, overrides: Mapping[str, Override] = NONE
+) -> tuple[CustomRule, ...]:
+    """The rules that KiCad can check, with the limits of a model file where it has some."""
+
+    def limit(id_: str, usual: float | None = None) -> float:
+        if id_ in overrides:
+            return overrides[id_].limit
+        found = BY_ID[id_].limit if usual is None else usual
+        assert found is not None
+        return found
+
+    conductors, leads = spacing(2.0 * circuit.supply)
+    summing = tuple(kicad_net(net) for net in summing_nets(circuit))
+    supply = tuple(kicad_net(net) for net in (POSITIVE, NEGATIVE, GROUND))
+    return (
+        CustomRule("clearance", "clearance", limit("clearance", max(conductors, MADE)), True),
+        CustomRule(
+            "pad-clearance",
+            "clearance",
+            limit("pad-clearance", max(leads, MADE)),
+            True,
+            "A.Type == 'Pad' && B.Type == 'Pad'",
+        ),
+        CustomRule("component-spacing", "courtyard_clearance", limit("component-spacing"), True),
+        CustomRule(
+            "summing-length", "length", limit("summing-length"), False, _any_of(summing), summing
+        ),
+        CustomRule(
+            "summing-vias", "via_count", limit("summing-vias"), False, _any_of(summing), summing
+        ),
+        CustomRule(
+            "supply-width", "track_width", limit("supply-width"), True, _any_of(supply), supply
+        ),
+    )
+
+
+def rules_text(rules: Sequence[CustomRule]) -> str:
+    """The text of a ``.kicad_dru`` file."""
+    return write_all([expression("version", 1), *(rule.expression for rule in rules)])
+
+
+def canary() -> CustomRule:
+    """A rule that a track of ``CANARY_WIDTH`` breaks: unless KiCad says so, it has read no rule."""
+    return CustomRule(
+        CANARY, "track_width", CANARY_LIMIT, True, f"A.Width == {number_text(CANARY_WIDTH)}mm"
+    )
+
+
+def _any_of(nets: Sequence[str]) -> str:
+    return " || ".join(f"A.NetName == '{net}'" for net in nets)

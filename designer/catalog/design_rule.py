@@ -1,0 +1,169 @@
+"""What a design rule is, what looking at it gives, and what a model file may change about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from designer.base.units import format_quantity
+
+Scope = Literal["circuit", "board"]
+Status = Literal["pass", "fail", "not run"]
+PASS: Status = "pass"
+FAIL: Status = "fail"
+NOT_RUN: Status = "not run"
+
+ROUNDING = 1e-9
+"""Relative: a limit that is met exactly is kept, whatever the last digit says."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule, without the function that looks at it.
+
+    id : its name, in rules.json and in ``[rules.<id>]``. unit : of the limit; "" for a ratio or a
+    count. limit : the number, or None where a data sheet or a table decides; ``limit_is`` then says
+    which. least : whether the limit is from below. source : where the limit comes from. do : what
+    helps where the rule fails.
+    """
+
+    id: str
+    scope: Scope
+    title: str
+    unit: str
+    limit: float | None
+    limit_is: str
+    least: bool
+    source: str
+    do: str
+
+    def keeps(self, value: float, limit: float) -> bool:
+        """Whether a value is on the right side of a limit; nan is on neither."""
+        room = ROUNDING * abs(limit)
+        return bool(value >= limit - room) if self.least else bool(value <= limit + room)
+
+    def bound(self, limit: float) -> str:
+        """A limit in words."""
+        return f"at {'least' if self.least else 'most'} {shown(limit, self.unit)}"
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a rule found: the worst value, where it is, and the limit that holds there.
+
+    limit : None takes the rule's own. more : what else a reader should know.
+    """
+
+    value: float
+    where: str = ""
+    limit: float | None = None
+    more: str = ""
+
+
+@dataclass(frozen=True)
+class Override:
+    """``[rules.<id>]`` of a model file: another limit, and why."""
+
+    limit: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A rule and what became of it. value, limit : nan where it was not run.
+
+    override : the limit is the model file's; ``usual`` then holds the one it replaces.
+    """
+
+    rule: Rule
+    status: Status
+    found: str
+    value: float = float("nan")
+    limit: float = float("nan")
+    where: str = ""
+    override: Override | None = None
+    usual: float = field(default=float("nan"))
+
+    def as_dict(self) -> dict[str, Any]:
+        """By the keys of docs/contract.md, and more."""
+        changed = self.override is not None
+        limit = self.limit_text
+        return {
+            "id": self.rule.id,
+            "status": self.status,
+            "found": self.found,
+            "limit": limit,
+            "source": "the model file" if changed else self.rule.source,
+            "do": self.rule.do,
+            "scope": self.rule.scope,
+            "title": self.rule.title,
+            "where": self.where,
+            "value": self.value,
+            "bound": self.limit,
+            "unit": self.rule.unit,
+            "reason": self.override.reason if self.override is not None else None,
+            "usual_bound": self.usual if changed else None,
+        }
+
+    @property
+    def limit_text(self) -> str:
+        """The limit in words; what decides it where nothing was found."""
+        if self.limit == self.limit:
+            return self.rule.bound(self.limit)
+        if self.rule.limit is not None:
+            return self.rule.bound(self.rule.limit)
+        return self.rule.limit_is
+
+
+class NotRun(Exception):
+    """A rule cannot be looked at; says why in words. Never a pass."""
+
+
+def judged(rule: Rule, found: Iterable[Found], override: Override | None = None) -> Outcome:
+    """Pass or fail by the worst of what was found, under the model file's limit or the usual one.
+
+    Raises
+    ------
+    NotRun : there is nothing that the rule applies to.
+    """
+    ranked = [(_excess(rule, each, override), each) for each in found]
+    if not ranked:
+        raise NotRun("the design has nothing that this applies to")
+    _, worst = max(ranked, key=lambda pair: pair[0])
+    usual = usual_limit(rule, worst)
+    limit = usual if override is None else override.limit
+    text = shown(worst.value, rule.unit)
+    text += f" at {worst.where}" if worst.where else ""
+    text += f"; {worst.more}" if worst.more else ""
+    status = PASS if rule.keeps(worst.value, limit) else FAIL
+    return Outcome(rule, status, text, worst.value, limit, worst.where, override, usual)
+
+
+def usual_limit(rule: Rule, found: Found) -> float:
+    """The limit of a rule where no model file changes it."""
+    limit = found.limit if found.limit is not None else rule.limit
+    assert limit is not None, f"{rule.id} has no limit"
+    return limit
+
+
+def _excess(rule: Rule, found: Found, override: Override | None) -> float:
+    """How far past its limit, in limits; a value that is no number is the worst."""
+    limit = usual_limit(rule, found) if override is None else override.limit
+    over = (limit - found.value) if rule.least else (found.value - limit)
+    return float("inf") if over != over else over / (abs(limit) or 1.0)
+
+
+def not_run(rule: Rule, why: str, override: Override | None = None) -> Outcome:
+    """What a rule says that could not be looked at."""
+    limit = float("nan") if override is None else override.limit
+    return Outcome(rule, NOT_RUN, why, limit=limit, override=override)
+
+
+def shown(value: float, unit: str) -> str:
+    """A value with its unit, to three digits."""
+    if value != value or abs(value) == float("inf"):
+        return "no number"
+    if unit == "mm":
+        return f"{value:.3g} mm"
+    return format_quantity(value, unit, 3) if unit else f"{value:.3g}"

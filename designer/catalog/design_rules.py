@@ -1,0 +1,295 @@
+"""Every design rule: what it limits, by how much, after whom, and what helps.
+
+The functions that look at a design stand in ``rule_nets``, ``rule_ratings``, ``rule_precision`` and
+``rule_board``, by the ids of this list. docs/rules.md holds the same list as a table.
+"""
+
+from __future__ import annotations
+
+from designer.catalog.design_rule import Rule
+
+OWN = "this tool's margin"
+
+
+def _rule(
+    id_: str,
+    title: str,
+    limit: float | str,
+    unit: str,
+    source: str,
+    do: str,
+    *,
+    least: bool = False,
+    board: bool = False,
+) -> Rule:
+    """limit : a number, or in words what decides it."""
+    fixed = not isinstance(limit, str)
+    return Rule(
+        id=id_,
+        scope="board" if board else "circuit",
+        title=title,
+        unit=unit,
+        limit=float(limit) if fixed else None,
+        limit_is="" if fixed else str(limit),
+        least=least,
+        source=source,
+        do=do,
+    )
+
+
+RULES: tuple[Rule, ...] = (
+    # Nets and pins.
+    _rule(
+        "feedback",
+        "Share of a section's output that returns to its inverting input, less what returns to the "
+        "other",
+        0.01, "",
+        "below it the loop gain of a TL074C's least open-loop gain, 25 V/mV, is under 250",
+        "connect the feedback resistor or capacitor to the inverting input, and check that the "
+        "inputs are not exchanged",
+        least=True,
+    ),
+    _rule(
+        "drivers",
+        "Outputs, rails and generators on one net",
+        1, "",
+        "two outputs on a net drive a current into each other",
+        "put the outputs on nets of their own",
+    ),
+    _rule(
+        "floating-input",
+        "Op-amp inputs without a path for their bias current",
+        0, "",
+        "an input's bias current needs a DC path to ground, a rail or an output",
+        "give the input a resistor to a driven net, or tie the section off",
+    ),
+    _rule(
+        "single-pin",
+        "Nets with a single pin",
+        0, "",
+        "a wire joins two pins or more",
+        "connect the pin, or mark it as not connected",
+    ),
+    _rule(
+        "references",
+        "Designators that two components share",
+        0, "",
+        "a board and its bill name each component once; KiCad's own checks do not see this",
+        "rename one of the two",
+    ),
+    _rule(
+        "supply-pins",
+        "Supply pins of op-amps that are not on their rail",
+        0, "",
+        "the pin table of the op-amp's data sheet, as the catalogue has it",
+        "connect V+ to the positive and V- to the negative rail",
+    ),
+    _rule(
+        "decoupling",
+        "Capacitance from a supply pin's rail to ground, at its package",
+        100e-9, "F",
+        "TI, OP07C, SLOS099G 12.1: 0.1 µF ceramic between each supply pin and ground",
+        "add a ceramic capacitor at the pin (board.decoupling in the model file)",
+        least=True,
+    ),
+    # Ratings and limits of the parts.
+    _rule(
+        "swing",
+        "Peak output voltage of a section that must stay linear",
+        "the op-amp's guaranteed swing at the current that its output gives", "V",
+        "the op-amp's data sheet: least swing into 10 kΩ and 2 kΩ, in proportion between the two",
+        "scale the voltages down (a lower saturation in the model file does that), or take an "
+        "op-amp that swings nearer to its rails",
+    ),
+    _rule(
+        "load",
+        "Resistance on an output, every resistor there taken to ground",
+        2e3, "Ω",
+        "the least load that data sheets of the TL07x guarantee a swing for",
+        "raise circuit.resistor_range, or lower the capacitors' range",
+        least=True,
+    ),
+    _rule(
+        "output-current",
+        "Peak current of an output",
+        "the op-amp's least guaranteed output current", "A",
+        "the op-amp's data sheet",
+        "take larger resistors at that output",
+    ),
+    _rule(
+        "fault-current",
+        "Current into an input while the supply is off and the generator gives 10 V",
+        "the op-amp's largest input current; 2 mA where its data sheet gives none", "A",
+        "the op-amp's data sheet, absolute maximum ratings; 2 mA is that of the MCP6004, DS21733J; "
+        "10 V is what common generators give into a high impedance",
+        "fit the input protection (board.input_protection), or drive through a larger resistor",
+    ),
+    _rule(
+        "power",
+        "Mean power of a resistor over its rating",
+        0.5, "",
+        f"the part family's rating; half of it is {OWN}",
+        "take a family with a higher rating, or a larger resistance",
+    ),
+    _rule(
+        "power-stuck",
+        "Mean power of a resistor over its rating, with any one op-amp stuck at a rail",
+        1, "",
+        "the part family's rating",
+        "take a family with a higher rating, or a larger resistance",
+    ),
+    _rule(
+        "capacitor-voltage",
+        "Peak voltage of a capacitor over its rating, also with an op-amp stuck at a rail",
+        0.8, "",
+        f"the part family's rating; a fifth of it is {OWN}",
+        "take a family with a higher voltage",
+    ),
+    _rule(
+        "common-mode",
+        "Room between an op-amp's inputs and the ends of its common-mode range",
+        0, "V",
+        "the op-amp's data sheet; a virtual ground leaves ground while its output is at a limit, "
+        "and past the range some op-amps drive their output the other way",
+        "lower the stage's gain or its feedback's share of the node, or take an op-amp with a "
+        "wider range",
+        least=True,
+    ),
+    _rule(
+        "slew",
+        "Fastest change of an output over the least guaranteed slew rate",
+        0.2, "",
+        f"the op-amp's data sheet; a fifth is {OWN}",
+        "lower circuit.frequency, or take a faster op-amp",
+    ),
+    _rule(
+        "gain-bandwidth",
+        "Noise gain of a stage times the highest frequency that matters",
+        "5 % of the op-amp's least gain-bandwidth", "Hz",
+        "docs/synthesis.md, side condition bandwidth: a phase error below 0.05 rad",
+        "lower circuit.frequency, or take a faster op-amp",
+    ),
+    # Errors referred to the clearance.
+    _rule(
+        "offset-force",
+        "Offsets of all sections as a constant force at the clearance, over the drive",
+        0.05, "",
+        "root of the sum of squares of the largest offsets of the data sheet; "
+        f"a twentieth of the drive is {OWN}",
+        "scale the voltages up, take an op-amp with less offset (TL074H, OPA4192), or use the DC "
+        "trim",
+    ),
+    _rule(
+        "bias-force",
+        "Bias currents of all sections as a constant force at the clearance, over the drive",
+        0.01, "",
+        f"the data sheet's largest bias current, all signs against us; a hundredth is {OWN}",
+        "take smaller resistors or an op-amp with less bias current",
+    ),
+    _rule(
+        "noise-force",
+        "Noise of op-amps and resistors up to the highest frequency that matters, RMS, as a force "
+        "at the clearance, over the drive",
+        0.002, "",
+        "the data sheet's noise density and corner, Johnson noise at 25 °C; the limit is the "
+        "strobe tolerance of ngspice (docs/definitions.md)",
+        "scale the voltages up, or take a quieter op-amp",
+    ),
+    _rule(
+        "leakage-force",
+        "Leakage over the board into the worst summing node, and through diodes that block, as a "
+        "constant force at the clearance, over the drive",
+        0.01, "",
+        "a rail over 1 GΩ, assumed: ten times the 100 MΩ that IPC J-STD-004 asks of flux residues "
+        "in damp heat (not compared with the standard); the diodes' largest reverse current; a "
+        f"hundredth is {OWN}",
+        "clean the board, put a guard ring around the node, take smaller resistors",
+    ),
+    _rule(
+        "absorption-force",
+        "What the integrators' dielectrics give back after an output stood at its limit, as a "
+        "constant force at the clearance, over the drive",
+        0.01, "",
+        "WIMA, characteristics of dielectrics: polypropylene 0.1 %, C0G 0.6 %, X7R 2.5 %, of the "
+        f"charge, here within 1 s; a hundredth is {OWN}",
+        "take polypropylene, or wait after power-up before counting",
+    ),
+    _rule(
+        "dead-zone-stiffness",
+        "Stiffness left inside the clearance, over K1: nominal, and one standard deviation of the "
+        "resistors' grades",
+        0.5, "",
+        "the spread bench-1 (docs/definitions.md); at half of K1 the model inside the clearance is "
+        "another one",
+        "take resistors of a better grade in the dead zone, or the rectifier, which has none",
+    ),
+    # The board.
+    _rule(
+        "clearance",
+        "Copper of different nets, by the largest voltage between them",
+        "IPC-2221, table 6-1, column B2, at the voltage between the rails", "mm",
+        "IPC-2221, table 6-1, column B2: external conductors, uncoated, up to 3050 m",
+        "move the copper apart",
+        least=True, board=True,
+    ),
+    _rule(
+        "pad-clearance",
+        "Pads of different nets, by the largest voltage between them",
+        "IPC-2221, table 6-1, column A6, at the voltage between the rails", "mm",
+        "IPC-2221, table 6-1, column A6: external component leads, uncoated",
+        "move the components apart, or take a larger case",
+        least=True, board=True,
+    ),
+    _rule(
+        "board-outline",
+        "From a component's pad to the edge of the board; below 0 by how far a pad is outside",
+        0.5, "mm",
+        "the distance from copper to an edge that KiCad asks for unless told otherwise; its own "
+        "check says nothing of what lies outside altogether",
+        "move the component onto the board, or the edge outwards",
+        least=True, board=True,
+    ),
+    _rule(
+        "component-spacing",
+        "Courtyards of two components",
+        0.25, "mm",
+        f"{OWN}: room for an iron and for a probe",
+        "move the components apart",
+        least=True, board=True,
+    ),
+    _rule(
+        "summing-length",
+        "Track of one summing node, in all",
+        50, "mm",
+        f"{OWN}: about 5 pF and a short antenna at a node of high impedance",
+        "move the node's resistors to the op-amp's input",
+        board=True,
+    ),
+    _rule(
+        "summing-vias",
+        "Vias in one summing node",
+        2, "",
+        f"{OWN}: a summing node changes sides and back at most",
+        "keep the node on one side",
+        board=True,
+    ),
+    _rule(
+        "decoupling-distance",
+        "From a supply pin to the nearest pad of its decoupling capacitor",
+        10, "mm",
+        f"{OWN}; SLOS099G 12.1 has: as close to the device as possible",
+        "move the capacitor to the pin",
+        board=True,
+    ),
+    _rule(
+        "supply-width",
+        "Track of a rail or of ground",
+        0.3, "mm",
+        f"{OWN}; IPC-2221, chart 6-4, asks less at the currents of this circuit",
+        "widen the track, or pour a zone",
+        least=True, board=True,
+    ),
+)  # fmt: skip
+
+BY_ID: dict[str, Rule] = {rule.id: rule for rule in RULES}
+"""The rules by id."""

@@ -1,0 +1,347 @@
+"""A user's SPICE model of an op-amp: untrusted text, reduced to subcircuits that only compute.
+
+A catalogue entry names a file beside it, the subcircuit in it and the order of its pins:
+
+    spice = { file = "part.lib", subckt = "PART", pins = ["inp", "inn", "vcc", "vee", "out"] }
+
+The file may hold ``.subckt .ends .model .param .func`` and element lines of the letters in
+``ELEMENTS``, and what `spice.simulator.check_netlist` allows of those; anything else is refused
+with the number of its line. Comments are dropped. What stands outside a subcircuit is copied into
+each, and every subcircuit gets a prefix, so that nothing in the file can change or replace what
+else is in a deck.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+from designer.base.errors import InputError
+from designer.base.inside_folder import inside
+from designer.base.netlist_guard import check_netlist
+
+PINS = ("inp", "inn", "out", "vcc", "vee")
+ELEMENTS = "BCDEFGHIJKLMQRSVWX"
+"""No code models, digital or compiled devices: those read files or run programs."""
+CARDS = (".subckt", ".ends", ".model", ".param", ".func")
+PREFIX = "vendor_"
+MOST_BYTES, MOST_STATEMENTS, LONGEST = 256_000, 5_000, 4_000
+"""Of a file, in a file, and characters of a statement with its continuations."""
+MOST_EXPANDED, MOST_CHARACTERS = 10_000, 1_000_000
+"""Statements of one op-amp, and their characters, with calls and functions written out: both can
+double with every line of a file."""
+
+_FILE = re.compile(r"\bfile\w*\s*[=(\"']|\bpwl\w*\s*\(?\s*file|\bd?pwlfile\b", re.IGNORECASE)
+_FUNCTION = re.compile(r"\.func\s+([A-Za-z_]\w*)\s*\(([^()]*)\)\s*=?", re.IGNORECASE)
+_TOKEN = re.compile(r"[a-z_]\w*|\S")
+_NAME = re.compile(r"[A-Za-z0-9_.+-]+")
+_PARAMETER = re.compile(r"\S+\s*=\s*(\{[^}]*\}|'[^']*'|\S+)|\bparams:", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class VendorModel:
+    """file : where it was read. subckt : its name in a deck. pins : those of ``PINS`` in its
+    order. lines : the subcircuits, safe and one statement a line. content : the file."""
+
+    file: str
+    subckt: str
+    pins: tuple[str, ...]
+    lines: tuple[str, ...]
+    content: bytes = field(repr=False)
+
+    def wrapped(self) -> list[str]:
+        """The subcircuit ``opamp``: the vendor's, with an offset in series with its input.
+
+        Its bias current and limits are the vendor's; ``ib``, ``low``, ``high``, ``start`` are
+        taken and ignored.
+        """
+        nets = " ".join("inside" if pin == "inp" else pin for pin in self.pins)
+        return [
+            *self.lines,
+            f".subckt opamp {' '.join(PINS)} vos=0 ib=0 low=0 high=0 start=0",
+            "Voffset inside inp {vos}",
+            f"Xvendor {nets} {self.subckt}",
+            ".ends opamp",
+        ]
+
+
+def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path) -> VendorModel:
+    """The model in the file ``name`` inside a folder.
+
+    Raises
+    ------
+    InputError : the file is not inside the folder (symbolic links count as outside), cannot be
+        read, is too large, or holds a line that is refused; the subcircuit or its pins are not
+        what was said.
+    """
+    path = inside(folder, name, "spice.file")
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(MOST_BYTES + 1)
+    except OSError as error:
+        reason = error.strerror or "unreadable"
+        raise InputError(path, "the file", reason, "a SPICE model that can be read") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(path, "the file", f"more than {MOST_BYTES} bytes", "an op-amp's model")
+    if sorted(pins) != sorted(PINS):
+        raise InputError(path, "pins", ", ".join(pins), "each once: " + ", ".join(PINS))
+    # Bytes outside ASCII are common in comments, and refused elsewhere.
+    statements = _statements(content.decode("latin-1"), path)
+    functions = _functions(statements, path)
+    blocks = _blocks(statements, path)
+    wanted = blocks.get(subckt.lower())
+    if wanted is None:
+        raise InputError(path, "subckt", subckt, "one of " + ", ".join(sorted(blocks)))
+    if len(wanted.nodes) != len(PINS):
+        raise InputError(
+            path, f"line {wanted.line}", f"{len(wanted.nodes)} pins", f"{len(PINS)} pins"
+        )
+    _check_calls(blocks, functions, path)
+    lines = [text for block in blocks.values() for text in block.text(blocks)]
+    return VendorModel(str(path), _prefixed(subckt), tuple(pins), tuple(lines), content)
+
+
+@dataclass(frozen=True)
+class _Statement:
+    line: int
+    text: str
+
+    @property
+    def word(self) -> str:
+        return self.text.split(maxsplit=1)[0].lower()
+
+
+@dataclass(frozen=True)
+class _Block:
+    """One subcircuit: line, name, nodes, what follows the nodes, statements inside."""
+
+    line: int
+    name: str
+    nodes: tuple[str, ...]
+    rest: str
+    inside: tuple[_Statement, ...]
+
+    def text(self, blocks: Mapping[str, _Block]) -> list[str]:
+        head = f".subckt {_prefixed(self.name)} {' '.join(self.nodes)} {self.rest}".rstrip()
+        return [head, *(_renamed(s, blocks) for s in self.inside), f".ends {_prefixed(self.name)}"]
+
+
+def _statements(text: str, path: Path) -> list[_Statement]:
+    """Statements without comments, continuations joined, each one found harmless."""
+    found: list[_Statement] = []
+    for number, raw in enumerate(text.replace("\r\n", "\n").split("\n"), start=1):
+        line = raw.strip(" \t")
+        if line.startswith("*"):
+            continue
+        line = " ".join(line.partition(";")[0].split("\t")).strip()
+        if not line:
+            continue
+        if line.startswith("+"):
+            if not found:
+                raise _refused(path, number, line, "a continuation of nothing")
+            first = found.pop()
+            found.append(_Statement(first.line, f"{first.text} {line[1:].strip()}"))
+        else:
+            found.append(_Statement(number, line))
+    if len(found) > MOST_STATEMENTS:
+        raise InputError(path, "the file", f"{len(found)} statements", f"up to {MOST_STATEMENTS}")
+    for statement in found:
+        if len(statement.text) > LONGEST:
+            raise InputError(
+                path,
+                f"line {statement.line}",
+                f"{len(statement.text)} characters",
+                f"a statement of up to {LONGEST} characters",
+            )
+    for statement in found:
+        _check(statement, path)
+    return found
+
+
+def _check(s: _Statement, path: Path) -> None:
+    if s.word.startswith("."):
+        if s.word not in CARDS:
+            raise _refused(path, s.line, s.text, f"the card {s.word}")
+    elif s.text[0].upper() not in ELEMENTS:
+        raise _refused(path, s.line, s.text, f"an element of kind {s.text[0]}")
+    if _FILE.search(s.text):
+        raise _refused(path, s.line, s.text, "a file")
+    try:
+        check_netlist(f"* one statement of a model\n{s.text}\n.end\n")
+    except ValueError as error:
+        why = re.search(r"is refused \((.*?)\): ", str(error))
+        raise _refused(path, s.line, s.text, why[1] if why else str(error)) from None
+
+
+def _blocks(statements: Sequence[_Statement], path: Path) -> dict[str, _Block]:
+    """Subcircuits by lower-case name, each with what stands outside all of them."""
+    common = [s for s in _outside(statements) if s.word in (".model", ".param", ".func")]
+    blocks: dict[str, _Block] = {}
+    head: _Statement | None = None
+    inside: list[_Statement] = []
+    for s in statements:
+        if s.word == ".subckt":
+            if head is not None:
+                raise _refused(path, s.line, s.text, "a subcircuit inside another")
+            head, inside = s, list(common)
+        elif s.word == ".ends":
+            if head is None:
+                raise _refused(path, s.line, s.text, "an end without a beginning")
+            block = _headed(head, tuple(inside), path)
+            if block.name.lower() in blocks:
+                raise _refused(path, head.line, head.text, "a name that is taken")
+            blocks[block.name.lower()] = block
+            head = None
+        elif head is not None:
+            inside.append(s)
+        elif s not in common:
+            raise _refused(path, s.line, s.text, "an element outside a subcircuit")
+    if head is not None:
+        raise _refused(path, head.line, head.text, "a subcircuit without an end")
+    return blocks
+
+
+def _outside(statements: Sequence[_Statement]) -> list[_Statement]:
+    depth, found = 0, []
+    for s in statements:
+        depth += (s.word == ".subckt") - (s.word == ".ends")
+        if depth == 0 and s.word != ".ends":
+            found.append(s)
+    return found
+
+
+def _headed(head: _Statement, inside: tuple[_Statement, ...], path: Path) -> _Block:
+    body = head.text.split(maxsplit=1)[1] if " " in head.text else ""
+    match = _PARAMETER.search(body)
+    words = body[: match.start()].split() if match else body.split()
+    if len(words) < 2 or not all(_NAME.fullmatch(word) for word in words):
+        raise _refused(path, head.line, head.text, "a subcircuit without a plain name and nodes")
+    rest = body[match.start() :] if match else ""
+    return _Block(head.line, words[0], tuple(words[1:]), rest, inside)
+
+
+def _called(s: _Statement) -> tuple[str, int, int]:
+    """Name of the subcircuit that an X line calls, and where it stands in the text.
+
+    A line without one names itself, which no subcircuit is called.
+    """
+    match = _PARAMETER.search(s.text)
+    nodes = s.text[: match.start()] if match else s.text
+    last = (nodes.split() or [s.text])[-1]
+    nodes = nodes if nodes.split() else s.text
+    start = nodes.rindex(last)
+    return last, start, start + len(last)
+
+
+def _renamed(s: _Statement, blocks: Mapping[str, _Block]) -> str:
+    if s.word[0] != "x":
+        return s.text
+    name, start, stop = _called(s)
+    return s.text[:start] + _prefixed(blocks[name.lower()].name) + s.text[stop:]
+
+
+def _check_calls(
+    blocks: Mapping[str, _Block], functions: Mapping[str, tuple[int, int]], path: Path
+) -> None:
+    """Every call is of a subcircuit of this file, none leads back to itself, and all that a
+    subcircuit stands for can be written out."""
+    calls: dict[str, list[str]] = {key: [] for key in blocks}
+    for key, block in blocks.items():
+        for s in block.inside:
+            if s.word[0] != "x":
+                continue
+            name = _called(s)[0].lower()
+            if name not in blocks:
+                raise _refused(path, s.line, s.text, "a subcircuit that is not in this file")
+            calls[key].append(name)
+    order, circle = _ordered(calls)
+    if circle is not None:
+        block = blocks[circle]
+        raise _refused(path, block.line, block.name, "a subcircuit that calls itself")
+    sizes: dict[str, tuple[int, int]] = {}
+    for key in order:
+        block, called = blocks[key], [sizes[name] for name in calls[key]]
+        count = len(block.inside) + sum(n for n, _ in called)
+        length = sum(_length(s.text, functions)[0] for s in block.inside if s.word != ".func")
+        length += _length(block.rest, functions)[0] + sum(n for _, n in called)
+        if count > MOST_EXPANDED or length > MOST_CHARACTERS:
+            most = f"{MOST_EXPANDED} statements or {MOST_CHARACTERS} characters"
+            raise _refused(path, block.line, block.name, f"more than {most}, written out")
+        sizes[key] = (count, length)
+
+
+def _functions(statements: Sequence[_Statement], path: Path) -> dict[str, tuple[int, int]]:
+    """How long calls of each function become: characters of its own, and how often it repeats its
+    arguments. No function leads back to itself: ngspice would expand it for ever."""
+    heads: dict[str, _Statement] = {}
+    # Two subcircuits may each have one of this name: all that any of them uses counts.
+    bodies: dict[str, list[tuple[str, set[str]]]] = {}
+    for s in statements:
+        if s.word == ".func":
+            match = _FUNCTION.match(s.text)
+            if match is None:
+                raise _refused(path, s.line, s.text, "a function without a name and arguments")
+            name = match[1].lower()
+            heads.setdefault(name, s)
+            arguments = {word.strip() for word in match[2].lower().split(",")}
+            bodies.setdefault(name, []).append((s.text[match.end() :], arguments))
+    uses = {
+        name: [w for text, _ in found for w in _TOKEN.findall(text.lower()) if w in heads]
+        for name, found in bodies.items()
+    }
+    order, circle = _ordered(uses)
+    if circle is not None:
+        s = heads[circle]
+        raise _refused(path, s.line, s.text, "a function that calls itself")
+    sizes: dict[str, tuple[int, int]] = {}
+    for name in order:
+        own, repeats = zip(
+            *(_length(text, sizes, names) for text, names in bodies[name]), strict=True
+        )
+        sizes[name] = (max(own), max(1, *repeats))
+    return sizes
+
+
+def _length(
+    text: str, functions: Mapping[str, tuple[int, int]], arguments: Collection[str] = ()
+) -> tuple[int, int]:
+    """At most so many characters with all functions written out, and how often any of the
+    arguments stands in it. Both stop a little above `MOST_CHARACTERS`."""
+    most = MOST_CHARACTERS + 1
+    open_: list[tuple[tuple[int, int], int, int]] = []
+    call, own, repeats, last = (0, 1), 0, 0, ""
+    for token in [*_TOKEN.findall(text.lower()), *")" * text.count("(")]:
+        if token == "(":
+            open_.append((call, own, repeats))
+            call, own, repeats = functions.get(last, (0, 1)), 0, 0
+        elif token == ")" and open_:
+            inner = (call[0] + call[1] * own, call[1] * repeats)
+            call, own, repeats = open_.pop()
+            own, repeats = min(own + inner[0], most), min(repeats + inner[1], most)
+        elif token in arguments:
+            repeats += 1
+        else:
+            own += len(token)
+        last = token
+    return own, repeats
+
+
+def _ordered(uses: Mapping[str, Collection[str]]) -> tuple[list[str], str | None]:
+    """Names after all that they use, and a name that leads back to itself, or None."""
+    try:
+        return list(TopologicalSorter(uses).static_order()), None
+    except CycleError as error:
+        return [], str(error.args[1][0])
+
+
+def _prefixed(name: str) -> str:
+    return PREFIX + name
+
+
+def _refused(path: Path, line: int, text: str, why: str) -> InputError:
+    return InputError(
+        path, f"line {line}", text, f"{', '.join(CARDS)} and elements that only compute, not {why}"
+    )

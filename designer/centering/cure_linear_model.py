@@ -1,0 +1,391 @@
+"""The linear picture of a branch: how far each response is from being lost, in every way it can be
+shown, and what each upgrade takes off the spread.
+
+A limit of ``yields.margins`` is nominal + Σ slope·ξ; a board is ok while every limit is positive.
+Its variance is the sum of what the parts contribute, so with the quantile z of the form's own
+distribution (of boards that are drawn: sums of uniform and normal numbers have no common one) the
+demand "P(limit > 0) is at least the target" reads: variance ≤ (nominal/z)², linear in the choice of
+grades. z depends a little on the choice, so it is taken again of each choice that is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.centering.cure_branch import TRIM, TRIMMER, Branch
+from designer.centering.cure_couplings import couplings, finest
+from designer.centering.cure_measure import Book, asked
+from designer.centering.cure_milp import Demand, Option, Program, Slot
+from designer.centering.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
+from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways
+from designer.centering.cure_upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
+from designer.centering.cure_ways import SAMPLES, Looker, Way, foretold
+from designer.circuit.board_arrays import Boards
+from designer.circuit.netlist import Circuit
+from designer.spread.spread import Spread, draw_many
+from designer.yields import margins
+from designer.yields.margins import Margin
+from designer.yields.trimmed_yield import DcTrim
+from designer.yields.verdict import StudyPlan
+
+DRAWN = 4000
+"""Boards that a linear form's distribution is taken from."""
+KEPT = 8
+"""Choices whose boards are kept."""
+CROSSINGS = 4
+"""Lost boards of each response whose way to the loss is followed."""
+MOVED = 1.0
+"""Trouble of another setting of the generator."""
+STREAM = "cure:"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """branch, its slots part by part, the ways of each response, and the standard deviation of each
+    quantity by name under option j of its slot, over that as it is: ratios[j]. matched : by slot
+    and option of an array, the covariance (n, n) of its elements, in the same units."""
+
+    branch: Branch
+    parts: tuple[PartSlot, ...]
+    ways: tuple[tuple[Way, ...], ...]
+    ratios: tuple[Mapping[str, float], ...]
+    trim: float
+    seed: int
+    matched: Mapping[tuple[int, int], Array] = field(default_factory=dict)
+    _drawn: dict[tuple[int, ...], Boards] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """Of the program: parts, then one for each response."""
+        trouble = {"omega": MOVED, "b": MOVED, TRIM: TRIMMED}
+        ways = [
+            Slot(
+                f"response {number + 1}",
+                tuple(Option(w.kind, 0.0, trouble.get(w.kind, 0.0)) for w in row),
+            )
+            for number, row in enumerate(self.ways)
+        ]
+        return (*(p.slot for p in self.parts), *ways)
+
+    def upgrades(self, pick: Sequence[int]) -> Upgrades:
+        """What a choice of options changes."""
+        grades, reference, networks = {}, None, list[PartNetwork]()
+        for part, i in zip(self.parts, pick, strict=False):
+            if i and part.grades:
+                grades[part.parts[0]] = part.grades[i]
+            elif i and part.network:
+                networks.append(PartNetwork(part.models[i], part.network))
+            elif i and part.models:
+                reference = part.models[i]
+        taken = self.taken(pick)
+        return replace(
+            self.branch.upgrades,
+            reference=reference,
+            grades=grades,
+            places={w.response: w.place for w in taken if w.place is not None},
+            trim=self.trim if any(w.kind == TRIM for w in taken) else None,
+            networks=tuple(networks),
+            trimmer=any(
+                i and part.trim is not None for part, i in zip(self.parts, pick, strict=False)
+            ),
+        )
+
+    def taken(self, pick: Sequence[int]) -> tuple[Way, ...]:
+        """The way of each response."""
+        chosen = pick[len(self.parts) :]
+        return tuple(row[i] for row, i in zip(self.ways, chosen, strict=True))
+
+    @property
+    def trimmer(self) -> DcTrim | None:
+        """The board's, of the branch's circuit, where setting it is among the options."""
+        return next((p.trim for p in self.parts if p.trim is not None), None)
+
+    def spread(self, pick: Sequence[int]) -> tuple[Circuit, Spread]:
+        """The circuit and the spread of this choice, each response where it was."""
+        made = self.branch.made
+        chosen = replace(self, ways=()).upgrades(pick[: len(self.parts)])
+        upgrades = replace(chosen, opamp=None, dead_zone=None, trimmer=False)
+        modelfile = upgraded_file(made.modelfile, upgrades)
+        circuit = made.design.circuit
+        if upgrades.reference is not None:
+            circuit = rebuilt(made.design, modelfile, made.catalog)
+        return circuit, Spread.of(modelfile, circuit, made.catalog)
+
+    def boards(self, pick: Sequence[int]) -> Boards:
+        """Boards of this choice, for its linear forms."""
+        key = tuple(pick[: len(self.parts)])
+        if key not in self._drawn:
+            circuit, spread = self.spread(key)
+            while len(self._drawn) >= KEPT:
+                self._drawn.pop(next(iter(self._drawn)))
+            self._drawn[key] = draw_many(circuit, spread, self.seed, range(DRAWN), STREAM)
+        return self._drawn[key]
+
+    def predicted(
+        self,
+        pick: Sequence[int],
+        boards: Boards,
+        shrink: Mapping[tuple[int, int], float] | None = None,
+    ) -> tuple[float, ...]:
+        """Share of these boards on which each response's margin is positive.
+
+        shrink : as ``program`` has it.
+        """
+        known = shrink or {}
+        chosen = pick[len(self.parts) :]
+        out = []
+        for w, way in zip(chosen, self.taken(pick), strict=True):
+            if way.margin is None:
+                out.append(way.rate)
+                continue
+            nearer = 1.0 - known.get((way.response, w), 1.0) ** 0.5
+            away = np.array([nearer * limit.distance for limit in way.margin.limits])
+            fine = (way.margin.each(boards) > away).all(axis=1) if len(away) else np.ones(1)
+            out.append(float(fine.mean()))
+        return tuple(out)
+
+    def quantiles(self, target: float, boards: Boards) -> dict[tuple[int, int, int], float]:
+        """z of each limit: (response, way, limit) → how many standard deviations of its form the
+        nominal value has to be above 0 for the target."""
+        found = {}
+        for r, row in enumerate(self.ways):
+            for w, way in enumerate(row):
+                if way.margin is None or not way.margin.limits:
+                    continue
+                each = way.margin.each(boards)
+                for k, limit in enumerate(way.margin.limits):
+                    form = each[:, k] - limit.distance
+                    found[r, w, k] = _quantile(form, target)
+        return found
+
+    def program(
+        self,
+        z: Mapping[tuple[int, int, int], float],
+        shrink: Mapping[tuple[int, int], float],
+        spoiled: frozenset[tuple[int, int]] = frozenset(),
+    ) -> Program:
+        """The program for these quantiles.
+
+        shrink : by (response, way), a factor on the room of its demands: what was learnt where the
+        picture promised too much. spoiled : ways that are not to be taken.
+        """
+        slots, demands = self.slots, list[Demand]()
+        none = tuple(np.zeros(len(s.options)) for s in slots)
+        for r, row in enumerate(self.ways):
+            for w, way in enumerate(row):
+                when = (len(self.parts) + r, w)
+                if (r, w) in spoiled:
+                    demands.append(Demand(f"response {r + 1}: {way.kind}", -1.0, none, when))
+                    continue
+                if way.margin is None:
+                    continue
+                for k, limit in enumerate(way.margin.limits):
+                    shares, fixed = self._shares(way.margin, k)
+                    room = (limit.distance / z[r, w, k]) ** 2 * shrink.get((r, w), 1.0)
+                    rows = list(none)
+                    rows[: len(shares)] = shares
+                    name = f"response {r + 1}: {limit.what}"
+                    demands.append(Demand(name, room - fixed, tuple(rows), when))
+        kinds = [[w.kind for w in row] for row in self.ways]
+        return Program(slots, (*demands, *couplings(slots, self.parts, kinds)))
+
+    def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
+        """What the options of each part add to a limit's variance, and what no upgrade changes, in
+        the limit's own variances."""
+        limit = margin.limits[number]
+        slot_of = {name: k for k, part in enumerate(self.parts) for name in part.parts}
+        shares = [np.zeros(len(p.slot.options)) for p in self.parts]
+        fixed, total = 0.0, 0.0
+        for q, slope in zip(margin.quantities, limit.slopes, strict=True):
+            base = float(slope / limit.sigma) ** 2
+            total += base
+            slot = slot_of.get(q.part)
+            if slot is None or q.group not in ("values", "reference"):
+                fixed += base
+                continue
+            for j in range(len(shares[slot])):
+                shares[slot][j] += base * self.ratios[j].get(q.name, 1.0) ** 2
+        slope_of = {q.name: s for q, s in zip(margin.quantities, limit.slopes / limit.sigma,
+                                              strict=True) if q.group == "values"}  # fmt: skip
+        for (k, j), together in self.matched.items():
+            slopes = np.array([slope_of.get(name, 0.0) for name in self.parts[k].network])
+            # Over what the parts are counted with as they are, one by one.
+            shares[k][j] = float(slopes @ together @ slopes - slopes @ slopes)
+        # The limit's own variance is of drawn boards, on which parts that track vary together: what
+        # that adds or takes stays in proportion.
+        own = 1.0 / total if total > 0.0 else 1.0
+        return [row * own for row in shares], fixed * own
+
+
+def _quantile(form: Array, target: float) -> float:
+    """How many standard deviations the form (N,) falls short of 0 in all but ``target`` of cases;
+    at least a little, so that no demand is without bound."""
+    size = float(form.std())
+    if size == 0.0:
+        return 1e-6
+    return max(-float(np.quantile(form, 1.0 - target)) / size, 1e-6)
+
+
+def picture(
+    branch: Branch,
+    target: float,
+    seed: int,
+    book: Book,
+    *,
+    trim: float,
+    without: frozenset[str] = frozenset(),
+    missed: Collection[int] = (),
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> Picture | None:
+    """The picture of a branch; None where its nominal circuit does not show every response.
+
+    The response that the fewest boards show is looked at first, and where all its ways are hopeless
+    the branch is, and no more of it is looked at. trim : half-width of the band of the DC offset.
+    without : kinds of upgrades that are not wanted. missed : responses that were measured to miss
+    the target on this branch as it is. progress : called once a piece of work.
+    """
+    made = branch.made
+    parts = (*part_slots(made, without), *network_slots(made, without))
+    questions = [q for q in asked(made, made.found) if q is not None]
+    if len(questions) < len(made.found):
+        return None
+    bare = Picture(branch, parts, (), (), trim, seed)
+    best = tuple(
+        StudyPlan(*bare.spread(pick), seed, SAMPLES, ()) for pick in finest(parts, made.catalog)
+    )
+    looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress, missed)
+    rows = [[looker.seen(Way(r, "as it is", question))] for r, question in enumerate(questions)]
+    order = sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r))
+    firsts = [rows[r][0] for r in order]
+
+    @cache
+    def fitted() -> tuple[PartSlot, list[Way]] | None:
+        slot = trimmer_slot(made, without)
+        found = (
+            None if slot is None or slot.trim is None else trimmer_ways(looker, slot.trim, firsts)
+        )
+        return None if slot is None or found is None else (slot, found)
+
+    out = False
+    for r in order:
+        rows[r] = looker.ways(rows[r][0])
+        out = all(way.hopeless for way in rows[r]) and fitted() is None
+        if out:
+            break
+    enough = [looker.enough(row[0]) or any(way.certain for way in row) for row in rows]
+    if not out and not all(enough) and (trimmer := fitted()) is not None:
+        parts = (*parts, trimmer[0])
+        for way in trimmer[1]:
+            rows[way.response].append(way)
+    bare = replace(bare, parts=parts, ways=tuple(map(tuple, rows)))
+    # What limits the design as it is is told in any case.
+    told = branch.upgrades == Upgrades()
+    if told or not out:
+        ratios, matched = _ratios(branch, parts, seed), _matched(branch, parts, seed)
+        bare = replace(bare, ratios=ratios, matched=matched)
+    which = [
+        (r, w)
+        for r, row in enumerate(rows)
+        for w, way in enumerate(row)
+        if (told and w == 0) or not (out or _needs_no_picture(way, rows, target))
+    ]
+    return pictured(bare, which, jobs, progress)
+
+
+def _needs_no_picture(way: Way, rows: Sequence[Sequence[Way]], target: float) -> bool:
+    """Whether a way is taken as it was seen, or not at all. The trimmer is, where it is enough for
+    every response."""
+    if way.kind == TRIMMER:
+        every = [w.rate for row in rows for w in row if w.kind == TRIMMER]
+        return min(every) >= target
+    return way.certain or way.hopeless or way.kind == TRIM
+
+
+def pictured(
+    seen: Picture,
+    which: Sequence[tuple[int, int]],
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> Picture:
+    """The same with margins of these ways (response, way)."""
+    made = seen.branch.made
+    circuit = made.design.circuit
+    spread = Spread.of(made.modelfile, circuit, made.catalog)
+    known = dict[tuple[int, int], Margin]()
+    trimmed = [(r, w) for r, w in which if seen.ways[r][w].kind == TRIMMER]
+    for some in ([key for key in which if key not in trimmed], trimmed):
+        if not some:
+            continue
+        questions = tuple(seen.ways[r][w].question for r, w in some)
+        if some is trimmed:
+            assert seen.trimmer is not None
+            plan = StudyPlan(circuit, spread, seen.seed, SAMPLES, questions)
+            found = trimmed_margins(
+                plan, seen.trimmer, count=CROSSINGS, jobs=jobs, progress=progress
+            )
+        else:
+            boards = draw_many(circuit, spread, seen.seed, range(SAMPLES))
+            answers = []
+            for question in questions:
+                answers.append(foretold(boards, question, jobs))
+                progress()
+            found = list(
+                margins.margins(
+                    circuit,
+                    questions,
+                    boards,
+                    answers,
+                    count=CROSSINGS,
+                    jobs=jobs,
+                    progress=progress,
+                )
+            )
+        known.update(zip(some, found, strict=True))
+    ways = tuple(
+        tuple(
+            replace(way, margin=known[r, w]) if (r, w) in known else way
+            for w, way in enumerate(row)
+        )
+        for r, row in enumerate(seen.ways)
+    )
+    return replace(seen, ways=ways)
+
+
+def _ratios(
+    branch: Branch, parts: Sequence[PartSlot], seed: int
+) -> tuple[Mapping[str, float], ...]:
+    """Under option j of every slot (its last, where it has fewer), the standard deviation of each
+    quantity over that as it is."""
+    most = max((len(p.slot.options) for p in parts), default=1)
+    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    columns: list[dict[str, float]] = []
+    names = [name for p in parts for name in p.parts]
+    for j in range(most):
+        boards = bare.boards([0 if p.network else min(j, len(p.slot.options) - 1) for p in parts])
+        known = {**boards.values, **boards.reference}
+        columns.append({name: float(np.std(known[name])) for name in names})
+    base = columns[0]
+    return tuple({n: c[n] / base[n] if base[n] > 0.0 else 1.0 for n in names} for c in columns)
+
+
+def _matched(
+    branch: Branch, parts: Sequence[PartSlot], seed: int
+) -> Mapping[tuple[int, int], Array]:
+    """By slot and option of an array, the covariance of its elements on drawn boards, in units of
+    each part's own standard deviation as it is."""
+    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    none = [0] * len(parts)
+    found = {}
+    plain = bare.boards(none).values if any(p.network for p in parts) else {}
+    for k, part in enumerate(parts):
+        for j in range(1, len(part.slot.options) if part.network else 1):
+            drawn = bare.boards([j if i == k else 0 for i in range(len(parts))]).values
+            off = [(drawn[n] - drawn[n].mean()) / float(np.std(plain[n])) for n in part.network]
+            found[k, j] = np.array([[float((a * b).mean()) for b in off] for a in off])
+    return found

@@ -1,0 +1,208 @@
+"""The studies of a cure: fresh boards, as many as it takes to tell which side of the target a yield
+is on, and kept so that interrupted work goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from designer.check import checked_design
+from designer.check.synthesis_result import Synthesis
+from designer.dynamics.orbit import OrbitStatus
+from designer.model.find_responses import ModelResponse
+from designer.model.tuning_bands import Bands
+from designer.spread.spread import Spread
+from designer.yields import exact_rung
+from designer.yields.study_identity import study_hash
+from designer.yields.trimmed_yield import DcTrim, trimmed_answers
+from designer.yields.tuned_yield import benched_block
+from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
+
+MOST = 8000
+"""Boards of a study at which it gives up."""
+FIRST, LOST = 50, 20
+"""Boards after which a study may end because the target is missed, and the lost boards by which
+it then knows their share well enough (to a quarter of it): lost boards are the dear ones."""
+TAG = 0xC04E
+"""Sets the boards of a cure apart from those of a study with the same seed."""
+VERDICTS = {"o": Verdict.OK, "l": Verdict.LOST, "g": Verdict.GRAZING, "f": Verdict.FAILED}
+_LETTERS = {verdict: letter for letter, verdict in VERDICTS.items()}
+
+
+def fresh(seed: int, number: int) -> int:
+    """The seed of study ``number`` of a cure: boards that no other one has seen."""
+    return int(np.random.SeedSequence([seed, number, TAG]).generate_state(1)[0])
+
+
+def asked(made: Synthesis, responses: Sequence[ModelResponse]) -> list[Question | None]:
+    """What the boards of a design are asked; None where the model or its circuit does not show the
+    response."""
+    checked = checked_design.check(made.design, responses, None)
+    return [
+        Question(c.model.spec, c.excitation, c.circuit, None)
+        if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
+        else None
+        for c in checked
+    ]
+
+
+def plan_of(made: Synthesis, question: Question, seed: int, samples: int = MOST) -> StudyPlan:
+    """The study of one response of a design, boards as its model file says."""
+    circuit = made.design.circuit
+    spread = Spread.of(made.modelfile, circuit, made.catalog)
+    return StudyPlan(circuit, spread, seed, samples, (question,))
+
+
+class Book:
+    """Verdicts that are known, by study and by block of boards: one letter a board.
+
+    save : called with everything after each block.
+    """
+
+    def __init__(
+        self,
+        known: Mapping[str, Mapping[str, str]] | None = None,
+        save: Callable[[dict[str, Any]], None] = lambda _: None,
+    ) -> None:
+        self._known = {study: dict(blocks) for study, blocks in (known or {}).items()}
+        self._save = save
+
+    def block(
+        self, plan: StudyPlan, indices: range, trim: float | DcTrim | None, jobs: int
+    ) -> tuple[str, bool]:
+        """The letters of these boards, and whether they had to be found.
+
+        trim : each board's DC offset is trimmed by the bench procedure within this band, or its
+        own trimmer is set.
+        """
+        bands = Bands(0.0, 0.0, trim) if isinstance(trim, float) else None
+        layer, more = "samples", dict[str, Any]()
+        if bands is not None:
+            layer, more = "tuned", {"bands": bands.as_dict()}
+        elif isinstance(trim, DcTrim):
+            layer, more = "trimmed", trim.as_dict()
+        study, place = study_hash(plan, layer, more), str(indices.start)
+        letters = self._known.get(study, {}).get(place, "")
+        if len(letters) >= len(indices):
+            return letters[: len(indices)], False
+        if isinstance(trim, DcTrim):
+            answers, _ = trimmed_answers(trim, plan, indices, jobs)
+        else:
+            answers = exact_rung.block(plan, indices, jobs)
+        verdicts = [a.verdict for a in answers]
+        if bands is not None:
+            verdicts = benched_block(plan, indices, answers, bands, jobs)
+        letters = "".join(_LETTERS[v] for v in verdicts)
+        self._known.setdefault(study, {})[place] = letters
+        self._save({"format": 1, "studies": self._known})
+        return letters, True
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A yield, and whether its 95 % interval says on which side of the target it is."""
+
+    counts: Yield
+    target: float
+
+    @property
+    def rate(self) -> float:
+        """The yield; 0 where nothing was decided."""
+        return self.counts.rate if self.counts.samples > self.counts.failed else 0.0
+
+    @property
+    def reached(self) -> bool:
+        """The whole interval is at the target or above."""
+        return self.counts.interval[0] >= self.target
+
+    @property
+    def missed(self) -> bool:
+        """The whole interval is below the target."""
+        return self.counts.interval[1] < self.target
+
+    @property
+    def decided(self) -> bool:
+        """Whether more boards would not change the answer."""
+        return self.reached or self.missed
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        low, high = self.counts.interval
+        y = self.counts
+        return {
+            "ok": y.ok,
+            "lost": y.lost,
+            "grazing": y.grazing,
+            "failed": y.failed,
+            "samples": y.samples,
+            "rate": y.rate,
+            "low": low,
+            "high": high,
+        }
+
+
+def measure(
+    plan: StudyPlan,
+    target: float,
+    book: Book,
+    *,
+    trim: float | DcTrim | None = None,
+    least: int = 2 * BLOCK,
+    most: int = MOST,
+    first: int | None = None,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> Measured:
+    """The yield of a plan of one question on ``least`` boards, and on more until it is decided.
+
+    most : boards at which it gives up. first : boards after which, and after each block from there,
+    it ends where the target is missed and ``LOST`` boards are lost; None: never before ``least``.
+    progress : called once a block.
+    """
+    letters, found, most = "", Measured(Yield(0, 0, 0, 0), target), max(least, most)
+    while len(letters) < least or (len(letters) < most and not found.decided):
+        lost = found.counts.lost + found.counts.grazing
+        if first is not None and found.missed and lost >= LOST:
+            break
+        stop = (len(letters) // BLOCK + 1) * BLOCK
+        if not letters and first is not None:
+            stop = first
+        indices = range(len(letters), min(stop, most))
+        letters += book.block(replace(plan, samples=most), indices, trim, jobs)[0]
+        found = Measured(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
+        progress()
+    return found
+
+
+def measure_together(
+    plans: Sequence[tuple[StudyPlan, float | DcTrim | None] | None],
+    target: float,
+    book: Book,
+    *,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[Measured, ...]:
+    """The yields of several responses that all have to reach the target.
+
+    One block of boards each. Once a response has missed the target the choice is out, whatever
+    becomes of the others: only those that miss it are asked on more boards, for their share.
+
+    plans : each with what its boards are trimmed by (``Book.block``), None: as built; None where
+    there is no response to ask for, which misses.
+    """
+    found = [Measured(Yield(0, 0, 0, 0), target) for _ in plans]
+    for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):
+        for k, asked_for in enumerate(plans):
+            out = None in plans or any(m.missed for m in found)
+            if most > BLOCK and out and not found[k].missed:
+                continue
+            if asked_for is not None:
+                plan, trim = asked_for
+                found[k] = measure(
+                    plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
+                    progress=progress,
+                )  # fmt: skip
+    return tuple(found)

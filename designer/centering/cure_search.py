@@ -1,0 +1,408 @@
+"""The search for the cheapest cure: upgrades that bring every wanted response to the yield that is
+asked for (docs/cure.md).
+
+Rounds of choosing and measuring. Each branch (``cure_branch``) has a linear picture
+(``cure_picture``); the cheapest choice of upgrades that it promises to be enough is found by
+mixed-integer optimisation (``cure_program``) and put to fresh boards on the exact rung. A response
+that falls short has its demand tightened by what was measured, and the next round chooses again.
+Branches are made only as far as they may be cheaper than what is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from designer.base.checks import cores
+from designer.base.progress import Progress
+from designer.centering.cure_branch import TRIMMER, Branch, Refused, branches
+from designer.centering.cure_couplings import finest
+from designer.centering.cure_linear_model import Picture, picture, pictured
+from designer.centering.cure_measure import (
+    FIRST,
+    MOST,
+    Book,
+    Measured,
+    asked,
+    fresh,
+    measure,
+    measure_together,
+    plan_of,
+)
+from designer.centering.cure_milp import Program, cheapest
+from designer.centering.cure_tighten import cut, shown
+from designer.centering.cure_trial import Cure, Trial
+from designer.centering.cure_upgrade import Upgrades
+from designer.check.synthesis_result import Synthesis
+from designer.model.model_file import need_responses
+from designer.spread.spread import Spread
+from designer.yields.limiting_parts import limiting, together
+from designer.yields.trimmed_yield import DcTrim
+from designer.yields.verdict import StudyPlan
+
+FRONT = 100
+"""Number of the boards of the front; no round comes so far."""
+CONFIRMING = 4000
+"""Boards of each response by which a choice is confirmed."""
+ROUNDS = 10
+"""Choices that are measured before the search gives up."""
+TRIES = 16
+"""Programs that are solved for one choice: each takes the quantiles of the one before."""
+FRONT_TARGETS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
+FRONT_POINTS = 5
+"""Points of the front that are measured beside those of the rounds."""
+FRONT_BOARDS = 500
+
+
+def find_cure(
+    base: Synthesis,
+    target: float,
+    *,
+    budget: float | None = None,
+    trim: float = 0.0,
+    without: frozenset[str] = frozenset(),
+    seed: int = 1,
+    jobs: int | None = None,
+    book: Book | None = None,
+    progress: Progress | None = None,
+) -> Cure:
+    """Search, in memory.
+
+    target : yield that the whole 95 % interval of every response is to reach. budget : most that
+    upgrades may cost [euro]. trim : half-width of the band of the generator's DC offset. without :
+    kinds of upgrades that are not wanted (``cure_branch.KINDS``). book : verdicts that are known.
+
+    Raises
+    ------
+    InputError : the model file names no response, or a place of a response is no choice.
+    """
+    need_responses(base.modelfile)
+    said = Progress() if progress is None else progress
+    book = Book() if book is None else book
+    threads = cores() if jobs is None else jobs
+    search = _Search(base, target, budget, trim, without, seed, threads, book, said)
+    return search.run()
+
+
+class _Search:
+    def __init__(
+        self,
+        base: Synthesis,
+        target: float,
+        budget: float | None,
+        trim: float,
+        without: frozenset[str],
+        seed: int,
+        jobs: int,
+        book: Book,
+        said: Progress,
+    ) -> None:
+        self.base, self.target, self.budget, self.trim = base, target, budget, trim
+        self.without, self.seed, self.jobs, self.book, self.said = without, seed, jobs, book, said
+        self.waiting = branches(base, without)
+        self.known: list[Branch] = []
+        self.pictures: list[Picture] = []
+        self.refused: list[Refused] = []
+        self.shrink: dict[tuple[int, int, int], float] = {}
+        self.spoiled: set[tuple[int, int, int]] = set()
+        self.fell_short: dict[tuple[int, tuple[int, ...]], list[int]] = {}
+        self.unseen: list[int] = []
+
+    def run(self) -> Cure:
+        before = self.before = self._before()
+        if before.reached:
+            return self._answer(before, [], True, "every response is there already")
+        rounds: list[Trial] = []
+        for number in range(ROUNDS):
+            found = self._choice(self.target)
+            if found is None:
+                return self._answer(before, rounds, False, self._out_of_reach())
+            which, pick, predicted = found
+            cost = self._price(which, pick)
+            if self.budget is not None and cost > self.budget + 1e-9:
+                why = f"the cheapest choice that may be enough costs {cost:.2f} euro"
+                return self._answer(before, rounds, False, why)
+            name = f"round {number + 1}"
+            trial = self._trial(which, pick, predicted, 2 + number, name)
+            if trial.reached:
+                # It was looked at until it was enough: what counts are other boards, asked once.
+                again = 2 + ROUNDS + number
+                trial = self._trial(which, pick, predicted, again, f"{name}, once more", CONFIRMING)
+            rounds.append(trial)
+            if trial.reached:
+                return self._answer(before, rounds, True, "measured on fresh boards")
+            self._learn(which, pick, trial)
+        return self._answer(before, rounds, False, f"not within {ROUNDS} rounds")
+
+    def _before(self) -> Trial:
+        """The design as it is, on fresh boards."""
+        step = self.said.stage("the design as it is")
+        made, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
+        for number, question in enumerate(asked(made, made.found)):
+            if question is None:
+                self.unseen.append(number)
+            plan = None if question is None else plan_of(made, question, fresh(self.seed, 1))
+            plans.append(None if plan is None else (plan, None))
+        trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
+        rates = tuple(m.rate for m in trials)
+        return Trial("as it is", Upgrades(), 0.0, rates, trials, self.target)
+
+    def _choice(self, target: float) -> tuple[int, tuple[int, ...], tuple[float, ...]] | None:
+        """The cheapest choice over all branches: its picture's number, the options, the promise.
+
+        Branches that have no picture yet get one where they may be cheaper."""
+        best: tuple[float, int, tuple[int, ...], tuple[float, ...]] | None = None
+        for which in range(len(self.pictures)):
+            best = self._better(best, which, target)
+        while (made := self._next_branch(None if best is None else best[0])) is not None:
+            self.said.stage(f"margins, {made.name}")
+            step = self.said.stage(f"linear picture, {made.name}")
+            measured = self.before.measured if made.upgrades == Upgrades() else ()
+            found = picture(
+                made,
+                self.target,
+                fresh(self.seed, 0),
+                self.book,
+                trim=self.trim,
+                without=self.without,
+                missed=[r for r, m in enumerate(measured) if m.missed],
+                jobs=self.jobs,
+                progress=step,
+            )
+            if found is None:
+                why = "the nominal circuit does not show every response"
+                self.refused.append(Refused(made.upgrades, why))
+                continue
+            self.pictures.append(found)
+            if made.upgrades == Upgrades():  # it has been measured
+                self._learn(0, tuple(0 for _ in found.slots), self.before)
+            best = self._better(best, len(self.pictures) - 1, target)
+        return None if best is None else best[1:]
+
+    def _next_branch(self, least: float | None) -> Branch | None:
+        """A branch that has no picture and may be cheaper than ``least``: None where there is none.
+
+        All are made as soon as one is asked for beyond the first: their prices must be known.
+        """
+        if not self.pictures and not self.known and not self.refused:
+            first = next(self.waiting)
+            assert isinstance(first, Branch)
+            return first
+        if least is not None and least <= 0.0:
+            return None
+        for made in self.waiting:
+            self.said.stage("other op-amps and dead zones")
+            if isinstance(made, Refused):
+                self.refused.append(made)
+            else:
+                self.known.append(made)
+        self.known.sort(key=lambda b: b.extra)
+        if self.known and (least is None or self.known[0].extra < least):
+            return self.known.pop(0)
+        return None
+
+    def _better(
+        self,
+        best: tuple[float, int, tuple[int, ...], tuple[float, ...]] | None,
+        which: int,
+        target: float,
+    ) -> tuple[float, int, tuple[int, ...], tuple[float, ...]] | None:
+        found = self._of_picture(which, target)
+        if found is None:
+            return best
+        cost = self._cost(which, found[0])
+        return (cost, which, *found) if best is None or cost < best[0] - 1e-12 else best
+
+    def _of_picture(
+        self, which: int, target: float
+    ) -> tuple[tuple[int, ...], tuple[float, ...]] | None:
+        """The cheapest choice on one branch that its picture promises to be enough."""
+        seen = self.pictures[which]
+        base = tuple(0 for _ in seen.slots)
+        shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
+        spoiled = frozenset((r, w) for k, r, w in self.spoiled if k == which)
+        spoiled |= {
+            (r, w)
+            for r, row in enumerate(seen.ways)
+            for w, way in enumerate(row)
+            if (way.margin is None and way.rate < target)
+            or (way.hopeless and target >= self.target)
+        }
+        if any(all((r, w) in spoiled for w in range(len(row))) for r, row in enumerate(seen.ways)):
+            return None
+        z = seen.quantiles(target, seen.boards(base))
+        enough: dict[tuple[int, ...], tuple[float, ...]] = {}
+        tried: set[tuple[int, ...]] = set()
+        for _ in range(TRIES):
+            program = seen.program(z, shrink, spoiled)
+            pick = cheapest(program)
+            if pick is None or (pick in tried and pick in enough):
+                break
+            tried.add(pick)
+            boards = seen.boards(pick)
+            promised = seen.predicted(pick, boards, shrink)
+            short = [r for r, share in enumerate(promised) if share < target]
+            if target >= self.target:
+                short = sorted({*short, *self.fell_short.get((which, pick), [])})
+            if short:
+                for r in short:
+                    key = r, pick[len(seen.parts) + r]
+                    shrink[key] = shrink.get(key, 1.0) * cut(program, pick, key, len(seen.parts))
+            else:
+                enough[pick] = promised
+            z = seen.quantiles(target, boards)
+        if not enough:
+            return None
+        pick = min(enough, key=lambda p: (self._cost(which, p), p))
+        return pick, enough[pick]
+
+    def _price(self, which: int, pick: Sequence[int]) -> float:
+        seen = self.pictures[which]
+        return seen.branch.extra + Program(seen.slots, ()).price(pick)
+
+    def _cost(self, which: int, pick: Sequence[int]) -> float:
+        seen = self.pictures[which]
+        return seen.branch.extra + Program(seen.slots, ()).cost(pick)
+
+    def _trial(
+        self,
+        which: int,
+        pick: Sequence[int],
+        predicted: tuple[float, ...],
+        number: int,
+        name: str,
+        boards: int | None = None,
+    ) -> Trial:
+        """A choice, measured on boards that nobody has seen.
+
+        boards : how many, of each response; None: until it is decided whether all are enough."""
+        seen = self.pictures[which]
+        cost = self._price(which, pick)
+        step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
+        upgrades = seen.upgrades(pick)
+        circuit, spread = seen.spread(pick)
+        drawn = fresh(self.seed, number)
+        plans = list[tuple[StudyPlan, float | DcTrim | None]]()
+        for way in seen.taken(pick):
+            setting: float | DcTrim | None = upgrades.trim if way.kind == "trim" else None
+            if way.kind == TRIMMER and seen.trimmer is not None:
+                setting = seen.trimmer.on(circuit)
+            plans.append((StudyPlan(circuit, spread, drawn, MOST, (way.question,)), setting))
+        found: tuple[Measured, ...]
+        if boards is None:
+            found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
+        else:
+            found = tuple(
+                measure(
+                    plan, self.target, self.book, trim=trim, least=boards, most=boards,
+                    first=FIRST, jobs=self.jobs, progress=step,
+                )
+                for plan, trim in plans
+            )  # fmt: skip
+        return Trial(seen.branch.name, upgrades, cost, predicted, found, self.target)
+
+    def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
+        """Tighten what was promised and not kept.
+
+        Where a response has missed the target, those that are undecided were asked on few boards
+        only: nothing is learnt of them."""
+        seen = self.pictures[which]
+        short = [r for r, m in enumerate(trial.measured) if m.missed or not m.counts.samples]
+        short = short or [r for r, m in enumerate(trial.measured) if not m.reached]
+        self.fell_short[which, tuple(pick)] = short
+        boards = seen.boards(pick)
+        for r, (way, m) in enumerate(zip(seen.taken(pick), trial.measured, strict=True)):
+            if r not in short:
+                continue
+            w = pick[len(seen.parts) + r]
+            if way.margin is None and (way.certain or way.kind == TRIMMER):  # it seemed enough
+                step = self.said.stage(f"linear picture, {seen.branch.name}: response {r + 1}")
+                seen = pictured(seen, [(r, w)], self.jobs, step)
+                self.pictures[which] = seen
+                way = seen.ways[r][w]
+            if way.margin is None or not way.margin.limits:
+                self.spoiled.add((which, r, w))
+                continue
+            # The upper end of what the measurement allows: the cheapest is come upon from below.
+            key, rate = (which, r, w), m.counts.interval[1]
+            self.shrink[key] = min(self.shrink.get(key, 1.0), shown(way, boards, rate))
+
+    def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
+        limits = tuple(self._limit(r) for r in range(len(self.base.found)))
+        return Cure(
+            self.base,
+            self.target,
+            self.budget,
+            before,
+            tuple(rounds),
+            reached,
+            why,
+            limits,
+            self._front(before, rounds),
+            tuple(self.refused),
+            tuple(self.pictures),
+        )
+
+    def _out_of_reach(self) -> str:
+        """Which responses no choice of upgrades is enough for, as the pictures are known now."""
+        best = np.zeros(len(self.base.found))
+        for which, seen in enumerate(self.pictures):
+            shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
+            for most in finest(seen.parts, seen.branch.made.catalog):
+                boards = seen.boards(most)
+                for r, row in enumerate(seen.ways):
+                    for w, way in enumerate(row):
+                        if way.hopeless:
+                            best[r] = max(best[r], way.most)
+                        elif (which, r, w) not in self.spoiled:
+                            pick = [*most, *(w if k == r else 0 for k in range(len(seen.ways)))]
+                            best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
+        short = [
+            f"response {r + 1} ({share:.3f} at most)"
+            for r, share in enumerate(best)
+            if share < self.target
+        ]
+        named = f": {', '.join(short)}" if short else ""
+        return f"no choice of upgrades is enough in the linear picture{named}"
+
+    def _limit(self, number: int) -> str:
+        """What limits a response with nothing upgraded, in one line."""
+        if number in self.unseen:
+            return "the nominal circuit does not show it"
+        seen = self.pictures[0] if self.pictures else None
+        margin = None if seen is None else seen.ways[number][0].margin
+        if seen is None or margin is None:
+            return ""
+        made = seen.branch.made
+        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        return limiting(margin, together(made.design.circuit, spread, seen.seed)).line
+
+    def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
+        """The design as it is, and trials by price, each with a higher worst yield than any cheaper
+        one: those of the rounds and the choices for other targets, as the pictures are known
+        now."""
+        trials = [before, *rounds]
+        seen = {(t.branch, repr(t.upgrades)) for t in trials}
+        found: list[tuple[int, tuple[int, ...], tuple[float, ...]]] = []
+        for target in FRONT_TARGETS if self.pictures else ():
+            options = [(k, got) for k in range(len(self.pictures))
+                       if (got := self._of_picture(k, target)) is not None]  # fmt: skip
+            if not options:
+                break
+            which, (pick, promised) = min(options, key=lambda x: (self._cost(x[0], x[1][0]), x[0]))
+            if (which, pick, promised) not in found:
+                found.append((which, pick, promised))
+        for which, pick, promised in found:
+            picked = self.pictures[which]
+            key = picked.branch.name, repr(picked.upgrades(pick))
+            if key in seen or len(trials) > len(rounds) + FRONT_POINTS:
+                continue
+            seen.add(key)
+            trials.append(self._trial(which, pick, promised, FRONT, "front", FRONT_BOARDS))
+        trials.sort(key=lambda t: (t.price, -t.worst.rate))
+        front: list[Trial] = []
+        for t in trials:
+            if not front or t.worst.rate > front[-1].worst.rate:
+                front.append(t)
+        return tuple(front) if before in front else (before, *front)

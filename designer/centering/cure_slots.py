@@ -1,0 +1,175 @@
+"""What can be upgraded part by part: slots of the program, with what each option costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from designer.base.errors import InputError, Unreachable
+from designer.catalog.catalog import Catalog
+from designer.catalog.entries import Kind
+from designer.centering.cure_branch import GRADE, NETWORK, REFERENCE, TRIMMER
+from designer.centering.cure_milp import Option, Slot
+from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_parts_kept
+from designer.check.synthesis_result import Synthesis
+from designer.circuit.netlist import Capacitor, Resistor
+from designer.spread.part_grades import bought
+from designer.spread.spread import Spread
+from designer.yields.trimmed_yield import DcTrim, dc_trim
+
+TRIMMED = 5.0
+"""Trouble of trimming each board once."""
+CHANGED = 0.01
+"""Trouble of one part that is bought at another grade: of two free choices, the smaller change."""
+
+
+@dataclass(frozen=True)
+class PartSlot:
+    """One part, all references together, parts that an array may hold, or the board's trimmer.
+
+    slot : its options. parts : those whose value it decides. grades, models : of each option, the
+    first as it is; grades of a part, models of the references, families of an array. trim : the
+    trimmer that the second option fits. network : parts whose places an array may take.
+    """
+
+    slot: Slot
+    parts: tuple[str, ...]
+    grades: tuple[float, ...] = ()
+    models: tuple[str, ...] = ()
+    trim: DcTrim | None = None
+    network: tuple[str, ...] = ()
+
+
+def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
+    """Every part of which a better grade can be bought, in the circuit's order; then the
+    references.
+
+    A part whose value was measured, or whose grade is not that of anything sold, stays as it is.
+    """
+    spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
+    own = bought(made.modelfile, circuit, catalog)
+    measured = made.modelfile.measured
+    known = set() if measured is None else set(measured.values)
+    out = []
+    if GRADE not in without:
+        stated = {name for rule in made.modelfile.spread.part for name in rule.names}
+        kinds = {"resistors", "capacitors"} & stated
+        every: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)
+        for part in every:
+            kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
+            if part.name in known or (f"{kind}s" in kinds and part.name not in own):
+                continue
+            if part.name in stated and part.name not in own:
+                continue
+            usual = spec.resistor_grade if kind == "resistor" else spec.capacitor_grade
+            found = _grades(catalog, kind, part, own.get(part.name, usual))
+            if found is not None:
+                out.append(found)
+    if REFERENCE not in without:
+        out += _references(made)
+    return tuple(out)
+
+
+def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
+    """Resistors of one value in sets that an array can hold, those at one summing node together.
+
+    Parts that were measured, that track already or have a grade of their own stay as they are.
+    """
+    if NETWORK in without:
+        return ()
+    spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
+    spread = Spread.of(made.modelfile, circuit, catalog)
+    measured = made.modelfile.measured
+    taken = {name for g in spread.groups if not g.reel for name in g.parts}
+    taken |= {*spread.grades, *spread.shapes, *(() if measured is None else measured.values)}
+    nodes = {s.inverting: k for k, s in enumerate(circuit.sections)}
+
+    def place(part: Resistor) -> int:
+        return min((nodes[net] for net in part.nets if net in nodes), default=len(nodes))
+
+    equal: dict[float, list[Resistor]] = {}
+    for part in sorted(circuit.resistors, key=place):
+        if part.name not in taken:
+            equal.setdefault(float(f"{part.value:.9g}"), []).append(part)
+    out = []
+    for family in (f for f in catalog.families if f.use == "array" and f.kind == "resistor"):
+        for value, same in equal.items():
+            try:
+                array = catalog.array(family.name, value)
+            except (InputError, Unreachable):
+                continue
+            single = catalog.euro(catalog.part("resistor", value, spec.resistor_grade).price)
+            for first in range(0, len(same), family.elements):
+                names = tuple(p.name for p in same[first : first + family.elements])
+                if len(names) > 1:
+                    extra = catalog.euro(array.price) - len(names) * single
+                    options = (Option("single parts", 0.0), Option(family.name, extra, CHANGED))
+                    slot = Slot(f"array {' '.join(names)}", options)
+                    out.append(PartSlot(slot, (), models=("", family.name), network=names))
+    return tuple(out)
+
+
+def trimmer_slot(made: Synthesis, without: frozenset[str] = frozenset()) -> PartSlot | None:
+    """The trimmer on the board; None where it is not wanted or there is none.
+
+    Fitting it costs what it adds to the bill of materials, nothing where it is fitted already.
+    """
+    if TRIMMER in without:
+        return None
+    fitted = with_parts_kept(made, upgraded_file(made.modelfile, Upgrades(trimmer=True)))
+    try:
+        trim, extra = dc_trim(fitted), price(fitted) - price(made)
+    except (Unreachable, InputError):
+        return None
+    options = (Option("not set", 0.0), Option("set", extra, TRIMMED))
+    return None if trim is None else PartSlot(Slot(TRIMMER, options), (), trim=trim)
+
+
+def _grades(
+    catalog: Catalog, kind: Kind, part: Resistor | Capacitor, now: float
+) -> PartSlot | None:
+    """The slot of one part; None where nothing better is sold. A dearer grade that is no better
+    than a cheaper one is left out."""
+    base = catalog.part(kind, part.value, now)
+    better = {
+        f.grade
+        for f in catalog.families
+        if f.kind == kind and f.use == "signal" and f.grade < now * (1.0 - 1e-9)
+    }
+    options, grades = [Option(f"{100.0 * now:g} %", 0.0)], [now]
+    for grade in sorted(better):
+        try:
+            sold = catalog.part(kind, part.value, grade)
+        except Unreachable:
+            continue
+        extra = catalog.euro(sold.price) - catalog.euro(base.price)
+        if all(extra < o.price for o in options[1:]):
+            options.append(Option(f"{100.0 * grade:g} %", extra, CHANGED))
+            grades.append(grade)
+    if len(options) == 1:
+        return None
+    return PartSlot(Slot(part.name, tuple(options)), (part.name,), grades=tuple(grades))
+
+
+def _references(made: Synthesis) -> Sequence[PartSlot]:
+    circuit, catalog = made.design.circuit, made.catalog
+    if not circuit.references:
+        return []
+    now = catalog.reference(circuit.references[0].model)
+    same = [
+        r
+        for r in catalog.references
+        if abs(r.voltage - now.voltage) < 1e-9 * now.voltage
+        and r.grade < now.grade
+        and r.least_current <= now.least_current
+    ]
+    if not same:
+        return []
+    count = len(circuit.references)
+    options = [Option(now.name, 0.0)]
+    for r in same:
+        extra = count * (catalog.euro(r.price) - catalog.euro(now.price))
+        options.append(Option(r.name, extra, CHANGED))
+    models = (now.name, *(r.name for r in same))
+    slot = Slot("references", tuple(options))
+    return [PartSlot(slot, tuple(r.name for r in circuit.references), models=models)]

@@ -1,0 +1,231 @@
+"""Upgrades of a design, and the model file and the circuit that have them.
+
+Everything that an upgrade changes stands in the model file afterwards, so the upgraded design is a
+design like any other: parts of a better grade are ``[[spread.part]]``, parts that track
+``[[spread.network]]``, a response at another place of its window has another ``omega`` or ``b``,
+a DC offset that is trimmed on each board is the band of ``[tuning]``, and a trimmer that is fitted
+is ``[board] dc_trim``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from designer.base.toml_writer import toml_text
+from designer.board.board_parts import board_circuit
+from designer.board.bom import bill
+from designer.board.component import components, to_buy
+from designer.catalog.catalog import Catalog
+from designer.check.synthesis_result import Synthesis
+from designer.circuit import build, terms
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.design import Certificate, Design
+from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.reduction import Reduction
+from designer.model.find_responses import ModelResponse, find, peaks
+from designer.model.model_file import ModelFile, parse_model_file
+from designer.synthesis import output_loads, side_conditions
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in its window a response is shown, in the model's units."""
+
+    omega: float
+    b: float
+
+
+@dataclass(frozen=True)
+class PartNetwork:
+    """Parts that are bought as one array. family : of the catalogue's arrays."""
+
+    family: str
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Upgrades:
+    """What is changed; None and empty: as it is.
+
+    grades : fractions by part. places : by number of the response. trim : half-width of the band of
+    the generator's DC offset over its amplitude, within which each board is trimmed. trimmer :
+    whether the board's own is fitted, and set on each board. networks : arrays in the places of
+    parts.
+    """
+
+    opamp: str | None = None
+    dead_zone: str | None = None
+    reference: str | None = None
+    grades: Mapping[str, float] = field(default_factory=dict)
+    places: Mapping[int, Place] = field(default_factory=dict)
+    trim: float | None = None
+    trimmer: bool = False
+    networks: tuple[PartNetwork, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; responses are counted from 1."""
+        places = [{"response": i + 1, **asdict(p)} for i, p in sorted(self.places.items())]
+        return {
+            "opamp": self.opamp,
+            "dead_zone": self.dead_zone,
+            "reference": self.reference,
+            "grades": dict(sorted(self.grades.items())),
+            "places": places,
+            "trim": self.trim,
+            "trimmer": self.trimmer,
+            "networks": [asdict(n) for n in self.networks],
+        }
+
+    @classmethod
+    def of_dict(cls, said: Mapping[str, Any]) -> Upgrades:
+        """What ``as_dict`` gave."""
+        return cls(
+            opamp=said["opamp"],
+            dead_zone=said["dead_zone"],
+            reference=said["reference"],
+            grades=dict(said["grades"]),
+            places={p["response"] - 1: Place(p["omega"], p["b"]) for p in said["places"]},
+            trim=said["trim"],
+            trimmer=said.get("trimmer", False),
+            networks=tuple(
+                PartNetwork(n["family"], tuple(n["parts"])) for n in said.get("networks", ())
+            ),
+        )
+
+
+def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
+    """The model file that says all this; the same object where nothing is changed.
+
+    A stated saturation belongs to the op-amp it was stated for: another one has its own.
+    """
+    if upgrades == Upgrades():
+        return modelfile
+    data = tomllib.loads(modelfile.text)
+    circuit = data.setdefault("circuit", {})
+    if upgrades.opamp is not None:
+        circuit["opamp"] = upgrades.opamp
+        circuit.pop("saturation", None)
+    if upgrades.dead_zone is not None:
+        circuit["dead_zone"] = upgrades.dead_zone
+    if upgrades.reference is not None:
+        circuit["reference"] = upgrades.reference
+    for number, place in upgrades.places.items():
+        response = data["response"][number]
+        response.pop("Omega", None)
+        response |= {"omega": place.omega, "b": place.b}
+    if upgrades.trim is not None:
+        data["tuning"] = {"frequency": 0.0, "amplitude": 0.0, "offset": upgrades.trim}
+    if upgrades.trimmer:
+        data.setdefault("board", {})["dc_trim"] = "fitted"
+    parts = data.setdefault("spread", {}).setdefault("part", [])
+    for grade in sorted(set(upgrades.grades.values())):
+        names = [name for name, own in upgrades.grades.items() if own == grade]
+        picked = [name for name in names if _was_picked_out(modelfile, name, grade)]
+        others = [name for name in names if name not in picked]
+        parts += [{"names": others, "grade": grade}] * bool(others)
+        parts += [{"names": picked, "grade": grade, "law": "uniform"}] * bool(picked)
+    for network in upgrades.networks:
+        held = data["spread"].setdefault("network", [])
+        held.append({"parts": list(network.parts), "family": network.family})
+    read = parse_model_file(toml_text(data), modelfile.source)
+    return replace(read, title=modelfile.title, measured=modelfile.measured)
+
+
+def _was_picked_out(modelfile: ModelFile, name: str, grade: float) -> bool:
+    """Whether a part of this grade is one of those that a binned law says were picked out: it lies
+    anywhere within the grade, while the law of what was left does not reach it."""
+    rules = modelfile.spread
+    kind = "resistors" if name.startswith("R") else "capacitors"
+    law = rules.resistors if kind == "resistors" else rules.capacitors
+    whole = name[:-1] if name[-1] in "AB" else name  # of a composite's two parts
+    for rule in rules.part:
+        if rule.law is not None and {name, whole, kind} & set(rule.names):
+            law = rule.law
+    return law.law == "binned" and grade <= law.inner
+
+
+def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
+    """The design's parts with the op-amp and the references that this file names."""
+    spec, model = modelfile.circuit, modelfile.model
+    system = model.second_order()
+    opamp = catalog.opamp(spec.opamp)
+    return build.build(
+        terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
+        design.circuit.values,
+        opamp,
+        supply=design.circuit.supply,
+        saturation=spec.saturation or opamp.saturation_at(spec.supply),
+        clearance="A" if model.k0 > 0.0 else None,
+        zone=build.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+        composites=design.composites,
+    )
+
+
+def with_parts_kept(
+    base: Synthesis, modelfile: ModelFile, loaded: Sequence[int] | None = None
+) -> Synthesis:
+    """The base's parts in a design for another model file, verified afresh.
+
+    loaded : numbers of the responses of which the op-amps' loads are asked; None: all. Those that
+    stayed where they were load a circuit of the same values as before.
+
+    The file differs in what ``Upgrades`` changes but for the dead zone. Its design's ``checks`` say
+    whether the side conditions still hold.
+
+    Raises
+    ------
+    InputError : the catalogue does not know a part.
+    """
+    model, catalog = modelfile.model, base.catalog
+    circuit = rebuilt(base.design, modelfile, catalog)
+    found = _found(base, modelfile)
+    held = peaks(model, found)
+    swing = float((base.design.errors.scales.volts * held.states).max()), held.states
+    errors = coefficient_errors(
+        circuit, model.second_order(), swing=None if circuit.stops else swing
+    )
+    design = replace(
+        base.design,
+        circuit=circuit,
+        errors=errors,
+        certificate=Certificate("bound", 0.0, "the parts are those of the design that was cured"),
+        binding={},
+    )
+    kept = modelfile.circuit.kept
+    amplitudes = [design.amplitude(r.b) for r in found] or [design.amplitude()]
+    needed = None
+    if found and kept & {"swing", "load"}:
+        loading = found if loaded is None else [found[number] for number in loaded]
+        needed = output_loads.design_loads(
+            design, Reduction(circuit, nominal_board(circuit)), loading
+        )
+    checks = side_conditions.verify(
+        design, kept, catalog.opamp(circuit.opamp), held, amplitudes, needed
+    )
+    stated = {c.quantity: c.limit for c in base.design.checks}
+    numbers = {k: v for k, v in base.design.conditions.items() if k not in stated}
+    design = replace(
+        design, checks=checks, conditions=numbers | {c.quantity: c.limit for c in checks}
+    )
+    return replace(base, modelfile=modelfile, found=found, design=design)
+
+
+def _found(base: Synthesis, modelfile: ModelFile) -> tuple[ModelResponse, ...]:
+    """The model's responses; those that stay where they were are not sought again."""
+    known = dict(zip(base.modelfile.responses, base.found, strict=True))
+    return tuple(
+        known[spec] if spec in known else find(modelfile.model, [spec])[0]
+        for spec in modelfile.responses
+    )
+
+
+def price(made: Synthesis) -> float:
+    """Of everything on its bill of materials, in euro, with the catalogue's price of each class."""
+    circuit, choice = board_circuit(made)
+    lines = bill(to_buy(components(circuit, made.catalog, choice), choice))
+    return float(np.sum([x.quantity * made.catalog.euro(x.price_class) for x in lines]))

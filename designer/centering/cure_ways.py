@@ -1,0 +1,269 @@
+"""The ways in which a branch may show a response, as far as few boards tell: as it is, at another
+place in its window, trimmed.
+
+Everything here is foretold, not decided: of the boards without a period after the drive periods
+that the compiled way grants a few are settled, and only if none of them shows the response are the
+others taken for lost. What is chosen is measured afterwards. A way is hopeless where even of boards
+with the best parts that can be bought too many for the target are seen to be lost; no picture of it
+is needed then, nor of a branch all of whose ways to one response are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import binom
+
+from designer.centering.cure_branch import PLACE, TRIM, Branch
+from designer.centering.cure_measure import Book, asked, measure, plan_of
+from designer.centering.cure_upgrade import Place, Upgrades, upgraded_file, with_parts_kept
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble
+from designer.spread.spread import Spread, draw_many
+from designer.yields.margins import Margin
+from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, count, judge
+from designer.yields.yield_maps import YieldMap, settle_open, yield_map
+
+SAMPLES = 250
+"""Boards on which a way is looked at: their verdicts choose the limits of its picture."""
+FEW = 50
+"""Boards of a place on a map, and boards with the best parts; as many again where the first leave
+it open whether a way is hopeless."""
+MAP_POINTS, TRIM_FIRST, TRIM_BOARDS = 7, 25, 100
+FAINT = 0.5
+"""Share of boards below which the best place is sought with the best parts instead."""
+RARE = 1e-3
+"""Chance of as many lost boards under the target at which a way is hopeless."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way of showing a response.
+
+    response : its number. kind : "as it is", "omega", "b", "trim" or "trimmer". place : another
+    than stated. margin : None where there is no picture of it. rate : share of boards that show the
+    response, parts as they are; 1 without a margin: no board of ``SAMPLES`` was lost. most : that
+    share with the best parts, at most; hopeless : it is too small for the target.
+    """
+
+    response: int
+    kind: str
+    question: Question
+    place: Place | None = None
+    margin: Margin | None = None
+    rate: float = float("nan")
+    most: float = 1.0
+    hopeless: bool = False
+
+    @property
+    def certain(self) -> bool:
+        """Every board that was looked at shows the response."""
+        return self.rate == 1.0
+
+
+def forecast(boards: Boards, question: Question, jobs: int) -> list[Verdict | None]:
+    """The verdict of each board; None where the compiled way leaves it open."""
+    size = len(boards)
+    found = Ensemble(boards, jobs=jobs).quick(
+        range(size),
+        [question.excitation.drive] * size,
+        np.tile(question.start.start, (size, 1)),
+        jobs=jobs,
+    )
+    said = [None if o is None else judge(o, question.spec, question.start)[0] for o in found]
+    return [None if verdict is Verdict.FAILED else verdict for verdict in said]
+
+
+def settled(boards: Boards, question: Question, jobs: int) -> list[Verdict]:
+    """The verdict of each board, given all the time there is."""
+    size = len(boards)
+    found = Ensemble(boards).settle(
+        range(size),
+        [question.excitation.drive] * size,
+        np.tile(question.start.start, (size, 1)),
+        jobs=jobs,
+    )
+    return [judge(orbit, question.spec, question.start)[0] for orbit in found]
+
+
+def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
+    """As much of an answer as a margin needs, for each board. What stays open is lost where a few
+    of the open ones have been settled and none shows the response."""
+    found = forecast(boards, question, jobs)
+    left = [k for k, verdict in enumerate(found) if verdict is None]
+    settle_open(found, left, lambda some: settled(boards.take(some), question, jobs))
+    nan = float("nan")
+    return [
+        Answer(sample, 0, verdict or Verdict.LOST, "", "", nan, nan, nan, nan, 0)
+        for sample, verdict in enumerate(found)
+    ]
+
+
+@dataclass(frozen=True)
+class Looker:
+    """Looks for the ways of a branch's responses.
+
+    target : yield wanted. trim : half-width of the DC offset's band. best : studies of boards with
+    the best parts that can be bought, of no question yet: single ones, then arrays. missed :
+    responses that are known to miss the target as they are, whatever the look at few boards says.
+    """
+
+    branch: Branch
+    target: float
+    seed: int
+    book: Book
+    trim: float
+    without: frozenset[str]
+    best: tuple[StudyPlan, ...]
+    jobs: int
+    progress: Callable[[], None]
+    missed: Collection[int] = ()
+
+    @property
+    def plan(self) -> StudyPlan:
+        """The study of boards with the parts as they are, of no question yet."""
+        made = self.branch.made
+        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        return StudyPlan(made.design.circuit, spread, self.seed, SAMPLES, ())
+
+    def seen(self, way: Way, boards: Boards | None = None) -> Way:
+        """A way with the share of boards that show it.
+
+        boards : that are asked; None: with the parts as they are.
+        """
+        boards = drawn(self.plan, SAMPLES) if boards is None else boards
+        found = count(foretold(boards, way.question, self.jobs))
+        self.progress()
+        return replace(way, rate=0.0 if np.isnan(found.rate) else found.rate)
+
+    def bounded(self, way: Way, finest: Sequence[Boards] | None = None) -> Way:
+        """A way with what the best parts make of it.
+
+        finest : (2 ``FEW``,) boards with them; None: not trimmed.
+        """
+        if way.certain or way.kind == TRIM:
+            return way
+        if finest is None:
+            finest = [drawn(plan, 2 * FEW) for plan in self.best]
+        shares = []
+        for boards in finest:
+            lost, total = self._lost(boards, way.question)
+            shares.append(1.0 - lost / total)
+            if not self._too_many(lost, total):
+                break
+        self.progress()
+        return replace(way, most=max(shares), hopeless=self._too_many(lost, total))
+
+    def _lost(self, boards: Boards, question: Question) -> tuple[int, int]:
+        """How many of how many boards are lost. More are asked while it is few; those left open are
+        settled as far as they decide whether it is too many."""
+        lost, left = 0, list[int]()
+        for total in (FEW, 2 * FEW):
+            some = range(total - FEW, total)
+            found = forecast(boards.take(some), question, self.jobs)
+            left += [k for k, verdict in zip(some, found, strict=True) if verdict is None]
+            lost += found.count(Verdict.LOST)
+            needed = next((n for n in range(total + 1) if self._too_many(n, total)), total + 1)
+            if needed <= lost + len(left):
+                missing = max(needed - lost, 0)
+                said = settled(boards.take(left[:missing]), question, self.jobs) if missing else []
+                lost, left = lost + said.count(Verdict.LOST), left[missing:]
+                if lost >= needed:  # those that were not settled are taken for lost too
+                    return lost + len(left), total
+            if not lost and not left:
+                break
+        return lost, total
+
+    def _too_many(self, lost: int, total: int) -> bool:
+        return bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
+
+    def enough(self, first: Way) -> bool:
+        """Whether a response needs no way but ``first``, the one as it is."""
+        return first.rate >= self.target and first.response not in self.missed
+
+    def ways(self, first: Way) -> list[Way]:
+        """A response's ways, ``first`` the one as it is. What asks more of people is looked for
+        only where nothing before it is certain."""
+        row = [self.bounded(first)]
+        if self.enough(first):
+            return row
+        plan = plan_of(self.branch.made, first.question, self.seed)
+        if PLACE not in self.without:
+            for over in ("omega", "b"):
+                moved = self._moved(first, plan, over)
+                if moved is not None:
+                    row.append(self.bounded(self.seen(moved)))
+                    if row[-1].certain:
+                        return row
+        if TRIM not in self.without and self.trim > 0.0:
+            few = measure(
+                plan, self.target, self.book, trim=self.trim, first=TRIM_FIRST,
+                least=TRIM_BOARDS, most=TRIM_BOARDS, jobs=self.jobs,
+            )  # fmt: skip
+            self.progress()
+            hopeless = few.rate < self.target
+            row.append(
+                Way(first.response, "trim", first.question,
+                    rate=few.rate, most=few.rate, hopeless=hopeless)
+            )  # fmt: skip
+        return row
+
+    def _moved(self, way: Way, plan: StudyPlan, over: str) -> Way | None:
+        """Another place of the response in its window, where more boards show it."""
+        number, made = way.response, self.branch.made
+        response = made.found[number]
+
+        def mapped(of: StudyPlan, values: tuple[float, ...] | None = None) -> YieldMap:
+            found = yield_map(
+                of, 0, "b" if over == "b" else "omega", response.b, values=values,
+                samples=FEW, points=MAP_POINTS, jobs=self.jobs, quick=True,
+            )  # fmt: skip
+            self.progress()
+            return found
+
+        found = mapped(plan)
+        if found.rate.max() < FAINT:
+            found = mapped(replace(self.best[0], questions=plan.questions), found.axes[0].values)
+        best = best_place(found)
+        if best is None:
+            return None
+        value = float(f"{best:.4g}")
+        place = Place(value, response.b) if over == "omega" else Place(response.omega, value)
+        question = moved_question(self.branch, {number: place})
+        return None if question is None else Way(number, over, question, place)
+
+
+def drawn(plan: StudyPlan, number: int) -> Boards:
+    """The first boards of a study."""
+    return draw_many(plan.circuit, plan.spread, plan.seed, range(number))
+
+
+def moved_question(branch: Branch, places: Mapping[int, Place]) -> Question | None:
+    """What boards are asked of one response at another place; None where the circuit does not show
+    it there, or a side condition breaks that held."""
+    made = branch.made
+    ((number, _),) = places.items()
+    moved = with_parts_kept(made, upgraded_file(made.modelfile, Upgrades(places=places)), [number])
+    broken = {c.quantity for c in made.design.checks if not c.holds}
+    if any(not c.holds and c.quantity not in broken for c in moved.design.checks):
+        return None
+    return asked(moved, moved.found[number : number + 1])[0]
+
+
+def best_place(found: YieldMap) -> float | None:
+    """The middle of the longest row of settings with the highest yield; None where the setting in
+    use has it.
+
+    Not ``recommended``, which stays where it is unless another setting is proved to be better: a
+    cure is measured before it is believed.
+    """
+    values, rate = np.array(found.axes[0].values), found.rate
+    if rate[found.axes[0].values.index(found.used)] >= rate.max():
+        return None
+    equal = np.flatnonzero(rate == rate.max())
+    rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)
+    longest = max(rows, key=lambda row: float(values[row[-1]] - values[row[0]]))
+    middle = 0.5 * (values[longest[0]] + values[longest[-1]])
+    return float(values[longest[int(np.argmin(np.abs(values[longest] - middle)))]])

@@ -1,0 +1,192 @@
+"""How far a response is from being lost, in standard deviations: boards with a stretched spread.
+
+A yield near 1 tells designs apart only with thousands of boards. So every deviation from the
+nominal board is stretched λ times, for a few λ, and boards are asked on the exact circuit rung
+whether they still show the response. Were the margin linear and its spread normal, the yield of
+boards stretched λ times would be Φ(d/λ), with d the distance of the nominal board from losing the
+response in standard deviations of the margin ("scaled-sigma sampling": Sun, Li, Liu, Luo and Gu,
+IEEE Trans. CAD 34, 2015). d is fitted to all λ by largest likelihood; Φ(d) is the yield that it
+predicts. Spreads are bounded and margins curved, so this ranks designs and places; yields that are
+reported are counted on boards as they are. A prediction does not wait: a board that has not
+settled after 140 drive periods counts as lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.stats import norm
+
+from designer.base.plain_json import plain
+from designer.centering.memory import Memory
+from designer.centering.windows import Place
+from designer.circuit.design import Design
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import Excitation
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.model_file import Response
+from designer.spice.numerics_gate import Subject
+from designer.spread.board_quantities import between
+from designer.spread.spread import Spread, draw_many
+from designer.yields.study_identity import nine_digits
+from designer.yields.verdict import Verdict, judge
+
+STREAM = "search:"
+"""Before the names of the coordinates: no study draws these boards, whatever its seed."""
+LADDER = (1.0, 1.5, 2.0, 3.0)
+"""Stretches of the spread."""
+FARTHEST = 20.0
+"""Distances further than so many standard deviations are not told apart."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """For each stretch: boards that were asked, and those that show the response."""
+
+    stretches: tuple[float, ...]
+    asked: tuple[int, ...]
+    ok: tuple[int, ...]
+
+    @property
+    def distance(self) -> float:
+        """d, as above. Half a loss is added at the largest stretch, so that it is finite."""
+        scale = 1.0 / np.array(self.stretches)
+        ok = np.array(self.ok, dtype=float)
+        lost = np.array(self.asked, dtype=float) - ok
+        lost[int(np.argmin(scale))] += 0.5
+
+        def against(d: float) -> float:
+            z = d * scale
+            return -float(np.sum(ok * norm.logcdf(z) + lost * norm.logcdf(-z)))
+
+        found = minimize_scalar(against, bounds=(-FARTHEST, FARTHEST), method="bounded")
+        return round(float(found.x), 4)
+
+    @property
+    def predicted(self) -> float:
+        """Yield at the spread as it is."""
+        return float(norm.cdf(self.distance))
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A place on the nominal board of a design: the orbit there, which boards start from."""
+
+    spec: Response
+    place: Place
+    drive: Drive
+    orbit: Orbit
+
+
+class Stretched:
+    """The boards of a design, each at every stretch, reduced once.
+
+    count : boards. seed : of their numbers, with a stream of their own. memory : of answers that
+    are known already.
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        spread: Spread,
+        seed: int,
+        count: int,
+        *,
+        jobs: int = 1,
+        memory: Memory | None = None,
+    ) -> None:
+        self.design, self.count, self.jobs = design, count, jobs
+        self._memory = Memory() if memory is None else memory
+        drawn = draw_many(design.circuit, spread, seed, range(count), STREAM)
+        rows = [0] + [i for _ in LADDER for i in range(count)]
+        shares = np.concatenate([[0.0], np.repeat(LADDER, count)])
+        self._boards = Ensemble(between(drawn.take(rows), shares), jobs=jobs)
+        circuit = design.circuit
+        self._whose = [circuit.opamp, sorted(circuit.values.items()), plain(spread.as_dict()), seed]
+
+    def stands(self, wanted: Sequence[tuple[Response, Place]]) -> list[Stand | None]:
+        """Each place on the nominal board; None where that does not show the response there."""
+        if not wanted:
+            return []
+        drives = [self.excitation(place).drive for _, place in wanted]
+        starts = np.array([p.start * self.design.volts(p.b) for _, p in wanted])
+        found = self._boards.quick([0] * len(wanted), drives, starts, jobs=self.jobs)
+        out: list[Stand | None] = []
+        for (spec, place), drive, orbit in zip(wanted, drives, found, strict=True):
+            fine = orbit is not None and judge(orbit, spec, orbit)[0] is Verdict.OK
+            out.append(Stand(spec, place, drive, orbit) if fine and orbit is not None else None)
+        return out
+
+    def ask(
+        self,
+        stands: Sequence[Stand],
+        boards: range,
+        stretches: Sequence[float] = LADDER,
+        progress: Callable[[], None] = lambda: None,
+    ) -> list[Counts]:
+        """What these boards show at each place. stretches : some of ``LADDER``."""
+        said = [self.said(stand, boards, stretches) for stand in stands]
+
+        def make(new: list[int]) -> list[tuple[int, ...]]:
+            return self._made([stands[k] for k in new], boards, stretches, progress)
+
+        asked = (len(boards),) * len(stretches)
+        known = self._memory.get_all(said, make)
+        return [Counts(tuple(stretches), asked, ok) for ok in known]
+
+    def _made(
+        self,
+        stands: Sequence[Stand],
+        boards: range,
+        stretches: Sequence[float],
+        progress: Callable[[], None],
+    ) -> list[tuple[int, ...]]:
+        """For each place the boards that show the response, by stretch."""
+        rungs = [LADDER.index(s) for s in stretches]
+        rows = [1 + r * self.count + i for r in rungs for i in boards]
+        which = [row for row in rows for _ in stands]
+        drives = [s.drive for _ in rows for s in stands]
+        starts = np.array([s.orbit.start for _ in rows for s in stands])
+        found = self._boards.quick(which, drives, starts, jobs=self.jobs, progress=progress)
+        fine = [_shows(orbit, stands[k % len(stands)]) for k, orbit in enumerate(found)]
+        ok = np.array(fine).reshape(len(rungs), len(boards), len(stands)).sum(axis=1)
+        return [tuple(int(v) for v in ok[:, k]) for k in range(len(stands))]
+
+    def said(self, stand: Stand, boards: range, stretches: Sequence[float]) -> object:
+        """Everything that decides an answer, as plain data."""
+        drive, spec = stand.drive, stand.spec
+        setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
+        wanted = [str(spec.expect), spec.twin, spec.symmetric]
+        asked = [boards.start, boards.stop, list(stretches)]
+        return [self._whose, nine_digits(setting), wanted, asked]
+
+    def excitation(self, place: Place) -> Excitation:
+        """The generator's setting for a place."""
+        frequency = self.design.errors.scales.frequency(place.omega)
+        return Excitation(frequency, self.design.amplitude(place.b))
+
+    def nominal(self, stand: Stand) -> Subject:
+        """The nominal board at a place, for ngspice."""
+        return Subject(self._boards.reduction(0), self.excitation(stand.place), stand.orbit)
+
+    def subjects(self, stand: Stand, boards: range, stretch: float) -> list[Subject]:
+        """Those of these boards that show the response at this stretch, for ngspice."""
+        rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
+        starts = np.tile(stand.orbit.start, (len(rows), 1))
+        found = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
+        excitation = self.excitation(stand.place)
+        return [
+            Subject(self._boards.reduction(row), excitation, orbit)
+            for row, orbit in zip(rows, found, strict=True)
+            if orbit is not None and _shows(orbit, stand)
+        ]
+
+
+def _shows(orbit: Orbit | None, stand: Stand) -> bool:
+    if orbit is None or orbit.status is not OrbitStatus.PERIODIC:
+        return False
+    return judge(orbit, stand.spec, stand.orbit)[0] is Verdict.OK

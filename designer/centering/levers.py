@@ -1,0 +1,116 @@
+"""What a search moves beside the places: op-amp, dead zone, and what the synthesis aims at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from designer.base.errors import InputError
+from designer.catalog.catalog import Catalog
+from designer.model.circuit_table import CircuitSpec, DeadZone
+from designer.model.model_file import ModelFile
+from designer.synthesis.limits import NO_AIMS, Aims
+
+PLACES, TOPOLOGY = "places", "opamp and dead zone"
+LEVERS = ("opamp", "dead zone", "amplitude", "state scales", "noise gain", "time scale")
+"""In the order in which they are tried."""
+SWINGS = (0.85, 0.7, 0.5)
+"""Of the op-amps' limits: what the peaks may use, so the threshold in volts follows."""
+SHARES = (1.6, 1.2, 1.0)
+"""Peaks of the other states over x1's."""
+NOISE_GAINS = (30.0, 6.0)
+"""Of the stages whose gain is a ratio of resistors."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How a design is made. frequency : band for ω = 1 [Hz]. aims : inside its conditions."""
+
+    opamp: str
+    dead_zone: DeadZone
+    frequency: tuple[float, float]
+    aims: Aims = NO_AIMS
+
+    @classmethod
+    def of(cls, spec: CircuitSpec) -> Choice:
+        """What the model file says."""
+        return cls(spec.opamp, spec.dead_zone, spec.frequency)
+
+    def spec(self, base: CircuitSpec) -> CircuitSpec:
+        """The table ``[circuit]`` of a design made so; the match decides over its parts."""
+        return replace(
+            base,
+            objective="match",
+            opamp=self.opamp,
+            # A saturation that is stated belongs to the op-amp that it is stated for.
+            saturation=base.saturation if self.opamp == base.opamp else None,
+            dead_zone=self.dead_zone,
+            frequency=self.frequency,
+        )
+
+    def get(self, lever: str) -> object:
+        """What it says of one of the ``LEVERS``."""
+        return {
+            "opamp": self.opamp,
+            "dead zone": self.dead_zone,
+            "amplitude": self.aims.swing,
+            "state scales": self.aims.share,
+            "noise gain": self.aims.noise_gain,
+            "time scale": self.frequency,
+        }[lever]
+
+    def with_lever(self, lever: str, value: Any) -> Choice:
+        """The same with one lever elsewhere."""
+        field = {"amplitude": "swing", "state scales": "share", "noise gain": "noise_gain"}
+        if lever in field:
+            changed: dict[str, Any] = {field[lever]: value}
+            return replace(self, aims=replace(self.aims, **changed))
+        name = {"opamp": "opamp", "dead zone": "dead_zone", "time scale": "frequency"}[lever]
+        moved: dict[str, Any] = {name: value}
+        return replace(self, **moved)
+
+
+def topologies(modelfile: ModelFile, catalog: Catalog) -> list[Choice]:
+    """Every op-amp with every dead zone that the search may take, the file's own first if it is
+    one of them.
+
+    Raises
+    ------
+    InputError : an op-amp that the catalogue does not have.
+    """
+    own, spec = Choice.of(modelfile.circuit), modelfile.search
+    for name in spec.opamps:
+        try:
+            catalog.opamp(name)
+        except InputError as error:
+            raise InputError(None, "search.opamps", error.found, error.expected) from None
+    opamps = spec.opamps or (own.opamp,)
+    found = [
+        replace(own, opamp=opamp, dead_zone=zone) for opamp in opamps for zone in spec.dead_zones
+    ]
+    return sorted(found, key=lambda choice: choice != own)
+
+
+def variants(choice: Choice, lever: str) -> Iterator[Choice]:
+    """The other settings of one of the levers after the dead zone."""
+    low, high = choice.frequency
+    ratio = (high / low) ** (1.0 / 3.0)
+    options: dict[str, tuple[object, ...]] = {
+        "amplitude": SWINGS,
+        "state scales": SHARES,
+        "noise gain": NOISE_GAINS,
+        "time scale": tuple((low * ratio**k, low * ratio ** (k + 1)) for k in range(3)),
+    }
+    for value in options[lever]:
+        if value != choice.get(lever):
+            yield choice.with_lever(lever, value)
+
+
+def slower(choice: Choice, frequency: float, low: float) -> Iterator[Choice]:
+    """The same at half of a frequency for ω = 1 [Hz], a quarter, and so on, not below ``low``."""
+    high = frequency / 2.0
+    while high > low * math.sqrt(2.0):
+        yield replace(choice, frequency=(high / math.sqrt(2.0), high))
+        high /= 2.0

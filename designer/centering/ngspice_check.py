@@ -1,0 +1,109 @@
+"""What ngspice says of a candidate, on op-amps with gain-bandwidth and slew rate.
+
+A search decides on the exact circuit, whose op-amps are ideal up to their limits. Real ones take
+time at the dead zone: while its diodes change over, the loop is open and the output has to cross
+two diode drops, so a contact comes late by about √(2·V/(GBW·β·dv/dt)), and a late spring force is
+negative damping. In units of the model's time this falls with the root of the frequency at ω = 1,
+hence the cure is a slower time scale. Boards are those of a prediction, with the spread stretched:
+few of them tell what many tell as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from designer.centering.distance import Stand, Stretched
+from designer.centering.memory import Memory
+from designer.spice import numerics_gate
+from designer.spice.numerics_gate import Subject
+from designer.spice.opamp_model import Rung
+from designer.spice.pool import SpicePool
+from designer.yields.ngspice_runs import Query, confirm, way_to_rung
+from designer.yields.ngspice_sampling import survives
+
+RUNG: Rung = "dynamic"
+STRETCH, LISTENED = 2.0, 16
+"""Stretch of the spread, and boards of each response."""
+FEWER, LEAST = 1, 8
+"""Boards of a response that ngspice may lose, and answers that it takes to say so."""
+LONGEST = 60
+"""Drive periods: a board that is further from its orbit in ngspice is not asked."""
+LEVELS = 3
+"""Step sizes that the numerics gate tries; finer ones, near a border, are not waited for."""
+REFINEMENTS = 1
+"""How often the step is halved where ngspice disagrees."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Of ``LISTENED`` boards of one response: those that show it on the exact circuit, those of
+    them that show it in ngspice as well, and those without an answer: too long a way to be asked,
+    runs that failed, step sizes of which one shows it, a contact that cannot be counted, a numerics
+    gate that does not pass."""
+
+    exact: int
+    ngspice: int
+    unanswered: int = 0
+
+    def __str__(self) -> str:
+        open_ = f" ({self.unanswered} without an answer)" if self.unanswered else ""
+        return f"{self.ngspice}/{self.exact}{open_}"
+
+    @property
+    def borne_out(self) -> bool | None:
+        """None where there are too few answers to tell."""
+        answers = self.exact - self.unanswered
+        return answers - self.ngspice <= FEWER if answers >= LEAST else None
+
+
+Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple[Agreement, ...]]
+"""Of the boards of a design and its responses' stands; the last is called once a response."""
+
+
+class Listener:
+    """Asks ngspice, and remembers. pool : where it runs. memory : of the search."""
+
+    def __init__(self, pool: SpicePool, memory: Memory) -> None:
+        self._pool, self._memory = pool, memory
+
+    def __call__(
+        self,
+        bench: Stretched,
+        stands: Sequence[Stand | None],
+        progress: Callable[[], None] = lambda: None,
+    ) -> tuple[Agreement, ...]:
+        """For each response; where the nominal board does not show it there is nothing to ask."""
+        out = []
+        for stand in stands:
+            found = Agreement(0, 0)
+            if stand is not None:
+                said = [RUNG, REFINEMENTS, LONGEST, bench.said(stand, range(LISTENED), (STRETCH,))]
+                (known,) = self._memory.get_all([said], partial(self._ask, bench, stand))
+                found = Agreement(*known)
+            out.append(found)
+            progress()
+        return tuple(out)
+
+    def _ask(self, bench: Stretched, stand: Stand, _: Sequence[int]) -> list[tuple[int, ...]]:
+        there = bench.subjects(stand, range(LISTENED), STRETCH)
+        near = [s for s in map(_started, there) if s.discard <= LONGEST]
+        if len(near) < LEAST:
+            return [(len(there), 0, len(there))]
+        (nominal,) = numerics_gate.check(
+            self._pool, [replace(bench.nominal(stand), rung=RUNG)], LEVELS
+        )
+        if not nominal.passed:
+            return [(len(there), 0, len(there))]
+        queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]
+        kept = [
+            survives(stand.spec, stand.orbit, h.response, h.either, symmetric=h.symmetric)
+            for h in confirm(self._pool, queries)
+        ]
+        answers = len(kept) - kept.count(None)
+        return [(len(there), kept.count(True), len(there) - answers)]
+
+
+def _started(subject: Subject) -> Subject:
+    return replace(subject, rung=RUNG, discard=way_to_rung(subject.orbit))

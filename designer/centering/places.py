@@ -1,0 +1,154 @@
+"""The place of a response in its windows over ω and b that is farthest from losing it.
+
+Every stretch of the response (``centering.windows``) is scanned with a few boards at one
+stretched spread; the best places are asked again with more boards and stretches, and around the
+best of them a pattern of ever smaller steps over ω and b goes on as long as something is gained.
+Distances are those of ``centering.distance``, so borders count by how much boards move them,
+whichever mechanism makes them, other attractors among them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from designer.centering.distance import LADDER, Counts, Stand, Stretched
+from designer.centering.windows import CLEARANCE_STEP, Place, Stretch
+from designer.model.model_file import Response
+
+SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
+"""Of a stretch: where it is scanned. The first of equal places is taken, so the middle is first."""
+SCAN, SOME, MANY = 8, 24, 64
+"""Boards of the scan, of the second round and of the pattern."""
+SCANNED, KEPT, STARTS = (2.0,), 10, 2
+"""Stretches of the spread in the scan; places of the second round; starts of the pattern."""
+PATTERN = 4
+"""Rounds of the pattern in which the step is halved."""
+MOST = 12
+"""Rounds of the pattern in all."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A place with what boards showed there; stand None: the nominal board shows it not."""
+
+    place: Place
+    stand: Stand | None
+    counts: Counts
+
+    @property
+    def distance(self) -> float:
+        return self.counts.distance if self.stand is not None else -math.inf
+
+
+@dataclass(frozen=True)
+class Room:
+    """How far a place may go. omega, b : closed ranges; equal ends where it is not open."""
+
+    omega: tuple[float, float]
+    b: tuple[float, float]
+
+
+def room_of(spec: Response, b: float, omega: tuple[float, float]) -> Room:
+    """What a response leaves open. b : the model's clearance. omega : band of a search."""
+    one = spec.b if isinstance(spec.b, float) else b
+    ends = spec.b if isinstance(spec.b, tuple) else (one, one)
+    return Room(omega if spec.omega is None else (spec.omega, spec.omega), ends)
+
+
+def places(
+    bench: Stretched,
+    spec: Response,
+    stretches: Sequence[Stretch],
+    room: Room,
+    *,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[list[Scored], int]:
+    """Places of one response, best first, and how many were tried.
+
+    bench : with ``MANY`` boards at least. progress : called every few boards.
+    """
+    every = [stretch.at(SHARES) for stretch in stretches]
+    scanned = [p for row in itertools.zip_longest(*every) for p in row if p is not None]
+    first = score(bench, spec, scanned, SCAN, SCANNED, progress)
+    # The scan's distances are coarse: among equals the middle of a wide stretch comes first.
+    second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER, progress)
+    tried, found = len(scanned) + len(second), []
+    for start in best(second, STARTS):
+        step = _step(stretches, start.place)
+        ways, more = _pattern(bench, spec, start.place, room, step, progress)
+        found += ways
+        tried += more
+    return best(found, len(found)), tried
+
+
+def score(
+    bench: Stretched,
+    spec: Response,
+    wanted: Sequence[Place],
+    boards: int,
+    ladder: Sequence[float] = LADDER,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Scored]:
+    """What the first boards show at these places, in order."""
+    stands = bench.stands([(spec, place) for place in wanted])
+    there = [s for s in stands if s is not None]
+    counts = iter(bench.ask(there, range(boards), ladder, progress) if there else [])
+    nothing = Counts(tuple(ladder), (0,) * len(ladder), (0,) * len(ladder))
+    return [
+        Scored(place, stand, nothing if stand is None else next(counts))
+        for place, stand in zip(wanted, stands, strict=True)
+    ]
+
+
+def best(found: Sequence[Scored], count: int) -> list[Scored]:
+    """Those of the largest distances that the nominal board shows; the earlier of equals first."""
+    there = [s for s in found if s.stand is not None]
+    return sorted(there, key=lambda s: -s.distance)[:count]
+
+
+def _step(stretches: Sequence[Stretch], place: Place) -> float:
+    """Of ln ω: half the distance of the places that were scanned."""
+    home = next(s for s in stretches if any(p is place for p in s.places))
+    return max(math.log(home.high / home.low) * 0.1, 1e-3)
+
+
+def _pattern(
+    bench: Stretched,
+    spec: Response,
+    start: Place,
+    room: Room,
+    step: float,
+    progress: Callable[[], None],
+) -> tuple[list[Scored], int]:
+    """Places met by a pattern search over (ln ω, ln b)."""
+    known = {(start.omega, start.b): score(bench, spec, [start], MANY, LADDER[1:], progress)[0]}
+    centre, halved, wide = known[start.omega, start.b], 0, 0.5 * CLEARANCE_STEP
+    for _ in range(MOST):
+        if halved == PATTERN:
+            break
+        around: list[Place] = []
+        for i in (-1, 0, 1):
+            for j in (-1, 0, 1):
+                omega, b = (
+                    centre.place.omega * math.exp(i * step),
+                    centre.place.b * math.exp(j * wide),
+                )
+                omega = min(max(omega, room.omega[0]), room.omega[1])
+                b = min(max(b, room.b[0]), room.b[1])
+                if (omega, b) not in known and (omega, b) not in [(p.omega, p.b) for p in around]:
+                    around.append(replace(centre.place, omega=omega, b=b))
+        for scored in score(bench, spec, around, MANY, LADDER[1:], progress):
+            known[scored.place.omega, scored.place.b] = scored
+        top = max(known.values(), key=lambda s: s.distance)
+        if top.distance > centre.distance:
+            centre = top
+        else:
+            step, wide, halved = 0.5 * step, 0.5 * wide, halved + 1
+    return list(known.values()), len(known)
+
+
+def _held(value: float, ends: tuple[float, float]) -> float:
+    return min(max(value, ends[0]), ends[1])

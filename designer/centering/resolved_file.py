@@ -1,0 +1,44 @@
+"""The model file of a found design: as it was given, with everything filled in that was open."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from designer.base.toml_writer import toml_text
+from designer.centering.levers import Choice
+from designer.check.synthesis_result import Synthesis
+from designer.model.find_responses import ModelResponse
+from designer.model.model_file import ModelFile, parse_model_file
+
+
+def resolved(asked: ModelFile, made: Synthesis, choice: Choice, source: Path) -> ModelFile:
+    """The model file that a design folder holds, as if read from ``source``.
+
+    ω and b of each response, op-amp and dead zone are values; ``objective`` stays "yield". What
+    the synthesis aimed at inside its conditions is no key of a model file: the parts stand in
+    ``design.json``.
+    """
+    text = _text(asked, made.found, choice)
+    file = parse_model_file(text, source)
+    return replace(file, measured=asked.measured)
+
+
+def _text(asked: ModelFile, found: Sequence[ModelResponse], choice: Choice) -> str:
+    data: dict[str, Any] = tomllib.loads(asked.text.lstrip("\ufeff"))
+    data.setdefault("title", asked.title)
+    for table, spec, response in zip(data["response"], asked.responses, found, strict=True):
+        if spec.omega is None:
+            table["omega"] = response.omega
+        if isinstance(spec.b, tuple):
+            table["b"] = response.b
+    circuit = data.setdefault("circuit", {})
+    circuit |= {"opamp": choice.opamp, "dead_zone": choice.dead_zone}
+    if choice.opamp != asked.circuit.opamp:
+        circuit.pop("saturation", None)  # it was stated for the other op-amp
+    order = ["format", "title", "model", "mechanical", "response", "circuit"]
+    first = {key: data[key] for key in order if key in data}
+    return toml_text({**first, **data})

@@ -1,0 +1,204 @@
+"""Where the model shows a response: places over ω and b, from which a search chooses one.
+
+At each clearance of a response's range the attractor is followed over ω, down and up
+(``bifurcations.sweep``); neighbouring steps that show the response are a stretch of its window.
+What coexists with both followed attractors is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.bifurcations import sweep
+from designer.bifurcations.sweep import DOWN, UP, SweepPlan
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import Course, Steady
+from designer.model import find_responses
+from designer.model.model import Dimensionless
+from designer.model.model_file import Response
+from designer.model.search_table import SearchSpec
+from designer.model.swept_model import ModelSubject
+
+STEP = 0.005
+"""Of ω, between two steps of a sweep."""
+CLEARANCE_STEP = 0.06
+"""Of b, between two clearances of a range, at most."""
+COURSE = Course(settle=300, keep=10, patience=300)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a response is asked for. start : (4,) a strobe of its orbit, in model units."""
+
+    omega: float
+    b: float
+    start: Array
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Neighbouring places at one clearance that show one response, by ascending ω."""
+
+    places: tuple[Place, ...]
+
+    @property
+    def b(self) -> float:
+        return self.places[0].b
+
+    @property
+    def low(self) -> float:
+        return self.places[0].omega
+
+    @property
+    def high(self) -> float:
+        return self.places[-1].omega
+
+    def at(self, shares: Sequence[float]) -> list[Place]:
+        """The places nearest to these shares of the way from the lower end to the upper, in the
+        order of the shares."""
+        last = len(self.places) - 1
+        return [self.places[i] for i in dict.fromkeys(round(s * last) for s in shares)]
+
+
+def open_in(spec: Response) -> bool:
+    """Whether a response leaves its place open."""
+    return spec.omega is None or isinstance(spec.b, tuple)
+
+
+def check(wanted: Sequence[Response]) -> None:
+    """Refuse what no search can find.
+
+    Raises
+    ------
+    InputError : ω or b is open and nothing says which response is wanted, or a range of b is one
+        value.
+    """
+    for number, spec in enumerate(wanted, start=1):
+        if not open_in(spec):
+            continue
+        if spec.expect is None:
+            open_ = '"best"' if spec.omega is None else "b as a range"
+            raise InputError(
+                None,
+                f"response[{number}].expect",
+                "nothing",
+                f'n-p-q such as "1-2-2": {open_} is chosen in the window of that response',
+            )
+        if isinstance(spec.b, tuple) and not spec.b[0] < spec.b[1]:
+            raise InputError(
+                None, f"response[{number}].b", list(spec.b), "a range [low, high] with low < high"
+            )
+
+
+def stretches(
+    model: Dimensionless,
+    wanted: Sequence[Response],
+    spec: SearchSpec,
+    *,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[tuple[Stretch, ...], ...]:
+    """For each response the stretches on which the model shows it, widest first.
+
+    progress : called once a clearance.
+
+    Raises
+    ------
+    InputError : see ``check``; the model does not show a response anywhere in its range.
+    """
+    check(wanted)
+    omegas = _grid(spec.omega)
+    swept: dict[float, list[tuple[Steady, ...]]] = {}
+
+    def at(b: float) -> list[tuple[Steady, ...]]:
+        if b not in swept:
+            subject = ModelSubject(replace(model, b=b))
+            plan = SweepPlan(subject, "omega", omegas, tracks=(DOWN, UP), course=COURSE)
+            found = sweep.run(plan, jobs)
+            swept[b] = [found.steps[DOWN], found.steps[UP]]
+            progress()
+        return swept[b]
+
+    out = []
+    for number, response in enumerate(wanted, start=1):
+        found: list[Stretch] = []
+        for b in clearances(model, response):
+            if response.omega is None:
+                found += _runs(response, omegas, b, at(b))
+            else:
+                found += _single(model, response, response.omega, b)
+        if not found:
+            _refuse(number, response, spec)
+        found.sort(key=lambda s: (-len(s.places), s.b, s.low))
+        out.append(tuple(found))
+    return tuple(out)
+
+
+def clearances(model: Dimensionless, response: Response) -> list[float]:
+    """The clearances at which a response is looked for, ascending."""
+    if not isinstance(response.b, tuple):
+        return [model.b if response.b is None else response.b]
+    low, high = response.b
+    count = max(math.ceil(math.log(high / low) / CLEARANCE_STEP), 1)
+    return [float(v) for v in np.geomspace(low, high, count + 1)]
+
+
+def shows(response: Response, step: Steady) -> bool:
+    """Whether a step of a sweep is the response that is wanted."""
+    if step.status is not OrbitStatus.PERIODIC or not step.radius < 1.0:
+        return False
+    if not response.accepts(step.n, step.p, step.q):
+        return False
+    return response.symmetric is None or step.symmetric is response.symmetric
+
+
+def _grid(ends: tuple[float, float]) -> Array:
+    low, high = ends
+    count = max(math.ceil(math.log(high / low) / STEP), 1)
+    return np.geomspace(low, high, count + 1)
+
+
+def _runs(
+    response: Response, omegas: Array, b: float, tracks: Sequence[Sequence[Steady]]
+) -> list[Stretch]:
+    places: list[Place | None] = []
+    for i, omega in enumerate(omegas):
+        step = next((t[i] for t in tracks if shows(response, t[i])), None)
+        places.append(None if step is None else Place(float(omega), b, step.start))
+    out: list[Stretch] = []
+    run: list[Place] = []
+    for place in [*places, None]:
+        if place is not None:
+            run.append(place)
+        elif run:
+            out.append(Stretch(tuple(run)))
+            run = []
+    return out
+
+
+def _single(model: Dimensionless, response: Response, omega: float, b: float) -> list[Stretch]:
+    found = find_responses.find(model, [replace(response, omega=omega, b=b)])[0]
+    return [Stretch((Place(omega, b, found.orbit.start),))] if found.found else []
+
+
+def _refuse(number: int, response: Response, spec: SearchSpec) -> None:
+    ranged = isinstance(response.b, tuple)
+    field = "omega" if response.omega is None else "b" if ranged else "omega"
+    found: object = "best" if response.omega is None else response.omega
+    if field == "b":
+        found = list(response.b) if isinstance(response.b, tuple) else response.b
+    where = f"ω from {spec.omega[0]:g} to {spec.omega[1]:g}" if response.omega is None else "it"
+    raise InputError(
+        None,
+        f"response[{number}].{field}",
+        found,
+        f"a place at which the model shows {response.expect}: it has no window over {where}"
+        + (" and this range of b" if ranged else " at this b")
+        + ("; search.omega says where to look" if response.omega is None else ""),
+    )

@@ -1,0 +1,178 @@
+"""The main job, stage by stage: model file → responses → design → checked circuit → yields.
+
+Each stage takes what the one before it made and can be called alone. Nothing here writes files or
+prints; ``base.design_folder`` and the command line do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from designer.catalog.catalog import Catalog
+from designer.check import trust
+from designer.check.trust import Trust
+from designer.circuit.design import Design
+from designer.circuit.netlist import Excitation
+from designer.circuit.nominal import (
+    Trace,
+    circuit_flow,
+    model_flow,
+    nominal_reduction,
+    reached,
+    trace_of,
+)
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.find_responses import ModelResponse, find, peaks
+from designer.model.model_file import ModelFile
+from designer.spice import numerics_gate as gate
+from designer.spice.numerics_gate import GateResult
+from designer.spice.pool import SpicePool
+from designer.spice.simulator import SimulationFailed
+from designer.spread.part_rules import check_names
+from designer.spread.spread import Spread
+from designer.synthesis.attempt import zone_of_spec
+from designer.synthesis.part_names import parts_of
+from designer.synthesis.parts_choice import check_choices, synthesise
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A wanted response on all three engines, for the nominal circuit.
+
+    circuit : orbit of the exact circuit rung, in volts and seconds. gate : ngspice's settings and
+    its run; None where ngspice was not asked. design, flow : what was checked, and its circuit's
+    flow at this response; without them nothing is measured of the exact answers' trust.
+    """
+
+    model: ModelResponse
+    circuit: Orbit
+    excitation: Excitation
+    gate: GateResult | None
+    design: Design | None = None
+    flow: Flow | None = None
+
+    @cached_property
+    def model_trust(self) -> Trust:
+        """Of the model's answer. Measured when somebody asks: it takes as long as the check."""
+        if self.design is None:
+            return Trust()
+        return trust.of_orbit(model_flow(self.design, self.model), self.model.orbit)
+
+    @cached_property
+    def circuit_trust(self) -> Trust:
+        """Of the exact circuit's answer, likewise."""
+        return Trust() if self.flow is None else trust.of_orbit(self.flow, self.circuit)
+
+    @property
+    def ngspice(self) -> Orbit | None:
+        """ngspice's orbit; status failed with the reason where it failed or the gate did not
+        pass."""
+        if self.gate is None:
+            return None
+        if isinstance(self.gate.read, SimulationFailed):
+            return Orbit(OrbitStatus.FAILED, reason=self.gate.read.reason)
+        if not self.gate.passed:
+            return Orbit(
+                OrbitStatus.FAILED,
+                reason=f"the numerics gate did not pass (steps a period: {self.gate.tried}): "
+                + self.gate.why,
+            )
+        return self.gate.read.orbit
+
+    @property
+    def trust(self) -> dict[str, Trust]:
+        """Of each engine's answer."""
+        said = {"model": self.model_trust, "circuit": self.circuit_trust}
+        return said if self.gate is None else {**said, "ngspice": trust.of_gate(self.gate)}
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every engine that was asked has an answer, and it can be trusted."""
+        return all(said.trusted is True for said in self.trust.values())
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every engine that was asked shows the same n-p-q, up to the mirror twin."""
+
+        def kind(o: Orbit) -> tuple[int, tuple[int, ...]] | str:
+            return (o.n, tuple(sorted((o.p, o.q)))) if o.n else str(o.status)
+
+        engines = [self.model.orbit, self.circuit]
+        if self.ngspice is not None:
+            engines.append(self.ngspice)
+        return len({(str(o.status), kind(o)) for o in engines}) == 1
+
+
+def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelResponse, ...], Design]:
+    """Find the wanted responses on the model and choose the parts.
+
+    Raises
+    ------
+    InputError, Unreachable : see ``find_responses.find`` and ``parts_choice.synthesise``.
+    """
+    check_choices(modelfile.model, modelfile.circuit, catalog)
+    choice = modelfile.model, modelfile.circuit, catalog
+    check_names(modelfile, parts_of(*choice, zone_of_spec(*choice)))
+    found = find(modelfile.model, modelfile.responses)
+    design = synthesise(
+        modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found
+    )
+    Spread.of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
+    return found, design
+
+
+def check(
+    design: Design,
+    found: Sequence[ModelResponse],
+    pool: SpicePool | None,
+    progress: Callable[[str], None] = lambda _: None,
+    *,
+    gates: Sequence[GateResult] | None = None,
+) -> tuple[Checked, ...]:
+    """Every response on the exact circuit and, with a pool, in ngspice behind the gate.
+
+    gates : what ngspice's gate found of this very design before; it is not asked again then.
+    """
+    reduction = nominal_reduction(design)
+    system = reduction.system()
+    settings = [
+        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in found
+    ]
+    progress("exact circuit")
+    flows = [circuit_flow(system, design, r) for r in found]
+    orbits = [reached(flow, design, r) for flow, r in zip(flows, found, strict=True)]
+    met: list[GateResult | None] = [None] * len(found)
+    if pool is not None and gates is not None:
+        met = list(gates)
+    elif pool is not None:
+        progress("ngspice, numerics gate")
+        met = list(
+            gate.check(
+                pool,
+                [gate.Subject(reduction, e, o) for e, o in zip(settings, orbits, strict=True)],
+            )
+        )
+    return tuple(
+        Checked(r, o, e, g, design, flow)
+        for r, o, e, g, flow in zip(found, orbits, settings, met, flows, strict=True)
+    )
+
+
+def traces(design: Design, checked: Checked) -> dict[str, Trace]:
+    """Orbits of each engine in model units, for overlays: "model", "circuit", "ngspice"."""
+    out: dict[str, Trace] = {}
+    b = checked.model.b
+    volts, seconds = design.volts(b), design.errors.scales.seconds
+    out["model"] = trace_of(model_flow(design, checked.model), checked.model.orbit, np.ones(4), 1.0)
+    circuit = circuit_flow(nominal_reduction(design).system(), design, checked.model)
+    out["circuit"] = trace_of(circuit, checked.circuit, volts, seconds)
+    read = checked.gate.read if checked.gate is not None else None
+    if read is not None and not isinstance(read, SimulationFailed) and read.trace is not None:
+        time, states = read.trace
+        out["ngspice"] = Trace(time / seconds, states / volts)
+    return out

@@ -1,0 +1,392 @@
+"""Simulating responses on one engine: model, exact circuit or ngspice, in dimensionless terms.
+
+Nothing here writes a file or prints.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.checks import cores
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.check import trust
+from designer.check.checked_design import Checked
+from designer.check.synthesis_result import Synthesis, synthesise
+from designer.check.trust import Trust
+from designer.circuit import nominal
+from designer.circuit.netlist import Excitation
+from designer.circuit.nominal import Trace, circuit_flow, trace_of
+from designer.dynamics import attractors
+from designer.dynamics.attractors import coexisting, settle, starts
+from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
+from designer.dynamics.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.find_responses import (
+    STARTS,
+    ModelResponse,
+    check_omega,
+    find,
+    matches,
+    scale_of,
+)
+from designer.model.model import Dimensionless
+from designer.model.model_file import ModelFile, Response, naming, need_responses
+from designer.spice import numerics_gate, read_orbit
+from designer.spice.opamp_model import Rung
+from designer.spice.pool import SpicePool, require_ngspice
+from designer.spice.simulator import SimulationFailed
+
+Engine = Literal["model", "circuit", "ngspice"]
+ENGINES: tuple[Engine, ...] = ("model", "circuit", "ngspice")
+NEAR_TWIN = 0.02
+"""Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A response on one engine, in model units whatever the engine.
+
+    twins : mirror twin of the orbit and of each of ``others``; None where an orbit is its own
+    twin, or there is no mirror, or the engine was not asked (ngspice). b : the clearance; sides :
+    the stops there are. settings : of the engine for this response. traces : where asked, the
+    orbit and its twin over their periods, each from its start. trust : of the orbit.
+    """
+
+    omega: float
+    expected: str | None
+    found: bool
+    orbit: Orbit
+    others: tuple[Orbit, ...]
+    seconds: float
+    twins: tuple[Orbit | None, ...] = ()
+    b: float = float("nan")
+    sides: tuple[int, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+    traces: tuple[Trace, ...] = ()
+    trust: Trust = field(default_factory=Trust)
+
+    @property
+    def twin(self) -> Orbit | None:
+        """The mirror twin of the orbit, if it has one."""
+        return self.twins[0] if self.twins else None
+
+
+def simulate(
+    modelfile: ModelFile,
+    omegas: Sequence[float] = (),
+    *,
+    engine: Engine = "model",
+    synthesis: Synthesis | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+    traces: bool = False,
+    rung: Rung = "ideal",
+) -> tuple[Simulated, ...]:
+    """The responses of a model file, or what is reached from rest at ``omegas``.
+
+    engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
+    synthesis : of this model file; made where the engine needs one and None is given. traces :
+    keep the orbits and their mirror twins as traces too. rung : the op-amps' model in ngspice.
+
+    Raises
+    ------
+    InputError : a rung for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, or
+        nothing to simulate.
+    """
+    said = Progress() if progress is None else progress
+    if rung != "ideal" and engine != "ngspice":
+        raise InputError(
+            None, "--rung", rung, "ideal, or --engine ngspice: other engines have none"
+        )
+    for omega in omegas:
+        check_omega("--omega", omega)
+    if not omegas and not modelfile.responses:
+        need_responses(modelfile, " (or --omega)")
+    specs = [Response(float(w)) for w in omegas] or list(modelfile.responses)
+    file = str(modelfile.source) if modelfile.source else None
+    for number, spec in enumerate(specs, start=1):
+        if spec.omega is not None:
+            check_omega(f"response[{number}].omega", spec.omega, file)
+    if engine == "model":
+        step = said.stage("responses of the model", len(specs))
+        return tuple(
+            _timed(step, lambda s=s: _on_model(modelfile, s, traces))  # type: ignore[misc]
+            for s in specs
+        )
+    if engine == "circuit":
+        made = synthesis or synthesise(modelfile)
+        step = said.stage("responses of the exact circuit", len(specs))
+        return tuple(
+            _timed(step, lambda s=s: _on_circuit(made, s, bool(omegas), traces))  # type: ignore[misc]
+            for s in specs
+        )
+    with SpicePool(cores() if jobs is None else jobs) as pool:
+        require_ngspice(pool)
+        made = synthesis or synthesise(modelfile)
+        return _in_ngspice(made, specs, bool(omegas), pool, said, traces, rung)
+
+
+def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
+    """What ``simulate`` states of an engine: tolerances, bounds and limits (docs/engine.md)."""
+    exact: dict[str, Any] = {
+        "flow": "exact, by modes",
+        "strobe_tolerance": attractors.STROBE_TOLERANCE,
+        "undecided_below": attractors.ENGINE_ERROR,
+        "symmetry_tolerance": SYMMETRY_TOLERANCE,
+        "largest_period": MAX_PERIOD,
+        "settling_periods": list(np.cumsum(attractors.STAGES)),
+        "starts": STARTS,
+        "most_events_a_period": MAX_EVENTS,
+    }
+    if engine != "ngspice":
+        return exact
+    return {
+        **exact,
+        "strobe_tolerance": read_orbit.STROBE_TOLERANCE,
+        "undecided_below": read_orbit.ENGINE_ERROR,
+        "gate_bound": numerics_gate.BOUND,
+        "rung": rung,
+    }
+
+
+# ---------------------------------------------------------------------------------------------
+
+
+def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated:
+    began = time.perf_counter()
+    result = work()
+    step()
+    return replace(result, seconds=time.perf_counter() - began)
+
+
+def _on_model(modelfile: ModelFile, spec: Response, traces: bool) -> Simulated:
+    with naming(modelfile):
+        (r,) = find(modelfile.model, [spec])
+    model = replace(modelfile.model, b=r.b)
+    flow = Flow(model.second_order().piecewise_linear(), Drive(r.omega))
+    orbits = [_measured(flow, o) for o in (r.orbit, *r.others)]
+    twins = [_twin(flow, o) for o in orbits]
+    return Simulated(
+        r.omega,
+        r.expected,
+        r.found and matches(orbits[0], r.spec),
+        orbits[0],
+        tuple(orbits[1:]),
+        0.0,
+        tuple(twins),
+        r.b,
+        _sides(model),
+        _exact_settings(flow, orbits[0], 1.0),
+        _traces(flow, (orbits[0], twins[0]), np.ones(4), 1.0) if traces else (),
+        trust.of_orbit(flow, orbits[0]),
+    )
+
+
+def _sides(model: Dimensionless) -> tuple[int, ...]:
+    """The stops that exist: 1 upper, -1 lower."""
+    if model.k0 == 0.0:
+        return ()
+    return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[model.sides]
+
+
+def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
+    """The mirror twin of an orbit that is not its own.
+
+    Bias currents leave a circuit without an exact mirror; its twin is then the stable orbit next to
+    the mirror image, if there is one with the counts the other way round.
+    """
+    if orbit.symmetric is not False:
+        return None
+    if flow.system.mirror is not None:
+        return attractors.twin(flow, orbit)
+    image = -flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=2).strobes[1]
+    found = attractors.shoot(flow, image, orbit.n)
+    if found is None:
+        return None
+    near = attractors.describe(flow, found[0], orbit.n, found[1])
+    peak = np.abs(orbit.extremes).max(axis=1)
+    alike = (np.abs(near.extremes + orbit.extremes[:, ::-1]).max(axis=1) < NEAR_TWIN * peak).all()
+    swapped = (near.n, near.p, near.q) == (orbit.n, orbit.q, orbit.p)
+    return near if alike and swapped and near.symmetric is False and near.radius < 1.0 else None
+
+
+def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
+    """kernel : which one carries the strobes. undecided_below : contacts shallower and misses
+    nearer than this, in units of x1, count as grazing."""
+    peak = float(np.abs(orbit.extremes[0]).max()) if len(orbit.extremes) else float("nan")
+    return {
+        "kernel": flow.kernel,
+        "undecided_below": attractors.ENGINE_ERROR * peak / unit,
+    }
+
+
+def _traces(
+    flow: Flow, orbits: Sequence[Orbit | None], volts: Array, seconds: float
+) -> tuple[Trace, ...]:
+    """Traces of the orbits in model units; none of what has no start."""
+    return tuple(
+        trace_of(flow, orbit, volts, seconds)
+        for orbit in orbits
+        if orbit is not None and len(orbit.start)
+    )
+
+
+def _circuit_orbits(
+    made: Synthesis, spec: Response, scan: bool
+) -> tuple[ModelResponse, Flow, list[Orbit]]:
+    """The wanted orbit first, in volts and seconds; with ``scan`` what is reached from rest."""
+    with naming(made.modelfile):
+        known = [r for r in made.found if r.spec is spec]
+        (r,) = known or find(made.modelfile.model, [spec])
+    flow = circuit_flow(nominal.nominal_reduction(made.design).system(), made.design, r)
+    volts = made.design.volts(r.b)
+    if scan:
+        model = replace(made.modelfile.model, b=r.b)
+        return r, flow, coexisting(flow, starts(scale_of(model, r.omega) * volts, STARTS))
+    orbits = [settle(flow, o.start * volts) for o in (r.orbit, *r.others) if len(o.start)]
+    return r, flow, orbits or [settle(flow, np.zeros(flow.system.size))]
+
+
+def _on_circuit(made: Synthesis, spec: Response, scan: bool, traces: bool) -> Simulated:
+    r, flow, orbits = _circuit_orbits(made, spec, scan)
+    volts, seconds = made.design.volts(r.b), made.design.errors.scales.seconds
+    measured = [_measured(flow, o) for o in orbits]
+    shown = [dimensionless(o, volts, seconds) for o in measured]
+    kept = _distinct(shown)
+    twins = {i: _twin(flow, measured[i]) for i in kept}
+    return Simulated(
+        r.omega,
+        r.expected,
+        matches(orbits[0], r.spec),
+        shown[0],
+        tuple(shown[i] for i in kept[1:]),
+        0.0,
+        tuple(None if t is None else dimensionless(t, volts, seconds) for t in twins.values()),
+        r.b,
+        _sides(made.design.model),
+        _exact_settings(flow, measured[0], float(volts[0])),
+        _traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
+        trust.of_orbit(flow, measured[0]),
+    )
+
+
+def _in_ngspice(
+    made: Synthesis,
+    specs: Sequence[Response],
+    scan: bool,
+    pool: SpicePool,
+    said: Progress,
+    traces: bool,
+    rung: Rung,
+) -> tuple[Simulated, ...]:
+    """ngspice from the exact circuit's attractors, at settings that pass the gate."""
+    began = time.perf_counter()
+    step = said.stage("responses of the exact circuit", len(specs))
+    reduction = nominal.nominal_reduction(made.design)
+    rows, subjects = [], []
+    for spec in specs:
+        r, _, orbits = _circuit_orbits(made, spec, scan)
+        frequency = made.design.errors.scales.frequency(r.omega)
+        excitation = Excitation(frequency, made.design.amplitude(r.b))
+        started = [o for o in orbits if len(o.start)]
+        subjects += [numerics_gate.Subject(reduction, excitation, o, rung=rung) for o in started]
+        rows.append((r, excitation, len(started)))
+        step()
+    said.stage("ngspice, numerics gate")
+    results = iter(numerics_gate.check(pool, subjects))
+    seconds = (time.perf_counter() - began) / max(len(specs), 1)
+    out = []
+    for r, excitation, count in rows:
+        volts, scale = made.design.volts(r.b), made.design.errors.scales.seconds
+        gates = [next(results) for _ in range(count)]
+        asked = [Checked(r, r.orbit, excitation, g).ngspice for g in gates]
+        heard = [o for o in asked if o is not None] or [Orbit(OrbitStatus.FAILED)]
+        shown = [dimensionless(o, volts, scale) for o in heard]
+        out.append(
+            Simulated(
+                r.omega,
+                r.expected,
+                matches(heard[0], r.spec),
+                shown[0],
+                tuple(shown[i] for i in _distinct(shown)[1:]),
+                seconds,
+                b=r.b,
+                sides=_sides(made.design.model),
+                settings=_gate_settings(gates[0]) if gates else {},
+                traces=_spice_traces(gates[0], volts, scale) if gates and traces else (),
+                trust=trust.of_gate(gates[0]) if gates else Trust(),
+            )
+        )
+    return tuple(out)
+
+
+def _gate_settings(result: numerics_gate.GateResult) -> dict[str, Any]:
+    return {
+        **result.settings.as_dict(),
+        "steps_a_period": result.tried[-1],
+        "steps_a_contact": result.contact_steps,
+        "gate_passed": result.passed,
+        "gate_difference": result.difference,
+        "remedies": list(result.remedies),
+        "discarded_periods": result.discarded,
+    }
+
+
+def _spice_traces(
+    result: numerics_gate.GateResult, volts: Array, seconds: float
+) -> tuple[Trace, ...]:
+    if isinstance(result.read, SimulationFailed) or result.read.trace is None:
+        return ()
+    time_, states = result.read.trace
+    return (Trace(time_ / seconds, states / volts),)
+
+
+def _distinct(orbits: Sequence[Orbit]) -> list[int]:
+    """Which orbits to show: the first, and the others that do not look like one before them."""
+    kept = [0]
+    for i in range(1, len(orbits)):
+        if not any(_alike(orbits[i], orbits[k]) for k in kept):
+            kept.append(i)
+    return kept
+
+
+def _alike(a: Orbit, b: Orbit) -> bool:
+    if a.status is not b.status or a.n != b.n or {a.p, a.q} != {b.p, b.q}:
+        return False
+    if not (len(a.extremes) and len(b.extremes)):
+        return True
+    size = np.abs(a.extremes).max(axis=1)
+    twin = -b.extremes[:, ::-1]
+    return any(
+        bool((np.abs(a.extremes - e).max(axis=1) < 1e-3 * size).all()) for e in (b.extremes, twin)
+    )
+
+
+def _measured(flow: Flow, orbit: Orbit) -> Orbit:
+    """With the extremes over 200 periods where the orbit is not periodic and has none."""
+    if len(orbit.extremes) or not len(orbit.start):
+        return orbit
+    run_ = flow.run(orbit.start, 200, measure=True)
+    return orbit if run_.status is not FlowStatus.DONE else replace(orbit, extremes=run_.extremes)
+
+
+def dimensionless(orbit: Orbit, volts: Array, seconds: float) -> Orbit:
+    """An orbit in volts and seconds, in model units: volts (states,) per unit, seconds per unit
+    of model time."""
+    return replace(
+        orbit,
+        start=orbit.start / volts if len(orbit.start) else orbit.start,
+        extremes=orbit.extremes / volts[:, None] if len(orbit.extremes) else orbit.extremes,
+        impact_times=orbit.impact_times / seconds,
+        impact_velocities=orbit.impact_velocities / volts[1],
+        lyapunov=orbit.lyapunov * seconds,
+        penetration=orbit.penetration / float(volts[0]),
+        miss=orbit.miss / float(volts[0]),
+    )

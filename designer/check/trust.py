@@ -1,0 +1,203 @@
+"""Whether a result can be trusted: its error, measured on the result itself, against what it says.
+
+A lap of an orbit is computed several ways that share no rounding error: by the kernel that
+answered, and by the general one with its steps cut differently, from starts a few roundings apart.
+What they differ by is what rounding does to a lap, with all that the flow magnifies inside it: a
+stop of stiffness μ turns a rounding error of the displacement into sqrt(μ) times as much of the
+velocity, and into μ times as much of the multipliers. The fixed point of the lap is off by that,
+times ‖(I - Φ)⁻¹‖, Φ the lap's linearised map. States count in units of their peaks.
+
+A result that says more than this error allows is *not to be trusted here*, and the reason is said:
+the tool gives no bare answer then. Where there is no answer there is nothing to trust either.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.doubt import Doubt
+from designer.dynamics.attractors import STROBE_TOLERANCE, peaks_near
+from designer.dynamics.flow import Flow, FlowResult, FlowStatus
+from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
+from designer.spice.numerics_gate import GateResult
+from designer.spice.simulator import SimulationFailed
+
+ROUNDING = 2.0**-53
+"""Of a number in double precision."""
+SPLITS = (1, 2, 3, 5)
+"""Stretches a period of the general kernel's runs: each cuts its steps at other times."""
+APART = 8.0
+"""Roundings of the peak by which their starts differ from the orbit's."""
+MARGIN = 10.0
+"""A few runs show the usual rounding error; the bound is so many times the largest they show."""
+WORDS = "not to be trusted here"
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What is known of a result's error.
+
+    rounding : largest difference of a lap's end between the ways to compute it; magnification :
+    ‖Φ‖ of the lap; error : bound of the state's error, multiplier_error : of the largest
+    multiplier's modulus. States in units of their peaks; nan where nothing was measured. doubts :
+    why the result is not to be trusted. answered : whether there is a result.
+    """
+
+    rounding: float = math.nan
+    magnification: float = math.nan
+    error: float = math.nan
+    multiplier_error: float = math.nan
+    doubts: tuple[Doubt, ...] = ()
+    answered: bool = False
+
+    @property
+    def trusted(self) -> bool | None:
+        """None where there is nothing to trust: no answer, and no doubt of what there is."""
+        if self.doubts:
+            return False
+        return True if self.answered else None
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """The doubts' words, without figures."""
+        return tuple(doubt.words for doubt in self.doubts)
+
+    def __str__(self) -> str:
+        """With the figures; empty without a doubt."""
+        return f"{WORDS}: {'; '.join(map(str, self.doubts))}" if self.doubts else ""
+
+    def verdict(self) -> dict[str, Any]:
+        """Without the figures, which no two machines share: equal studies are equal files."""
+        return {"trusted": self.trusted, "reasons": list(self.reasons)}
+
+    def as_dict(self) -> dict[str, Any]:
+        """With the figures, in the reasons too."""
+        return {
+            "trusted": self.trusted,
+            "reasons": [str(doubt) for doubt in self.doubts],
+            "rounding": self.rounding,
+            "magnification": self.magnification,
+            "error": self.error,
+            "multiplier_error": self.multiplier_error,
+        }
+
+
+def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
+    """Of what the exact engine says of a response; ``flow`` is the one it was found with.
+
+    Without a start nothing is measured: its status and reason say why. One that has not settled
+    is measured too, but no answer. Of a motion without a period, one drive period is a lap.
+    """
+    if not len(orbit.start):
+        return Trust()
+    n, size, mode = max(orbit.n, 1), flow.system.size, orbit.mode or None
+    peak = _peak(flow, orbit)
+    general = Flow(flow.system, flow.drive, fast=False)
+    apart = APART * ROUNDING * peak * np.random.default_rng(0).choice([-1, 1], (len(SPLITS), size))
+    runs = [flow.run(orbit.start, n, mode=mode, tangent=np.eye(size))]
+    runs += [
+        general.run(orbit.start + off, n, mode=mode, tangent=np.eye(size), points=k)
+        for k, off in zip(SPLITS, apart, strict=True)
+    ]
+    laps = [run.tangent * peak / peak[:, None] for run in runs if run.tangent is not None]
+    ended = [run.status for run in runs if run.status is not FlowStatus.DONE]
+    if ended:
+        return Trust(doubts=(Doubt(f"a lap computed anew ends with: {ended[0]}"),))
+    ends = np.array([run.strobes[-1] for run in runs]) / peak
+    magnification = float(np.linalg.norm(laps[0], 2))
+    rounding = float(np.ptp(ends, axis=0).max())
+    if runs[0].counts.any():  # all runs may have found the stop with the same last digit
+        rounding = max(rounding, ROUNDING * _kick(flow, peak) * magnification)
+    error = MARGIN * rounding * (_carried(laps[0]) if orbit.n else 1.0)
+    doubts = _doubts_of_lap(runs, error, counted=not _at_strobe(orbit, n * flow.drive.period))
+    if orbit.n == 0:
+        answered = orbit.status in ANSWERS
+        return Trust(rounding, magnification, error, doubts=doubts, answered=answered)
+    open_by = MARGIN * float(np.ptp([_radius(lap) for lap in laps]))
+    if orbit.status is OrbitStatus.PERIODIC:
+        doubts += _doubts_of_orbit(orbit, error, open_by, float(peak[_moving(flow)]))
+    return Trust(rounding, magnification, error, open_by, doubts, orbit.status in ANSWERS)
+
+
+def of_gate(gate: GateResult) -> Trust:
+    """Of ngspice, which answers only behind its gate; a run that failed is no answer."""
+    if isinstance(gate.read, SimulationFailed):
+        return Trust()
+    return Trust(doubts=gate.doubts, answered=gate.read.orbit.status in ANSWERS)
+
+
+# ---------------------------------------------------------------------------------------------
+
+
+def _moving(flow: Flow) -> int:
+    return flow.system.displacement[0] if flow.system.displacement else 0
+
+
+def _peak(flow: Flow, orbit: Orbit) -> Array:
+    """(states,) as `peaks_near`, from the orbit's extremes where it has them."""
+    if not len(orbit.extremes):
+        return peaks_near(flow, orbit.start, orbit.mode or None)
+    peak = np.abs(orbit.extremes).max(axis=1)
+    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+
+
+def _kick(flow: Flow, peak: Array) -> float:
+    """What a contact makes of a rounding error, of the peak: sqrt(μ) in the model."""
+    system, largest = flow.system, 1.0
+    for guard in system.mode(system.start).guards:
+        if guard.clearance >= 0:
+            A = system.mode(guard.target).A
+            rate = float(np.abs(np.linalg.eigvals(A)).max())
+            largest = max(largest, float(np.linalg.norm(A * peak / peak[:, None], 2)) / rate)
+    return largest
+
+
+def _carried(lap: Array) -> float:
+    """How much of a lap's error its fixed point has: ‖(I - Φ)⁻¹‖, at least 1."""
+    smallest = float(np.linalg.svd(np.eye(len(lap)) - lap, compute_uv=False)[-1])
+    return max(1.0, 1.0 / smallest) if smallest > 0.0 else math.inf
+
+
+def _at_strobe(orbit: Orbit, span: float) -> bool:
+    """Whether an impact falls on the strobe, and so into one lap or the next by its last digit."""
+    times = orbit.impact_times
+    return bool((np.minimum(times, np.abs(span - times)) < STROBE_TOLERANCE * span).any())
+
+
+def _doubts_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[Doubt, ...]:
+    doubts = []
+    if not error <= STROBE_TOLERANCE:
+        said = (
+            "rounding errors, as the flow magnifies them, leave the state open by more than the "
+            f"{STROBE_TOLERANCE:.0e} of its peak that to call a response periodic asks for"
+        )
+        doubts.append(Doubt(said, f"{error:.1g}"))
+    counts = {tuple(int(c) for c in run.counts.sum(axis=(0, 1))) for run in runs}
+    if counted and len(counts) > 1:
+        said = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
+        doubts.append(Doubt("computed with other steps a lap has other impacts", said))
+    return tuple(doubts)
+
+
+def _doubts_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) -> tuple[Doubt, ...]:
+    doubts = []
+    nearest = min(orbit.penetration, orbit.miss) / peak
+    if nearest <= error:
+        said = "a contact or a miss lies within the error: the count of impacts is open"
+        doubts.append(Doubt(said, f"{nearest:.1g} of the peak, error {error:.1g}"))
+    if abs(1.0 - orbit.radius) <= open_by:
+        said = (
+            "its largest multiplier cannot be told from 1: whether the response is stable is not "
+            "known"
+        )
+        doubts.append(Doubt(said, f"it is open by {open_by:.1g}"))
+    return tuple(doubts)
+
+
+def _radius(lap: Array) -> float:
+    return float(np.abs(np.linalg.eigvals(lap)).max())

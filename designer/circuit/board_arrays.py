@@ -1,0 +1,127 @@
+"""Many boards of one circuit at once: an array of N values wherever a board has one."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array, Index
+from designer.base.errors import InputError
+from designer.circuit.netlist import Board, Circuit, nominal_board
+
+_BY_NAME = (
+    "values",
+    "offset",
+    "low",
+    "high",
+    "bias",
+    "reference",
+    "drop",
+    "supply",
+    "gain_bandwidth",
+)
+
+
+@dataclass(frozen=True)
+class Boards:
+    """N boards of a circuit; every mapping is from a name to an array (N,).
+
+    What they hold is told at ``circuit.netlist.Board``; low, high : its rails.
+    inverse_gain : (N,).
+    """
+
+    circuit: Circuit
+    values: Mapping[str, Array]
+    offset: Mapping[str, Array]
+    low: Mapping[str, Array]
+    high: Mapping[str, Array]
+    bias: Mapping[str, Array]
+    reference: Mapping[str, Array]
+    drop: Mapping[str, Array]
+    supply: Mapping[str, Array]
+    gain_bandwidth: Mapping[str, Array]
+    inverse_gain: Array
+
+    def __len__(self) -> int:
+        return len(self.inverse_gain)
+
+    def board(self, index: int) -> Board:
+        """One of them."""
+
+        def at(arrays: Mapping[str, Array]) -> dict[str, float]:
+            return {name: float(column[index]) for name, column in arrays.items()}
+
+        low, high = at(self.low), at(self.high)
+        return Board(
+            values=at(self.values),
+            offset=at(self.offset),
+            rails={name: (low[name], high[name]) for name in low},
+            inverse_gain=float(self.inverse_gain[index]),
+            bias=at(self.bias),
+            reference=at(self.reference),
+            drop=at(self.drop),
+            supply=at(self.supply),
+            gain_bandwidth=at(self.gain_bandwidth),
+        )
+
+    def take(self, which: Index | Sequence[int]) -> Boards:
+        """These of them, in this order; one may be taken more than once."""
+        index = np.asarray(which, dtype=np.intp)
+        picked: dict[str, Any] = {
+            group: {name: column[index] for name, column in getattr(self, group).items()}
+            for group in _BY_NAME
+        }
+        return replace(self, **picked, inverse_gain=self.inverse_gain[index])
+
+    def exact(self, names: Collection[str]) -> Boards:
+        """The same boards with these parts, op-amp sections, references and supplies as drawn in
+        the circuit: at their nominal values, without offset.
+
+        Raises
+        ------
+        InputError : the circuit has no part of such a name.
+        """
+        nominal = Boards.of(self.circuit, [nominal_board(self.circuit)])
+        known = {name for group in _BY_NAME for name in getattr(nominal, group)}
+        known |= {rail.name for rail in self.circuit.rails}
+        for name in sorted(set(names) - known):
+            raise InputError(None, "part", name, "a part of the circuit")
+
+        def at_nominal(group: str) -> dict[str, Array]:
+            theirs: Mapping[str, Array] = getattr(nominal, group)
+            columns = {}
+            for name, column in getattr(self, group).items():
+                if name not in names:
+                    columns[name] = column
+                elif name in theirs:
+                    columns[name] = np.full(len(self), theirs[name][0])
+            return columns  # what the nominal board lacks is the circuit's own
+
+        changed: dict[str, Any] = {group: at_nominal(group) for group in _BY_NAME}
+        return replace(self, **changed)
+
+    @classmethod
+    def of(cls, circuit: Circuit, boards: Sequence[Board]) -> Boards:
+        """Single boards together. A name must be in all of them or in none."""
+
+        def columns(group: str) -> dict[str, Array]:
+            first: Mapping[str, float] = getattr(boards[0], group)
+            return {name: np.array([getattr(b, group)[name] for b in boards]) for name in first}
+
+        names = boards[0].rails
+        return cls(
+            circuit=circuit,
+            values=columns("values"),
+            offset=columns("offset"),
+            low={name: np.array([b.rails[name][0] for b in boards]) for name in names},
+            high={name: np.array([b.rails[name][1] for b in boards]) for name in names},
+            bias=columns("bias"),
+            reference=columns("reference"),
+            drop=columns("drop"),
+            supply=columns("supply"),
+            gain_bandwidth=columns("gain_bandwidth"),
+            inverse_gain=np.array([b.inverse_gain for b in boards]),
+        )

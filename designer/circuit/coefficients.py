@@ -1,0 +1,218 @@
+"""How far a finished circuit's equation is from the model's: the coefficient error.
+
+docs/definitions.md: the minimum over the time scale and a positive scale for each state of the
+largest |ln(realised/wanted)| over all coefficients of the state equations. The dead-zone null, a
+wanted zero, counts in units of K1: mu |ln(1 - leftover/slope)|. So does the constant force that a
+stage with one stop leaves inside the clearance, over K1 times the threshold. Realised coefficients
+come from the nodal reduction with ideal op-amps, never from the formulas that chose the parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.netlist import Board, Circuit, nominal_board
+from designer.circuit.reduction import Reduction
+from designer.circuit.scale_fit import minimax
+from designer.model.mechanics import SecondOrderSystem
+
+EXACT = 1e-6
+"""Errors that differ by less count as equal: one up to it as none, one this close to its lower
+bound as proved, and a condition that costs less as one that does not bind."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """How circuit and model correspond: v_i = volts[i] · x_i, T = seconds · t.
+
+    seconds : circuit seconds per unit of model time. volts : (states,) volts per unit of each
+    model state (x1, dx1/dt, …). threshold : magnitude of v1 at the upper stop, or at the only one
+    [V]; threshold_lower : at the lower stop. nan where there is none.
+    """
+
+    seconds: float
+    volts: Array
+    threshold: float
+    threshold_lower: float = float("nan")
+
+    @property
+    def offcentre(self) -> float:
+        """How far the middle of the clearance lies from rest, over half the clearance.
+
+        Stated, not an error: a DC offset of the generator moves it. 0 with one stop or none.
+        """
+        both = self.threshold + self.threshold_lower
+        return float((self.threshold - self.threshold_lower) / both) if both == both else 0.0
+
+    def frequency(self, omega: float) -> float:
+        """Generator frequency [Hz] of a dimensionless frequency omega."""
+        return float(omega / (2.0 * np.pi * self.seconds))
+
+
+class CutShort(ArithmeticError):
+    """An op-amp that is meant to be linear inside the clearance is not."""
+
+
+@dataclass(frozen=True)
+class CoefficientErrors:
+    """errors : ln(realised/wanted) by coefficient, at the best scales; max_error : the largest.
+
+    drive_gain : model force per generator volt, for the driven masses (0 where not driven).
+    """
+
+    errors: dict[str, float]
+    max_error: float
+    scales: Scales
+    drive_gain: Array
+
+
+def coefficient_errors(
+    circuit: Circuit,
+    model: SecondOrderSystem,
+    board: Board | None = None,
+    swing: tuple[float, Array] | None = None,
+) -> CoefficientErrors:
+    """Errors of ``circuit`` (or of one ``board`` of it) against the dimensionless ``model``.
+
+    The amplitude is set by the clearance, volts[0] = threshold/b; without one, by ``swing``: the
+    voltage [V] that the largest of the states' peaks (states,) shall have.
+
+    Raises
+    ------
+    ArithmeticError : a coefficient has the wrong sign, so no scale makes it right; or an op-amp
+        clips or a diode switches inside the clearance, so its stiffness is not one number.
+    """
+    board = nominal_board(circuit, ideal=True) if board is None else board
+    reduction = Reduction(circuit, board)
+    system = reduction.system()
+    open_mode = system.mode(system.start)
+    zone = _dead_zone(reduction) if circuit.stops else None
+    A_lin = open_mode.A if zone is None else zone.A
+    wanted = model.state_matrix()
+    n = len(wanted)
+    rows, targets, names = [], [], []
+
+    def add(name: str, i: int, j: int, realised: float, want: float) -> None:
+        # ln realised + ln seconds + ln volts_j - ln volts_i - ln wanted
+        row = np.zeros(1 + n)
+        row[0] = 1.0
+        row[1 + j] += 1.0
+        row[1 + i] -= 1.0
+        rows.append(row)
+        ratio = realised / want
+        targets.append(np.log(ratio) if ratio > 0.0 else np.inf)
+        names.append(name)
+
+    for i in range(n):
+        for j in range(n):
+            if wanted[i, j] != 0.0:
+                add(f"{_equation(i)} {_state(j)}", i, j, A_lin[i, j], wanted[i, j])
+    if zone is not None:
+        stop = model.clearances[0]
+        for name, slope in zone.slopes.items():
+            add(name, 1, 0, slope, -stop.stiffness / model.mass[stop.mass])
+    h, D = np.array(targets), np.array(rows)
+    if not np.all(np.isfinite(h)):
+        wrong = [name for name, value in zip(names, h, strict=True) if not np.isfinite(value)]
+        raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
+    free = minimax(h, D[:, [0, *range(2, 1 + n)]])  # volts of x1 is the amplitude, set below
+    residual = h + D[:, [0, *range(2, 1 + n)]] @ free
+    errors = dict(zip(names, (float(e) for e in residual), strict=True))
+    relative = np.exp(np.concatenate([[0.0], free[1:]]))
+    amplitude = 1.0
+    if swing is not None:
+        amplitude = swing[0] / float((swing[1] * relative).max())
+    thresholds = {1: float("nan"), -1: float("nan")}
+    if zone is not None:
+        thresholds |= zone.thresholds
+        amplitude = next(iter(zone.thresholds.values())) / model.clearances[0].gap
+        mu = model.clearances[0].stiffness / -wanted[1, 0] / model.mass[0]
+        errors["dead-zone null"] = float(mu * zone.null)
+        if len(zone.thresholds) == 1:
+            errors["dead-zone bias"] = zone.bias
+    upper, lower = thresholds[1], thresholds[-1]
+    scales = Scales(
+        seconds=float(np.exp(free[0])),
+        volts=amplitude * relative,
+        threshold=upper if np.isfinite(upper) else lower,
+        threshold_lower=lower,
+    )
+    drive = -open_mode.B * scales.seconds / scales.volts
+    return CoefficientErrors(
+        errors=errors,
+        max_error=max(abs(e) for e in errors.values()),
+        scales=scales,
+        drive_gain=drive[1::2] * model.mass,
+    )
+
+
+@dataclass(frozen=True)
+class _Zone:
+    """A : the state matrix without the stop. slopes : the stop's entry in A, by error name.
+
+    null : ln of the null's gain ratio, at the side where it is worst. bias : constant force inside
+    the clearance over K1 times the threshold. thresholds : magnitude of v1 [V] by side.
+    """
+
+    A: Array
+    slopes: dict[str, float]
+    null: float
+    bias: float
+    thresholds: dict[int, float]
+
+
+def _dead_zone(reduction: Reduction) -> _Zone:
+    c = reduction.circuit
+    stop = c.stops[0]
+    system = reduction.system()
+    state, row = c.states.index(stop.state), c.states.index(stop.state) + 1
+    rest, inside = system.mode(c.rest), reduction.solution(c.rest).voltage[OUTPUT]
+    flat = float(inside[state])
+    slopes: dict[str, float] = {}
+    thresholds: dict[int, float] = {}
+    nulls: list[float] = []
+    A, bias = rest.A, 0.0
+    for side, contact in stop.contacts:
+        key = c.carrying(contact)
+        steep = float(reduction.solution(key).voltage[OUTPUT][state])
+        per_gain = (system.mode(key).A - rest.A) / (steep - flat)
+        switch = c.switches.index(contact.switch)
+        guard = next(g for g in rest.guards if g.target[switch] == contact.position)
+        end = -guard.e / float(guard.C[state])
+        threshold = abs(end)
+        _stays_linear(reduction, state, end, contact.switch)
+        if not thresholds:
+            A = rest.A - flat * per_gain
+            force = float(inside[-1] * per_gain[row, state])
+            bias = force / abs(float(A[row, state]) * threshold)
+        thresholds[side] = threshold
+        nulls.append(float(np.log1p(-flat / steep)))
+        name = {1: "upper stop slope", -1: "lower stop slope"}[side]
+        if stop.shared or len(stop.contacts) == 1:
+            name = "stop slope"
+        slopes.setdefault(name, float(steep * per_gain[row, state]))
+    return _Zone(A, slopes, max(nulls, key=abs), bias, thresholds)
+
+
+def _stays_linear(reduction: Reduction, state: int, end: float, ends: str) -> None:
+    """The mode at rest has to hold up to where contact begins, at ``end`` [V]."""
+    c = reduction.circuit
+    for guard in reduction.system().mode(c.rest).guards:
+        pairs = zip(c.switches, c.rest, guard.target, strict=True)
+        switch = next(name for name, here, there in pairs if here != there)
+        reach = abs(float(guard.C[state]) * end) + abs(guard.e)
+        if switch != ends and float(guard.C[state]) * end + guard.e > 1e-9 * reach:
+            raise CutShort(f"{switch} changes inside the clearance, before v1 = {end:.4g} V")
+
+
+def _state(j: int) -> str:
+    return f"x{j // 2 + 1}" + ("'" if j % 2 else "")
+
+
+def _equation(i: int) -> str:
+    """The left-hand side of state equation i."""
+    return f"x{i // 2 + 1}''" if i % 2 else f"x{i // 2 + 1}'"

@@ -1,0 +1,125 @@
+"""A finished choice of parts, and what it was chosen for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.coefficients import CoefficientErrors
+from designer.circuit.netlist import Circuit
+from designer.circuit.resistors import Composite, composites_of
+from designer.model.find_responses import ModelResponse
+from designer.model.model import Dimensionless
+
+TOLERANCE = 2e-3
+"""Relative, of a side condition: two circuits with like errors differ so much in their scales."""
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """status : "optimal" or "bound"; lower_bound : no choice from this catalogue has a smaller
+    max_error under the stated conditions; proof : how that is known."""
+
+    status: str
+    lower_bound: float
+    proof: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """A side condition on the finished circuit, as verified outside the search.
+
+    name : of the condition, as in a model file. quantity : what is limited, with its unit, such as
+    "swing_v". limit, found : its bound and its value. where : the part or section that has it.
+    least : whether the bound is from below.
+    """
+
+    name: str
+    quantity: str
+    limit: float
+    found: float
+    where: str = ""
+    least: bool = False
+
+    @property
+    def excess(self) -> float:
+        """Found over limit, or limit over found for a bound from below: up to 1 it holds."""
+        over, under = (self.limit, self.found) if self.least else (self.found, self.limit)
+        return over / under if under > 0.0 else float("inf")
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is kept, to what the scales of a circuit with errors are known to."""
+        return self.excess <= 1.0 + TOLERANCE
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether it is within 1 % of its bound."""
+        return self.excess >= 0.99
+
+
+@dataclass(frozen=True)
+class Design:
+    """A finished choice of parts.
+
+    errors are of the reduced circuit. conditions : side conditions that were kept, by name, with
+    their values. solver : what the solver said of each stage. seconds : wall time. checks : the
+    conditions as verified on the finished circuit. binding : the max_error that the design would
+    have without a condition, for those that cost some.
+    """
+
+    model: Dimensionless
+    circuit: Circuit
+    errors: CoefficientErrors
+    certificate: Certificate
+    conditions: dict[str, float]
+    solver: dict[str, str]
+    seconds: float
+    checks: tuple[Check, ...] = ()
+    binding: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def composites(self) -> dict[str, Composite]:
+        """Resistors NAME that are two parts, NAMEA and NAMEB, and how those are joined."""
+        return composites_of(self.circuit)
+
+    @property
+    def distinct_values(self) -> int:
+        """How many different values the resistors and capacitors have."""
+        kinds = {(r.value, "R") for r in self.circuit.resistors}
+        return len(kinds | {(c.value, "C") for c in self.circuit.capacitors})
+
+    def amplitude(self, b: float | None = None) -> float:
+        """Generator amplitude [V peak] that makes the clearance ``b`` (default: the model's)."""
+        wanted = np.array([1.0 - self.model.f20, self.model.f20])
+        gain = self.errors.drive_gain
+        driven = gain > 0.0
+        volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
+        return volts * (1.0 if b is None else self.model.b / b)
+
+    def volts(self, b: float | None = None) -> Array:
+        """(4,) volts per unit of each model state at clearance ``b``."""
+        return self.errors.scales.volts * (1.0 if b is None else self.model.b / b)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The generator for one response: Hz, volts peak into a high impedance, volts of offset."""
+
+    omega: float
+    expect: str | None
+    frequency_hz: float
+    amplitude_v_peak: float
+    offset_v: float = 0.0
+
+
+def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[Setting, ...]:
+    """The generator's settings, in the order of the responses."""
+    scales = design.errors.scales
+    return tuple(
+        Setting(r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b))
+        for r in found
+    )

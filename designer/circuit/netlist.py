@@ -1,0 +1,369 @@
+"""The circuit: the single list of parts and nets that every output is written from.
+
+Net "0" is ground. ``Circuit.parts`` are simulated; ``Circuit.fittings`` are on the board or on the
+bill alone, and each part says in which views it stands. Parts carry the names of the paper where it
+has them, and the role they play: the term of Eq. (10) that they realise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from designer.base.errors import InputError
+from designer.base.views import View
+from designer.catalog.diode_curve import DiodeModel
+from designer.catalog.entries import OpAmp
+from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
+from designer.dynamics.piecewise_linear import Drive
+
+GROUND = "0"
+POSITIVE, NEGATIVE = "vcc", "vee"
+"""Nets of the supplies."""
+
+
+@dataclass(frozen=True)
+class Resistor:
+    """Resistance [ohm] between nets a and b."""
+
+    name: str
+    a: str
+    b: str
+    value: float
+    role: str
+    views: View = View.EVERYWHERE
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.a, self.b)
+
+
+@dataclass(frozen=True)
+class Capacitor:
+    """Capacitance [F]; its voltage, a state of the circuit, is v(plus) - v(minus)."""
+
+    name: str
+    plus: str
+    minus: str
+    value: float
+    role: str
+    views: View = View.EVERYWHERE
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.plus, self.minus)
+
+
+@dataclass(frozen=True)
+class Section:
+    """One op-amp of a package: name "U1A" is section A of package U1.
+
+    limits : whether it is meant to reach its output limits (the dead-zone stage).
+    """
+
+    name: str
+    inverting: str
+    noninverting: str
+    output: str
+    role: str
+    limits: bool = False
+    views: View = View.EVERYWHERE
+
+    @property
+    def package(self) -> str:
+        return self.name[:-1]
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.inverting, self.noninverting, self.output)
+
+
+@dataclass(frozen=True)
+class Diode:
+    """A diode: model is its curve; rest : whether it conducts with everything at rest."""
+
+    name: str
+    anode: str
+    cathode: str
+    model: DiodeModel
+    rest: bool
+    role: str
+    views: View = View.EVERYWHERE
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.anode, self.cathode)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A shunt reference that keeps v(cathode) - v(anode) at ``volts``, within ± grade.
+
+    model : its name in the catalogue. least : current [A] that it needs; impedance [ohm],
+    dynamic; without them it is a source.
+    """
+
+    name: str
+    cathode: str
+    anode: str
+    volts: float
+    grade: float
+    model: str
+    role: str
+    least: float = 0.0
+    impedance: float = 0.0
+    views: View = View.EVERYWHERE
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        return (self.cathode, self.anode)
+
+
+@dataclass(frozen=True)
+class Supply:
+    """A rail of the power supply: ``volts`` from ``net`` to ground."""
+
+    name: str
+    net: str
+    volts: float
+
+
+@dataclass(frozen=True)
+class Generator:
+    """The signal generator: a voltage source from ``net`` to ground."""
+
+    name: str
+    net: str
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How one side of a stop shows: ``switch``, an op-amp section or a diode, leaves its rest
+    position for ``position`` where contact begins.
+
+    A section's position is 1 at its upper limit, -1 at its lower, 0 between; a diode's is 1 while
+    it conducts, else 0. others : further switches, with their positions while the stop carries.
+    """
+
+    switch: str
+    position: int
+    others: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Stop:
+    """How a clearance shows in the circuit; a side that does not exist is None.
+
+    state : name of the capacitor whose voltage is the displacement.
+    """
+
+    clearance: str
+    state: str
+    upper: Contact | None
+    lower: Contact | None
+
+    @property
+    def contacts(self) -> tuple[tuple[int, Contact], ...]:
+        """The sides that exist, 1 upper and -1 lower, each with its contact."""
+        pairs = ((1, self.upper), (-1, self.lower))
+        return tuple((side, contact) for side, contact in pairs if contact is not None)
+
+    @property
+    def shared(self) -> bool:
+        """Whether both sides are ends of one switch: then they have one slope."""
+        switches = [contact.switch for _, contact in self.contacts]
+        return len(switches) == 2 and switches[0] == switches[1]
+
+
+Part = Resistor | Capacitor | Section | Diode | Reference
+"""What is simulated."""
+Fitting = Part | SupplyCapacitor | Connector | TestPoint | Trimmer
+"""What may stand on the board or the bill alone, or be any part of a view."""
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """Parts and nets, with what the op-amps are and where the states stand.
+
+    states : capacitor names in the order of the state equations.
+    state_nets : nets that carry the states, in the same order.
+    opamp : name of the op-amp in the catalogue; gain : its open-loop gain; bias : input current
+    [A]; supply, saturation : rails and output limits, ± volts. figures : the catalogue's entry of
+    the op-amp, for models above the ideal one.
+    fittings : parts of the board and the bill that are not simulated (``board.board_parts``).
+    """
+
+    parts: tuple[Part, ...]
+    generator: Generator
+    states: tuple[str, ...]
+    state_nets: tuple[str, ...]
+    stops: tuple[Stop, ...]
+    opamp: str
+    gain: float
+    bias: float
+    supply: float
+    saturation: float
+    figures: OpAmp | None = None
+    fittings: tuple[Fitting, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [p.name for p in (*self.parts, *self.fittings)]
+        if len(set(names)) != len(names):
+            twice = sorted({n for n in names if names.count(n) > 1})
+            raise InputError(None, "circuit.parts", ", ".join(twice), "each reference once")
+        for wanted, parts in ((True, self.parts), (False, self.fittings)):
+            lost = [p.name for p in parts if (View.SIMULATION in p.views) is not wanted]
+            if lost:
+                place = "parts" if wanted else "fittings"
+                said = "simulated parts" if wanted else "parts that are not simulated"
+                raise InputError(None, f"circuit.{place}", ", ".join(lost), said)
+
+    def view(self, view: View) -> tuple[Fitting, ...]:
+        """The parts that stand in a view, simulated ones first."""
+        return tuple(p for p in (*self.parts, *self.fittings) if view in p.views)
+
+    @property
+    def gain_bandwidth(self) -> float:
+        """Typical gain-bandwidth of the op-amp [Hz]; nan where its figures are not known."""
+        return self.figures.gbw.nominal if self.figures is not None else math.nan
+
+    @property
+    def resistors(self) -> tuple[Resistor, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Resistor))
+
+    @property
+    def capacitors(self) -> tuple[Capacitor, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Capacitor))
+
+    @property
+    def sections(self) -> tuple[Section, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Section))
+
+    @property
+    def diodes(self) -> tuple[Diode, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Diode))
+
+    @property
+    def references(self) -> tuple[Reference, ...]:
+        return tuple(p for p in self.parts if isinstance(p, Reference))
+
+    @property
+    def rails(self) -> tuple[Supply, ...]:
+        """Both rails of the power supply."""
+        return (Supply("VCC", POSITIVE, self.supply), Supply("VEE", NEGATIVE, -self.supply))
+
+    @property
+    def supplies(self) -> tuple[Supply, ...]:
+        """The rails that a part other than an op-amp is connected to."""
+        return tuple(r for r in self.rails if r.net in self.nets)
+
+    @property
+    def switches(self) -> tuple[str, ...]:
+        """What changes the circuit's mode: op-amp sections in order, then diodes."""
+        return (*(s.name for s in self.sections), *(d.name for d in self.diodes))
+
+    @property
+    def rest(self) -> tuple[int, ...]:
+        """Position of each switch at rest: op-amps linear, diodes as they say."""
+        return (*(0 for _ in self.sections), *(int(d.rest) for d in self.diodes))
+
+    def carrying(self, contact: Contact) -> tuple[int, ...]:
+        """Position of each switch while this stop carries force and nothing else has changed."""
+        moved = dict([(contact.switch, contact.position), *contact.others])
+        pairs = zip(self.switches, self.rest, strict=True)
+        return tuple(moved.get(name, position) for name, position in pairs)
+
+    def may_limit(self, section: Section, position: int) -> bool:
+        """Whether a section may stand at this limit, 1 upper or -1 lower: those of the dead-zone
+        stage may; one that is a stop's switch only at the end where a stop is. The free end of a
+        one-sided stage would be a second stop that the model does not have."""
+        ends = {
+            contact.position
+            for stop in self.stops
+            for _, contact in stop.contacts
+            if contact.switch == section.name
+        }
+        return section.limits and (not ends or position in ends)
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """Op-amp packages in order of appearance."""
+        return tuple(sorted({s.package for s in self.sections}))
+
+    @property
+    def nets(self) -> tuple[str, ...]:
+        """Every net but ground, sorted."""
+        found = {self.generator.net}.union(*(p.nets for p in self.parts))
+        return tuple(sorted(found - {GROUND}))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Resistances [ohm] and capacitances [F] by part name."""
+        return {p.name: p.value for p in self.parts if isinstance(p, Resistor | Capacitor)}
+
+
+@dataclass(frozen=True)
+class Board:
+    """One copy of a circuit with its actual values: what a Monte Carlo sample is.
+
+    values : ohm or farad by part name. offset : input offset [V] by section; rails : (low, high)
+    output limits [V] by section. inverse_gain : 1/open-loop gain, 0 for ideal op-amps. bias :
+    current into each input [A] by section. reference : volts by name of the reference; drop :
+    forward voltage [V] by name of the diode, while it conducts. supply : volts of the rails by
+    name; gain_bandwidth : [Hz] by section, which ngspice's models with a bandwidth use. What is
+    missing has no offset and no bias, and the circuit's own supply and bandwidth.
+    """
+
+    values: Mapping[str, float]
+    offset: Mapping[str, float] = field(default_factory=dict)
+    rails: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    inverse_gain: float = 0.0
+    bias: Mapping[str, float] = field(default_factory=dict)
+    reference: Mapping[str, float] = field(default_factory=dict)
+    drop: Mapping[str, float] = field(default_factory=dict)
+    supply: Mapping[str, float] = field(default_factory=dict)
+    gain_bandwidth: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def mirror_symmetric(self) -> bool:
+        """No offset, no bias and equal rails: x → -x is a symmetry of a stage that is even."""
+        level = not any(self.offset.values()) and not any(self.bias.values())
+        return level and all(low == -high for low, high in self.rails.values())
+
+
+def nominal_board(circuit: Circuit, *, ideal: bool = False) -> Board:
+    """The board with the nominal values, no offset, equal rails.
+
+    ideal : infinite gain and no bias current, as the matching conditions assume.
+    """
+    limit = circuit.saturation
+    return Board(
+        values=circuit.values,
+        offset={s.name: 0.0 for s in circuit.sections},
+        rails={s.name: (-limit, limit) for s in circuit.sections},
+        inverse_gain=0.0 if ideal else 1.0 / circuit.gain,
+        bias={} if ideal else {s.name: circuit.bias for s in circuit.sections},
+        reference={r.name: r.volts for r in circuit.references},
+        drop={d.name: d.model.drop for d in circuit.diodes},
+    )
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """The generator's setting: frequency [Hz], amplitude [V peak], offset [V].
+
+    The generator starts at phase π: the force enters the inverting integrators with its sign
+    turned, so that the model's sin(ωt) and the circuit agree.
+    """
+
+    frequency: float
+    amplitude: float
+    offset: float = 0.0
+
+    @property
+    def drive(self) -> Drive:
+        """The voltage at the generator's net, as the exact circuit is driven by it."""
+        return Drive(2.0 * np.pi * self.frequency, -self.amplitude, self.offset)

@@ -1,0 +1,263 @@
+"""The modified nodal equations of a board, or of many at once, and what is read from them.
+
+Capacitors are voltage sources (their voltages are the states), op-amps either a virtual short
+v+ - v- + offset = v_out/gain or, at a limit, a fixed output voltage. Diodes carry no current or
+drop a constant voltage and that of their series resistance, without which a diode between two
+op-amps' outputs would have no answer.
+
+Whatever a board has may be one number or an array of N, one for each of N boards; then every
+array here has a leading axis (N,).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.board_arrays import Boards
+from designer.circuit.netlist import GROUND, Board, Circuit, Diode, Section, Stop
+from designer.dynamics.piecewise_linear import ModeKey
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Linear functions of (states, generator, 1), each a row of length n + 2.
+
+    voltage : by net; current : into each state capacitor and through each diode, by name; output :
+    out of each op-amp section's output, by name [A].
+    """
+
+    voltage: dict[str, Array]
+    current: dict[str, Array]
+    output: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class Exit:
+    """A way out of a mode: row (..., n + 2) over (states, generator, 1), positive past it.
+
+    target : key of the mode beyond; clearance : whose contact begins or ends, or -1.
+    """
+
+    row: Array
+    target: ModeKey
+    clearance: int
+
+
+def stacked(boards: Boards) -> Board:
+    """N boards in the form of one, an array (N,) wherever a board has a number."""
+    values: dict[str, Any] = {
+        "values": boards.values,
+        "offset": boards.offset,
+        "rails": {name: (boards.low[name], boards.high[name]) for name in boards.low},
+        "inverse_gain": boards.inverse_gain,
+        "bias": boards.bias,
+        "reference": boards.reference,
+        "drop": boards.drop,
+        "supply": boards.supply,
+    }
+    return Board(**values)
+
+
+class NodalEquations:
+    """G y = right for each mode: y are the nets' voltages and the branches' currents."""
+
+    def __init__(self, circuit: Circuit, board: Board) -> None:
+        self.circuit = circuit
+        self.board = board
+        self.lead = np.shape(board.inverse_gain)
+        self._sections, self._diodes = circuit.sections, circuit.diodes
+        self._stops = [(stop.contacts, circuit.states.index(stop.state)) for stop in circuit.stops]
+        self._nets = {net: i for i, net in enumerate(circuit.nets)}
+        self._first = _layout(circuit, len(self._nets))
+        self._number = {name: i for i, name in enumerate(circuit.switches)}
+        self._sided: dict[ModeKey, tuple[int, ...]] = {}
+        self._matrix, self._right = self._assemble()
+
+    def of(self, key: ModeKey) -> tuple[Array, Array]:
+        """(..., size, size) and (..., size, n + 2): G and right of a mode."""
+        c, board = self.circuit, self.board
+        G, right = self._matrix.copy(), self._right.copy()
+        n, first = len(c.states), self._first
+        amplifiers = len(self._sections)
+        for row, (s, position) in enumerate(
+            zip(self._sections, key[:amplifiers], strict=True), first["sections"]
+        ):
+            if position:
+                G[..., row, self._nets[s.output]] = 1.0
+                right[..., row, n + 1] = board.rails[s.name][1 if position > 0 else 0]
+                continue
+            for net, sign in ((s.noninverting, 1.0), (s.inverting, -1.0)):
+                if net != GROUND:
+                    G[..., row, self._nets[net]] += sign
+            G[..., row, self._nets[s.output]] -= board.inverse_gain
+            right[..., row, n + 1] = -np.asarray(board.offset.get(s.name, 0.0))
+        for row, (d, position) in enumerate(
+            zip(self._diodes, key[amplifiers:], strict=True), first["diodes"]
+        ):
+            if not position:
+                G[..., row, row] = 1.0  # no current
+                continue
+            for net, sign in ((d.anode, 1.0), (d.cathode, -1.0)):
+                if net != GROUND:
+                    G[..., row, self._nets[net]] += sign
+            G[..., row, row] = -d.model.resistance
+            right[..., row, n + 1] = board.drop[d.name]
+        return G, right
+
+    def solution(self, y: Array) -> Solution:
+        """y (..., size, n + 2) by names."""
+        c, first = self.circuit, self._first
+        voltage = {net: y[..., i, :] for net, i in self._nets.items()}
+        voltage[GROUND] = np.zeros((*self.lead, len(c.states) + 2))
+        # The unknown is the current that leaves ``plus`` through the source: into the capacitor.
+        amps = {cap.name: y[..., i, :] for i, cap in enumerate(c.capacitors, first["capacitors"])}
+        amps |= {d.name: y[..., i, :] for i, d in enumerate(self._diodes, first["diodes"])}
+        out = {s.name: -y[..., i, :] for i, s in enumerate(self._sections, first["sections"])}
+        return Solution(voltage, amps, out)
+
+    def rates(self, solved: Solution) -> Array:
+        """(..., n, n + 2): how fast each state changes."""
+        values = self.board.values
+        names = self.circuit.states
+        rows = [solved.current[name] / np.asarray(values[name])[..., None] for name in names]
+        return np.stack(rows, axis=-2)
+
+    def exits(self, key: ModeKey, solved: Solution) -> list[Exit]:
+        """Every way out of a mode, those of contacts scaled to displacement."""
+        n = len(self.circuit.states)
+        sides = self.sides(key)
+        found: list[Exit] = []
+        switches: tuple[Section | Diode, ...] = (*self._sections, *self._diodes)
+        for i, (switch, position) in enumerate(zip(switches, key, strict=True)):
+            for row, to in self._leaving(switch, position, solved):
+                target = (*key[:i], to, *key[i + 1 :])
+                changed = [j for j, s in enumerate(self.sides(target)) if s != sides[j]]
+                j = changed[0] if changed else -1
+                if j >= 0 or isinstance(switch, Diode):
+                    largest = np.abs(row[..., :n]).max(axis=-1, initial=0.0)
+                    if j >= 0:
+                        across = np.abs(row[..., self._stops[j][1]])
+                        scale = np.where(across > 1e-9 * largest, across, 1.0)
+                    else:  # amperes beside volts: bring both to states
+                        scale = np.where(largest > 0.0, largest, 1.0)
+                    row = row / scale[..., None]
+                found.append(Exit(row, target, j))
+        return found
+
+    def sides(self, key: ModeKey) -> tuple[int, ...]:
+        """For each stop 1, 0 or -1: in contact with its upper side, open, with its lower."""
+        known = self._sided.get(key)
+        if known is None:
+            known = tuple(self._side(stop, key) for stop in self.circuit.stops)
+            self._sided[key] = known
+        return known
+
+    def clipped(self, key: ModeKey) -> bool:
+        """Whether an op-amp that ought to be linear is at a limit."""
+        pairs = zip(self._sections, key, strict=False)
+        return any(position and not self.circuit.may_limit(s, position) for s, position in pairs)
+
+    def _side(self, stop: Stop, key: ModeKey) -> int:
+        for side, contact in stop.contacts:
+            if key[self._number[contact.switch]] == contact.position:
+                return side
+        return 0
+
+    def _leaving(
+        self, switch: Section | Diode, position: int, solved: Solution
+    ) -> list[tuple[Array, int]]:
+        """Rows that become positive where the switch leaves its position, with the next one."""
+        board = self.board
+        if isinstance(switch, Diode):
+            if position:
+                return [(-solved.current[switch.name], 0)]
+            across = solved.voltage[switch.anode] - solved.voltage[switch.cathode]
+            return [(_plus(across, -np.asarray(board.drop[switch.name])), 1)]
+        low, high = board.rails[switch.name]
+        if position == 0:
+            out = solved.voltage[switch.output]
+            return [(_plus(out, -np.asarray(high)), 1), (_plus(-out, np.asarray(low)), -1)]
+        across = solved.voltage[switch.noninverting] - solved.voltage[switch.inverting]
+        offset = np.asarray(board.offset.get(switch.name, 0.0))
+        across = _plus(across, offset)
+        limit = np.asarray(high if position > 0 else low) * board.inverse_gain
+        return [(-position * _plus(across, -limit), 0)]
+
+    def _assemble(self) -> tuple[Array, Array]:
+        """What is the same in every mode."""
+        c, board = self.circuit, self.board
+        n, nodes = len(c.states), len(self._nets)
+        # Each branch has its current as an unknown and a row of its own, in this order.
+        first = self._first
+        size = first["generator"] + 1
+        G = np.zeros((*self.lead, size, size))
+        right = np.zeros((*self.lead, size, n + 2))
+
+        def stamp(row: int, net: str, value: Any) -> None:
+            if net != GROUND:
+                G[..., row, self._nets[net]] += value
+
+        def current(net: str, column: int, value: float) -> None:
+            if net != GROUND:
+                G[..., self._nets[net], column] += value
+
+        def source(row: int, plus: str, minus: str) -> None:
+            """v(plus) - v(minus) is given; the unknown is the current that leaves plus into it."""
+            stamp(row, plus, 1.0)
+            stamp(row, minus, -1.0)
+            current(plus, row, 1.0)
+            current(minus, row, -1.0)
+
+        for r in c.resistors:
+            g = 1.0 / np.asarray(board.values[r.name])
+            for here, there in ((r.a, r.b), (r.b, r.a)):
+                if here != GROUND:
+                    stamp(self._nets[here], here, g)
+                    stamp(self._nets[here], there, -g)
+        for i, cap in enumerate(c.capacitors, nodes):
+            source(i, cap.plus, cap.minus)
+            right[..., i, c.states.index(cap.name)] = 1.0
+        for i, s in enumerate(c.sections, first["sections"]):
+            current(s.output, i, 1.0)
+            for net in (s.inverting, s.noninverting):
+                if net != GROUND:
+                    right[..., self._nets[net], n + 1] -= board.bias.get(s.name, 0.0)
+        for i, d in enumerate(c.diodes, first["diodes"]):
+            current(d.anode, i, 1.0)
+            current(d.cathode, i, -1.0)
+        for i, ref in enumerate(c.references, first["references"]):
+            source(i, ref.cathode, ref.anode)
+            right[..., i, n + 1] = board.reference[ref.name]
+        for i, rail in enumerate(c.supplies, first["supplies"]):
+            source(i, rail.net, GROUND)
+            right[..., i, n + 1] = board.supply.get(rail.name, rail.volts)
+        source(first["generator"], c.generator.net, GROUND)
+        right[..., first["generator"], n] = 1.0
+        return G, right
+
+
+def _plus(row: Array, constant: Any) -> Array:
+    out = row.copy()
+    out[..., -1] += constant
+    return out
+
+
+def _layout(circuit: Circuit, nodes: int) -> Mapping[str, int]:
+    """First unknown of each group of branches; the nets' voltages come before them all."""
+    groups = {
+        "capacitors": circuit.capacitors,
+        "sections": circuit.sections,
+        "diodes": circuit.diodes,
+        "references": circuit.references,
+        "supplies": circuit.supplies,
+    }
+    first, at = {}, nodes
+    for name, members in groups.items():
+        first[name] = at
+        at += len(members)
+    return {**first, "generator": at}

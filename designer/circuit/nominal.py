@@ -1,0 +1,69 @@
+"""The nominal board of a design: its reduction, its flows and its responses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.design import Design
+from designer.circuit.netlist import nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
+from designer.model.find_responses import ModelResponse
+
+
+def on_circuit(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Orbit:
+    """The orbit that the exact circuit reaches from the model's own, in volts and seconds."""
+    return reached(circuit_flow(system, design, response), design, response)
+
+
+def reached(flow: Flow, design: Design, response: ModelResponse) -> Orbit:
+    """``on_circuit``, with the circuit's flow at this response."""
+    return settle(flow, response.orbit.start * design.volts(response.b))
+
+
+def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Flow:
+    """The flow of a reduced board under the generator's setting for this response."""
+    frequency = design.errors.scales.frequency(response.omega)
+    return Flow(system, Drive(2.0 * np.pi * frequency, -design.amplitude(response.b)))
+
+
+TRACE_POINTS = 1024
+"""Points of a drawn orbit per drive period."""
+
+
+SHOWN_PERIODS = 30
+"""Drive periods of a trace of a response without a period."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One engine's orbit over its n periods in model units: time (k,), states (k, 4)."""
+
+    time: Array
+    states: Array
+
+
+def nominal_reduction(design: Design) -> Reduction:
+    """The nominal board's exact reduction, with the op-amps' finite gain and bias."""
+    return Reduction(design.circuit, nominal_board(design.circuit))
+
+
+def model_flow(design: Design, response: ModelResponse) -> Flow:
+    """The flow of the model at a response."""
+    model = replace(design.model, b=response.b)
+    return Flow(model.second_order().piecewise_linear(), Drive(response.omega))
+
+
+def trace_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:
+    """An orbit over its n periods in model units; from rest where it has no start."""
+    periods = max(orbit.n, 1) if orbit.status is OrbitStatus.PERIODIC else SHOWN_PERIODS
+    start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
+    run = flow.run(start, periods, mode=orbit.mode or None, points=TRACE_POINTS)
+    time = np.arange(len(run.strobes)) * flow.drive.period / TRACE_POINTS
+    return Trace(time / seconds, run.strobes / volts)

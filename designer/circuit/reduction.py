@@ -1,0 +1,158 @@
+"""A board's parts and nets reduced to a piecewise-linear system, by modified nodal analysis.
+
+``circuit.nodal`` has the equations. Nothing here knows the formulas that chose the parts, so the
+result can be held against the model.
+
+Between two diodes around an op-amp, one off and the other not yet on, nothing closes the loop: its
+output crosses the gap while its input moves by the gap over the gain. That is a mode like any
+other, microvolts wide, as long as the gain is finite.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.netlist import Board, Circuit, Stop
+from designer.circuit.nodal import NodalEquations, Solution
+from designer.circuit.working_modes import working_keys
+from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+
+
+class FloatingCircuit(ArithmeticError):
+    """The nodal equations are singular: a net that nothing determines."""
+
+
+EVEN = 1e-9
+"""Relative: what may differ between the two stops of a board that counts as mirror symmetric."""
+WORST_CONDITION = 1e14
+"""Of the scaled nodal equations: past it a net floats, whatever the solver says."""
+
+
+class Reduction:
+    """The exact reduction of one board.
+
+    Parameters
+    ----------
+    circuit, board : what is reduced.
+
+    Raises
+    ------
+    FloatingCircuit : the nodal equations have no unique answer.
+    """
+
+    def __init__(self, circuit: Circuit, board: Board) -> None:
+        self.circuit = circuit
+        self.board = board
+        self._solutions: dict[ModeKey, Solution] = {}
+
+    @cached_property
+    def _equations(self) -> NodalEquations:
+        return NodalEquations(self.circuit, self.board)
+
+    def system(self) -> PiecewiseLinearSystem:
+        """States are the capacitor voltages in volts, time in seconds, the drive in volts.
+
+        A mode's key has one entry per op-amp section in the circuit's order, then one per diode.
+        """
+        c = self.circuit
+        return PiecewiseLinearSystem(
+            states=c.states,
+            build=self._mode,
+            start=c.rest,
+            clearances=tuple(s.clearance for s in c.stops),
+            displacement=tuple(c.states.index(s.state) for s in c.stops),
+            mirror=-np.eye(len(c.states)) if self._even() else None,
+            working=working_keys(c),
+        )
+
+    def solution(self, key: ModeKey) -> Solution:
+        """Every net's voltage and every capacitor's current in this mode."""
+        known = self._solutions.get(key)
+        if known is None:
+            G, right = self._equations.of(key)
+            known = self._equations.solution(_solved(G, right, key))
+            self._solutions[key] = known
+        return known
+
+    def output(self, key: ModeKey, net: str, x: Array, u: Array) -> Array:
+        """Voltage (k,) of a net along states x (k, n) and generator voltages u (k,)."""
+        row = self.solution(key).voltage[net]
+        return np.asarray(x @ row[:-2] + row[-2] * u + row[-1])
+
+    def _mode(self, key: ModeKey) -> Mode:
+        solved, n = self.solution(key), len(self.circuit.states)
+        rows = self._equations.rates(solved)
+        exits = self._equations.exits(key, solved)
+        guards = tuple(
+            Guard(e.row[:n], float(e.row[n]), float(e.row[n + 1]), e.target, e.clearance)
+            for e in exits
+        )
+        return Mode(
+            A=rows[:, :n],
+            B=rows[:, n],
+            d=rows[:, n + 1],
+            guards=guards,
+            sides=self._equations.sides(key),
+            clipped=self._equations.clipped(key),
+        )
+
+    def _even(self) -> bool:
+        """Whether x → -x, u → -u is a symmetry: no DC anywhere, and both stops alike.
+
+        Stops that one switch makes are alike where its limits are; others, and those of a circuit
+        that is fed from a rail, are compared by what they do: the flow in contact, and where
+        contact begins.
+        """
+        if not self.board.mirror_symmetric:
+            return False
+        for stop in self.circuit.stops:
+            if stop.upper is None or stop.lower is None:
+                return False
+            if (self.circuit.supplies or not stop.shared) and not self._alike(stop):
+                return False
+        return True
+
+    def _alike(self, stop: Stop) -> bool:
+        assert stop.upper is not None
+        assert stop.lower is not None
+        c = self.circuit
+        rest = self._mode(c.rest)
+        above, below = (self._mode(c.carrying(contact)) for contact in (stop.upper, stop.lower))
+        ends = sorted(-g.e for g in rest.guards if g.clearance == c.stops.index(stop))
+        return (
+            _close(above.A, below.A, 0.0)
+            and _close(above.d, -below.d, float(np.abs(above.d).max()))
+            and _close(rest.d, -rest.d, float(np.abs(above.d).max()))
+            and len(ends) == 2
+            and ends[1] - ends[0] <= EVEN * abs(ends[1])
+        )
+
+
+def _close(a: Array, b: Array, scale: float) -> bool:
+    return bool(np.abs(a - b).max() <= EVEN * max(float(np.abs(a).max()), scale))
+
+
+def _solved(G: Array, right: Array, key: ModeKey) -> Array:
+    """G y = right with rows and columns brought to like size first."""
+    rows = np.abs(G).max(axis=1)
+    if rows.min() == 0.0:
+        raise FloatingCircuit(f"a net without any part, in mode {key}")
+    scaled = G / rows[:, None]
+    columns = np.abs(scaled).max(axis=0)
+    if columns.min() == 0.0:
+        raise FloatingCircuit(f"a net without any part, in mode {key}")
+    scaled /= columns
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError as error:
+        raise FloatingCircuit(f"singular nodal equations in mode {key}") from error
+    size = float(np.abs(scaled).sum(axis=0).max() * np.abs(inverse).sum(axis=0).max())
+    if not size < WORST_CONDITION:
+        raise FloatingCircuit(f"singular nodal equations in mode {key}")
+    y = inverse @ (right / rows[:, None])
+    # One step of refinement: the inverse alone loses digits.
+    y += inverse @ (right / rows[:, None] - scaled @ y)
+    return np.asarray(y / columns[:, None])

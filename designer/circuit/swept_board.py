@@ -1,0 +1,143 @@
+"""What a sweep changes: parameters of a model, or the generator's settings of a board."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.base.schema import one_of
+from designer.bifurcations.flow_family import Family
+from designer.circuit.design import Design
+from designer.circuit.netlist import Excitation
+from designer.circuit.nominal import nominal_reduction
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
+from designer.dynamics.steady_state import Setting
+from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
+from designer.model.swept_model import GREATEST, SMALLEST, ModelSubject
+
+BOARD_SETTINGS = ("frequency", "omega", "amplitude", "offset")
+"""Of the generator: Hz, dimensionless by the design's time scale, V peak, V."""
+UNITS = {"frequency": "Hz", "amplitude": "V", "offset": "V", "x": "V", "v": "V", "λ": "1/s"}
+"""Of a board, by parameter, and of the two axes and the exponent of a diagram."""
+
+
+class BoardSubject:
+    """The nominal board of a design, in volts and seconds, under its generator.
+
+    amplitude [V peak] and offset [V] stand unless they are changed; the design's amplitude for the
+    model's clearance by default. frequency [Hz] may be None where it is among the changes.
+    """
+
+    parameters = BOARD_SETTINGS
+
+    def __init__(
+        self,
+        design: Design,
+        frequency: float | None = None,
+        amplitude: float | None = None,
+        offset: float = 0.0,
+    ) -> None:
+        self.design = design
+        self.frequency = frequency
+        self.amplitude = design.amplitude() if amplitude is None else amplitude
+        self.offset = offset
+        self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
+        self.states = ("v1", "v2", "v3", "v4")
+        self.units: Mapping[str, str] = UNITS
+
+    def check(self, option: str, name: str, value: float) -> None:
+        """InputError that names the option, unless the parameter may have this value."""
+        if name not in self.parameters:
+            raise InputError(None, option, name, one_of(name, self.parameters))
+        if not np.isfinite(value):
+            raise InputError(None, option, value, "a finite number")
+        if name == "omega":
+            check_omega(option, value)
+        elif name == "frequency":
+            scales = self.design.errors.scales
+            least, most = scales.frequency(SLOWEST), scales.frequency(FASTEST)
+            if not least <= value <= most:
+                raise InputError(
+                    None, option, value, f"a frequency from {least:.4g} to {most:.4g} Hz"
+                )
+        elif name == "amplitude" and value <= 0.0:
+            raise InputError(None, option, value, "an amplitude > 0 V")
+
+    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+        """One for each set of changes, the others as they stand."""
+        out = []
+        for change in changes:
+            drive = self.excitation(change).drive
+            out.append(
+                Setting(lambda d=drive: Flow(self.system, d), drive.period)  # type: ignore[misc]
+            )
+        return out
+
+    def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
+        """(states,) size of the states that starts are drawn from: one for all changes."""
+        out = np.zeros(4)
+        for change in changes:
+            e = self.excitation(change)
+            b = self.design.model.b * self.design.amplitude() / e.amplitude
+            omega = 2.0 * np.pi * e.frequency * self.design.errors.scales.seconds
+            model = replace(self.design.model, b=b)
+            out = np.maximum(out, scale_of(model, omega) * self.design.volts(b))
+        return out
+
+    def as_dict(self) -> dict[str, object]:
+        """What decides the flow, for hashes and provenance. The hash is of the whole circuit: of
+        the op-amps' gain, bias currents and limits and the diodes' curves too."""
+        circuit = self.design.circuit
+        return {
+            "board": "nominal",
+            "parts": dict(sorted(circuit.values.items())),
+            "circuit_sha256": hashlib.sha256(repr(circuit).encode("utf-8")).hexdigest(),
+            "frequency": self.frequency,
+            "amplitude": self.amplitude,
+            "offset": self.offset,
+        }
+
+    def excitation(self, change: Mapping[str, float]) -> Excitation:
+        """The generator's setting with these changes."""
+        frequency = change.get("frequency", self.frequency)
+        if "omega" in change:
+            frequency = self.design.errors.scales.frequency(change["omega"])
+        assert frequency is not None
+        return Excitation(
+            float(frequency),
+            float(change.get("amplitude", self.amplitude)),
+            offset=float(change.get("offset", self.offset)),
+        )
+
+
+Subject = ModelSubject | BoardSubject
+
+
+SETTINGS = {
+    "frequency": (SMALLEST, GREATEST),
+    "amplitude": (0.0, GREATEST),
+    "offset": (-GREATEST, GREATEST),
+}
+"""The same for the generator of a board: Hz, V peak, V."""
+
+
+def of_board(system: PiecewiseLinearSystem, excitation: Excitation, parameter: str) -> Family:
+    """A reduced board with one setting of its generator free: frequency, amplitude or offset.
+
+    Raises
+    ------
+    InputError : the setting is not one of them.
+    """
+    if parameter not in SETTINGS:
+        raise InputError(None, "over", parameter, f"one of {', '.join(SETTINGS)}")
+
+    def build(value: float) -> Flow:
+        return Flow(system, replace(excitation, **{parameter: value}).drive, fast=False)
+
+    return Family(parameter, *SETTINGS[parameter], build)

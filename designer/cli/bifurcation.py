@@ -1,0 +1,117 @@
+"""The verb ``bifurcation``: options in, one JSON object or tables out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from designer.cli.app import (
+    Jobs,
+    Json,
+    Log,
+    Out,
+    Overwrite,
+    Quiet,
+    Resume,
+    Source,
+    Verbose,
+    _compiling,
+    _print_json,
+    _session,
+    app,
+)
+
+
+@app.command()
+def bifurcation(
+    model: Source,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="NAME",
+            help="omega (default), b, k0, zeta, m, k, c or f20; with --circuit frequency in Hz "
+            "(default), omega, amplitude or offset in V; with --basins a state.",
+        ),
+    ] = None,
+    low: Annotated[
+        float | None, typer.Option("--from", metavar="A", help="One end of the sweep.")
+    ] = None,
+    high: Annotated[float | None, typer.Option("--to", metavar="B", help="The other end.")] = None,
+    steps: Annotated[
+        int | None, typer.Option("--steps", metavar="N", help="Values, both ends included.")
+    ] = None,
+    omega: Annotated[
+        float | None,
+        typer.Option("--omega", metavar="W", help="The drive's frequency where it is not swept."),
+    ] = None,
+    down: Annotated[
+        bool, typer.Option("--down", help="Follow the attractor downwards (the default).")
+    ] = False,
+    up: Annotated[bool, typer.Option("--up", help="Follow it upwards; with --down both.")] = False,
+    starts: Annotated[
+        int | None,
+        typer.Option("--starts", metavar="K", help="From K starts at every value, rest first."),
+    ] = None,
+    periods: Annotated[
+        int | None,
+        typer.Option("--periods", metavar="N", help="Drive periods left out [500; maps 134]."),
+    ] = None,
+    keep: Annotated[
+        int | None, typer.Option("--keep", metavar="N", help="Drive periods shown [30; maps 16].")
+    ] = None,
+    second: Annotated[
+        tuple[str, float, float, int] | None,
+        typer.Option("--map", metavar="NAME A B N", help="A map over this parameter too."),
+    ] = None,
+    basins: Annotated[
+        bool, typer.Option("--basins", help="Where starts on a plane of states end.")
+    ] = False,
+    circuit: Annotated[
+        bool, typer.Option("--circuit", help="The design folder's circuit, in Hz and volts.")
+    ] = False,
+    points: Annotated[
+        bool, typer.Option("--points/--no-points", help="Locate the bifurcation points.")
+    ] = True,
+    out: Out = None,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """Bifurcation diagrams, maps of n-p-q over two parameters, basins of attraction."""
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
+        from designer.jobs import bifurcation_job
+        from designer.jobs.bifurcation_request import Request
+
+        request = Request(
+            over=over,
+            low=low,
+            high=high,
+            steps=steps,
+            omega=omega,
+            down=down,
+            up=up,
+            starts=starts,
+            periods=periods,
+            keep=keep,
+            second=second,
+            basins=basins,
+            circuit=circuit,
+            points=points,
+            jobs=jobs,
+            overwrite=overwrite,
+            resume=resume,
+        )
+        answer, reused = bifurcation_job.answer(model, request, out, progress)
+    if json:
+        _print_json(answer)
+    elif not quiet:
+        from designer.cli import bifurcation_tables
+
+        bifurcation_tables.show(answer, out, reused)
+    return 0

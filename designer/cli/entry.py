@@ -1,0 +1,77 @@
+"""The command ``designer``: exit statuses and messages; the verbs are in ``cli.verbs``.
+
+Worker processes import this module again, so it imports nothing that takes time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+from designer.base.errors import DesignerError
+
+INTERRUPTED = 130
+_INTERRUPTED = "interrupted; --resume goes on with what has been written, if anything was"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit status (docs/contract.md)."""
+    sys.exit(status(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def status(arguments: list[str]) -> int:
+    """Run the command line; the exit status."""
+    try:
+        return _status(arguments)
+    except BrokenPipeError:  # whoever read standard output has seen enough
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _status(arguments: list[str]) -> int:
+    try:
+        from designer.cli import verbs
+
+        code = verbs.dispatch(arguments)
+        if code == INTERRUPTED:  # the parser has caught it
+            _say(_INTERRUPTED)
+        return code
+    except KeyboardInterrupt:
+        _say(_INTERRUPTED)
+        return INTERRUPTED
+    except DesignerError as error:
+        _say(f"error: {error}")
+        return error.exit_status
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        return _unexpected(error, arguments)
+
+
+def _unexpected(error: Exception, arguments: Sequence[str]) -> int:
+    """Usage errors of the parser, whichever library it comes with; else a defect of the tool."""
+    format_message = getattr(error, "format_message", None)
+    code = getattr(error, "exit_code", None)
+    if callable(format_message) and isinstance(code, int):
+        _say(f"error: {format_message()}")
+        return code
+    if type(error).__name__ == "Abort":
+        _say(_INTERRUPTED)
+        return INTERRUPTED
+    kind = type(error).__name__
+    _say(f"internal error: {kind}: {_line(str(error))}; please report it (-v shows where)")
+    if "-v" in arguments or "--verbose" in arguments:
+        traceback.print_exception(error, file=sys.stderr)
+    return 1
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())[:300]
+
+
+def _say(text: str) -> None:
+    print(f"designer: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,27 @@
+"""What the rules say, as a table for people, on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
+from designer.cli.tables import _console, _line, _row, _table
+
+
+def show(answer: Mapping[str, Any]) -> None:
+    """Every rule with what was found; then what to do about those that fail."""
+    console = _console()
+    table = _table("Design rules", "rule", "status", "found", "limit")
+    for rule in answer["rules"]:
+        limit = rule["limit"] + (" (model file)" if rule["reason"] else "")
+        _row(table, rule["id"], rule["status"], rule["found"], limit)
+    console.print(table)
+    for rule in answer["rules"]:
+        if rule["reason"]:
+            _line(console, f"{rule['id']}: the model file's limit, because: {rule['reason']}")
+    for rule in answer["rules"]:
+        if rule["status"] == FAIL:
+            _line(console, f"{rule['id']} fails: {rule['do']}")
+    count = answer["counts"]
+    _line(console, f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")

@@ -1,0 +1,143 @@
+"""The verb ``search``: a design that real parts cannot spoil, or the cheapest cure of one."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.cli.app import (
+    Jobs,
+    Json,
+    Log,
+    Out,
+    Overwrite,
+    Quiet,
+    Resume,
+    Seed,
+    Source,
+    Verbose,
+    _compiling,
+    _print_json,
+    _session,
+    app,
+)
+from designer.cli.tolerance import StudyRung
+
+if TYPE_CHECKING:
+    from designer.jobs.cure_job import CureResult
+    from designer.jobs.options import Options
+
+SAMPLES = 4000
+"""Boards of the final study; as ``search_job.SAMPLES``."""
+KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
+"""Of upgrades; as ``cure_branch.KINDS``."""
+
+
+@app.command()
+def search(
+    model: Source,
+    out: Out = None,
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", metavar="N", help=f"Fresh boards at the end [{SAMPLES}]."),
+    ] = None,
+    wanted: Annotated[
+        float | None,
+        typer.Option("--yield", metavar="Y", help="Cure this design folder: the yield wanted."),
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option("--budget", metavar="PRICE", help="Of a cure, at most.")
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--without",
+            metavar="KIND",
+            help=f"Of a cure, no upgrade of this kind: {', '.join(KINDS)}; may be repeated.",
+        ),
+    ] = None,
+    rung: Annotated[
+        StudyRung | None,
+        typer.Option(
+            "--rung", help="Of the final study; auto: by a trade that is in the folder. [auto]"
+        ),
+    ] = None,
+    seed: Seed = 1,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """The design of the highest yield for a model file; with --yield the cure of a folder."""
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
+        from designer.jobs.options import Options
+
+        count = SAMPLES if samples is None else samples
+        said = StudyRung.AUTO if rung is None else rung
+        options = Options(seed, jobs, count, overwrite, resume, rung=said.value)
+        options.check()
+        if not model.exists():
+            raise InputError(model, "MODEL|DIR", "nothing", "a model file or a design folder")
+        if model.is_dir():
+            for name, given in (("--samples", samples), ("--rung", rung)):
+                if given is not None:
+                    raise InputError(None, name, given, "no such option with a design folder")
+            result = _cured(model, out, wanted, budget, without or [], options, progress)
+            if json:
+                _print_json(result.answer)
+            elif not quiet:
+                from designer.centering import cure_table
+
+                print(cure_table.text(result.answer), file=sys.stderr)
+            return 0 if result.reached else 1
+        for name, value in (("--yield", wanted), ("--budget", budget), ("--without", without)):
+            if value not in (None, []):
+                expected = "a design folder to cure; a model file gets its highest yield"
+                raise InputError(None, name, value, expected)
+        from designer.jobs import search_job, synthesise_job
+
+        modelfile, folder = synthesise_job.source(model, out)
+        command = partial(Options.command, verb="search", model=model, out=out)
+        outcome = search_job.search_into(modelfile, folder, options, progress, command)
+    if json:
+        _print_json(outcome.answer)
+    elif not quiet:
+        from designer.cli import search_tables, tables
+
+        tables.run(outcome.answer)
+        search_tables.searched(outcome.answer)
+        tables.files(folder, outcome.reused)
+    return 0 if outcome.satisfied else 1
+
+
+def _cured(
+    folder: Path,
+    out: Path | None,
+    wanted: float | None,
+    budget: float | None,
+    without: list[str],
+    options: Options,
+    progress: Progress,
+) -> CureResult:
+    from designer.jobs.cure_job import cure
+
+    if wanted is None:
+        raise InputError(None, "--yield", "nothing", "the yield that the cure shall reach")
+    return cure(
+        folder,
+        target=wanted,
+        budget=budget,
+        out=out,
+        without=without,
+        options=options,
+        progress=progress,
+    )

@@ -1,0 +1,323 @@
+"""Results as tables for people, on standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from designer.base.units import format_quantity
+from designer.catalog.catalog import Catalog
+from designer.report import compare_table
+
+if TYPE_CHECKING:
+    from designer.spice.opamp_check import Check
+
+
+def run(answer: Mapping[str, Any]) -> None:
+    """Parts and errors, then the responses."""
+    synthesised(answer)
+    tolerance(answer)
+
+
+def synthesised(answer: Mapping[str, Any]) -> None:
+    """The chosen parts, their error and the generator's settings."""
+    console = _console()
+    table = _table("Parts", "value", "parts")
+    kinds: dict[tuple[str, float], list[str]] = {}
+    for name, value in answer["parts"].items():
+        kinds.setdefault((name[0], value), []).append(name)
+    for (kind, value), names in sorted(kinds.items()):
+        _row(table, format_quantity(value, "F" if kind == "C" else "Ω"), " ".join(names))
+    console.print(table)
+    certificate = answer["certificate"]
+    _line(
+        console,
+        f"Largest coefficient error {_error(answer['max_error'])} "
+        f"({certificate['status']}, lower bound {_error(certificate['lower_bound'])}); "
+        f"{answer['distinct_values']} distinct values",
+    )
+    if answer["knobs"]:
+        table = _table("Generator", "ω", "expected", "frequency", "amplitude (peak, high-Z)")
+        for knob in answer["knobs"]:
+            _row(
+                table,
+                f"{knob['omega']:g}",
+                knob["expected"] or "-",
+                f"{knob['frequency_hz']:.4g} Hz",
+                f"{knob['amplitude_v_peak']:.4g} V",
+            )
+        console.print(table)
+
+
+def tolerance(answer: Mapping[str, Any]) -> None:
+    """The responses on each engine, and their yields."""
+    console = _console()
+    spread = (answer.get("provenance", {}).get("spread") or {}).get("name", "")
+    table = _table(
+        f"Responses, {answer['samples']} samples"
+        + (f", spread of the {spread}" if spread == "model file" else ""),
+        "ω",
+        "expected",
+        "model",
+        "circuit",
+        "ngspice",
+        "yield %",
+        "95 %",
+        "lost",
+        "grazing",
+        "failed",
+        gap=1,
+    )
+    for r in answer["responses"]:
+        y = r["yield"]
+        counted = ["-", r.get("left_out", ""), "", "", ""]
+        if y is not None:
+            rate = "-" if r["rate"] is None else f"{100 * r['rate']:.1f}"
+            counted = [
+                rate,
+                f"{100 * y['low']:.0f}–{100 * y['high']:.0f}",
+                str(y["lost"]),
+                str(y["grazing"]),
+                str(y["failed"]),
+            ]
+        found = r["model"] if r["found"] else f"{r['model']} (not what is wanted)"
+        _row(
+            table,
+            f"{r['omega']:g}",
+            r["expected"] or "-",
+            found,
+            r["circuit"],
+            r["ngspice"] or "-",
+            *counted,
+        )
+    console.print(table)
+    for r in answer["responses"]:
+        for doubt in doubts(_with_its_figures(r)):
+            _line(console, f"ω = {r['omega']:g}: {doubt}")
+    if answer.get("equation_check") is not None:
+        from designer.spice.equation_check import EquationCheck  # only here is it needed
+
+        problem = EquationCheck.read(answer["equation_check"]).problem
+        if problem:
+            _line(console, problem)
+    if answer.get("until") is not None:
+        reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
+        _line(console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
+    _further(console, answer)
+
+
+def _further(console: Console, answer: Mapping[str, Any]) -> None:
+    """The yields beside those as built, where there are any."""
+    kinds: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+        "tuned": lambda r: r.get("tuned"),
+        "on the bench": lambda r: (r.get("tuned") or {}).get("bench"),
+        "trimmed": lambda r: r.get("trimmed"),
+        "reached": lambda r: r.get("reached"),
+    }
+    shown = [k for k, of in kinds.items() if any(of(r) for r in answer["responses"])]
+    both = any(r.get("combined") for r in answer["responses"])
+    if not shown and not both:
+        return
+    heads = [*(f"{kind} %" for kind in shown), *(["both engines %", "95 %", "differ"] * both)]
+    table = _table("Further yields", "ω", "expected", *heads, gap=1)
+    for r in answer["responses"]:
+        cells = [_percent((kinds[kind](r) or {}).get("rate")) for kind in shown]
+        c = r.get("combined")
+        if both and c is None:
+            cells += ["-", "", ""]
+        elif both:
+            differ = c["disagreement"]
+            cells += [
+                _percent(c["estimate"]),
+                f"{100 * c['low']:.0f}–{100 * c['high']:.0f}",
+                f"{differ['count']} of {differ['asked']}",
+            ]
+        _row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
+    console.print(table)
+    whole = answer.get("all_on_one_board") or {}
+    said = [
+        f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
+        for kind, y in whole.items()
+        if y is not None
+    ]
+    if said:
+        _line(console, f"All on one board: {', '.join(said)}")
+
+
+def _percent(rate: float | None) -> str:
+    return "-" if rate is None else f"{100 * rate:.1f}"
+
+
+def simulated(answer: Mapping[str, Any]) -> None:
+    """The responses on one engine."""
+    table = _table(
+        f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice",
+        "ω",
+        "expected",
+        "response",
+        "symmetric",
+        "x1 max",
+        "x1 min",
+        "twin",
+        "others",
+        gap=1,
+    )
+    for r in answer["responses"]:
+        _row(
+            table,
+            f"{r['omega']:g}",
+            r["expected"] or "-",
+            r["response"] + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
+            {True: "yes", False: "no", None: "-"}[r["symmetric"]],
+            "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
+            "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
+            "-" if r["twin"] is None else r["twin"]["response"],
+            ", ".join(o["response"] for o in r["others"]) or "-",
+        )
+    console = _console()
+    console.print(table)
+    for r in answer["responses"]:
+        if r["reason"]:
+            _line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+        for doubt in doubts({"this response": r.get("trust")}):
+            _line(console, f"ω = {r['omega']:g}: {doubt}")
+
+
+def compared(answer: Mapping[str, Any]) -> None:
+    """The design beside the paper's."""
+    console = _console()
+    head, *rest = compare_table.rows(answer)
+    table = _table("Side by side", *head)
+    for cells in rest:
+        _row(table, *cells)
+    console.print(table)
+    for note in compare_table.notes(answer):
+        _line(console, note)
+
+
+def pictures(folder: Path, names: Sequence[str]) -> None:
+    """Where the pictures are."""
+    said = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
+    _line(_console(), f"{folder}: {said}")
+
+
+def checks(name: str, measured: Sequence[Check]) -> None:
+    """An op-amp's figures, by the catalogue and by its model in ngspice."""
+    table = _table(f"{name} in ngspice", "figure", "catalogue", "measured", "")
+    for row in measured:
+        _row(
+            table,
+            row.figure + (" (assumed)" if row.assumed else ""),
+            format_quantity(row.expected, row.unit),
+            format_quantity(row.measured, row.unit),
+            "" if row.agrees else f"differ by more than {100 * row.tolerance:g} %",
+        )
+    _console().print(table)
+
+
+def catalog(held: Catalog) -> None:
+    """What can be bought."""
+    console = _console()
+    table = _table("Families", "name", "kind", "series", "range", "grade", "price class")
+    for family in held.families:
+        unit = "Ω" if family.kind == "resistor" else "F"
+        low, high = (format_quantity(end, unit) for end in family.range)
+        _row(
+            table,
+            family.name,
+            family.kind,
+            " ".join(family.series),
+            f"{low} to {high}",
+            f"{100 * family.grade:g} %",
+            str(family.price),
+        )
+    console.print(table)
+    table = _table("Op-amps", "name", "sections", "saturation", "gain-bandwidth", "price class")
+    for opamp in held.opamps:
+        _row(
+            table,
+            opamp.name,
+            str(opamp.sections),
+            f"{opamp.saturation.nominal:g} V at ± {opamp.rated_supply:g} V",
+            format_quantity(opamp.gbw.nominal, "Hz"),
+            str(opamp.price),
+        )
+    console.print(table)
+    for what, names in (
+        ("Diodes", [entry.name for entry in held.diodes]),
+        ("References", [entry.name for entry in held.references]),
+        ("Trimmers", [entry.name for entry in held.trimmers]),
+        ("Headers", [entry.name for entry in held.headers]),
+    ):
+        _line(console, f"{what}: {', '.join(names) or 'none'}")
+
+
+def files(folder: Path, reused: bool) -> None:
+    """Where the results are."""
+    how = "was there already, from the same inputs" if reused else "written"
+    _line(_console(), f"{folder}: {how}")
+
+
+def doubts(trust: Mapping[str, Any]) -> list[str]:
+    """A line for each result that is not to be trusted (``check.trust``), by what it is of."""
+    return [
+        f"{what} not to be trusted here: {'; '.join(said['reasons'])}"
+        for what, said in trust.items()
+        if said is not None and said["trusted"] is False
+    ] + [
+        f"{what} gave no answer: {'; '.join(said['reasons'])}"
+        for what, said in trust.items()
+        if said is not None and said["trusted"] is None and said["reasons"]
+    ]
+
+
+def _with_its_figures(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The trust of a study's response; ngspice's with the reason that has the figures."""
+    said = dict(row.get("trust") or {})
+    if said.get("ngspice") is not None and row.get("ngspice_reason"):
+        said["ngspice"] = {**said["ngspice"], "reasons": [row["ngspice_reason"]]}
+    return said
+
+
+def _console() -> Console:
+    """On standard error; wide enough for a row where there is no terminal to ask."""
+    return Console(stderr=True, width=None if sys.stderr.isatty() else 120)
+
+
+def _table(title: str, *columns: str, gap: int = 2) -> Table:
+    """No lines, so that the longest fits into 80 columns."""
+    table = Table(title=f"\n{title}", title_justify="left", box=None, padding=(0, gap, 0, 0))
+    for column in columns:
+        table.add_column(column)
+    return table
+
+
+def _row(table: Table, *cells: str) -> None:
+    table.add_row(*(Text(cell) for cell in cells))
+
+
+def _line(console: Console, text: str) -> None:
+    console.print(Text(text), soft_wrap=True)
+
+
+__all__: Sequence[str] = (
+    "catalog",
+    "compared",
+    "files",
+    "pictures",
+    "run",
+    "simulated",
+    "synthesised",
+    "tolerance",
+)
+
+
+def _error(value: float) -> str:
+    """A coefficient error in words: below 1e-12 it is rounding."""
+    return f"{100 * value:.3g} %" if value >= 1e-12 else "0 to rounding"

@@ -1,0 +1,285 @@
+"""The verbs of the command line: options in, one JSON object or tables out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from designer.base.errors import InputError
+from designer.base.version import __version__
+from designer.cli.app import (
+    VERBS,
+    EngineName,
+    Jobs,
+    Json,
+    Log,
+    Out,
+    Overwrite,
+    Quiet,
+    Resume,
+    RungName,
+    Samples,
+    Seed,
+    Source,
+    Verbose,
+    _compiling,
+    _print_json,
+    _session,
+    app,
+)
+
+if TYPE_CHECKING:
+    from designer.jobs.synthesise_job import Outcome
+
+STUDY_KEYS = (
+    "format",
+    "samples",
+    "until",
+    "narrow",
+    "all_on_one_board",
+    "equation_check",
+    "responses",
+    "maps",
+    "provenance",
+)
+"""Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
+
+
+def dispatch(arguments: list[str]) -> int:
+    """Run a command line; returns the exit status or raises what went wrong."""
+    if arguments and not arguments[0].startswith("-") and arguments[0] not in VERBS:
+        from designer.base.schema import one_of
+
+        raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
+    result = app(args=arguments, prog_name="designer", standalone_mode=False)
+    return result if isinstance(result, int) else 0
+
+
+@app.callback(invoke_without_command=True)
+def _designer(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        print(f"designer {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    model: Source,
+    out: Out = None,
+    samples: Samples = 200,
+    seed: Seed = 1,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """Everything: parts, circuit, check in ngspice, yield, report."""
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
+        from designer.jobs import search_job, study_job, synthesise_job
+        from designer.jobs.options import Options
+
+        options = Options(seed, jobs, samples, overwrite, resume)
+        options.check()
+        modelfile, folder = synthesise_job.source(model, out)
+        modelfile = search_job.chosen(modelfile, folder, options, progress)
+        command = partial(Options.command, verb="run", model=model, out=out)
+        outcome = study_job.run_into(modelfile, folder, options, progress, command)
+    return _answer(outcome, json, quiet, "run")
+
+
+@app.command()
+def synthesise(
+    model: Source,
+    out: Out = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Beside the paper's values; needs no --out.")
+    ] = False,
+    seed: Seed = 1,
+    jobs: Jobs = None,
+    overwrite: Overwrite = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """Choose the parts and write the design folder."""
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
+        from designer.jobs import search_job, synthesise_job
+        from designer.model.model_file import read_model_file
+
+        options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
+        options.check()
+        if compare and out is None and not model.is_dir():
+            outcome = synthesise_job.compare_in_memory(read_model_file(model), options, progress)
+        else:
+            modelfile, folder = synthesise_job.source(model, out)
+            modelfile = search_job.chosen(modelfile, folder, options, progress)
+            outcome = synthesise_job.synthesise_into(
+                modelfile, folder, options, progress, compare=compare
+            )
+    return _answer(outcome, json, quiet, "synthesise")
+
+
+app.command("synthesize", hidden=True)(synthesise)
+
+
+@app.command()
+def simulate(
+    model: Source,
+    omega: Annotated[
+        list[float] | None,
+        typer.Option("--omega", metavar="W", help="Dimensionless frequency; may be repeated."),
+    ] = None,
+    engine: Annotated[EngineName, typer.Option("--engine", help="What simulates.")] = (
+        EngineName.MODEL
+    ),
+    rung: Annotated[
+        RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
+    ] = RungName.IDEAL,
+    seed: Seed = 1,
+    plots: Annotated[
+        Path | None,
+        typer.Option("--plots", metavar="DIR", help="Draw each response: PNG and SVG."),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace pictures of the same names.")
+    ] = False,
+    jobs: Jobs = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """The responses: those that the model file wants, or what is reached from rest at --omega."""
+    with _session(verbose, quiet, log) as progress, _compiling(progress):
+        from designer.jobs import synthesise_job
+
+        synthesise_job.Options(seed, jobs).check()
+        answer, found = synthesise_job.simulate_answer(
+            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
+        )
+    if json:
+        _print_json(answer)
+    elif not quiet:
+        from designer.cli import tables
+
+        tables.simulated(answer)
+        if plots is not None:
+            tables.pictures(plots, answer["files"])
+    return 0 if found else 1
+
+
+@app.command()
+def catalog(
+    check: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Measure this op-amp's model against its figures."),
+    ] = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
+    with _session(verbose, quiet, log):
+        from designer.catalog.catalog import load_catalog
+
+        held = load_catalog()
+        if check is not None:
+            from designer.spice.opamp_check import checks
+
+            measured = checks(held.opamp(check))
+    if check is not None:
+        if json:
+            rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
+            _print_json({"format": 1, "opamp": check, "checks": rows, "hash": held.hash})
+        elif not quiet:
+            from designer.cli import tables
+
+            tables.checks(check, measured)
+        return 0 if all(row.agrees for row in measured) else 1
+    if json:
+        _print_json(
+            {
+                "format": 1,
+                "opamps": [entry.name for entry in held.opamps],
+                "families": [entry.name for entry in held.families],
+                "diodes": [entry.name for entry in held.diodes],
+                "references": [entry.name for entry in held.references],
+                "trimmers": [entry.name for entry in held.trimmers],
+                "headers": [entry.name for entry in held.headers],
+                "hash": held.hash,
+            }
+        )
+    elif not quiet:
+        from designer.cli import tables
+
+        tables.catalog(held)
+    return 0
+
+
+@app.command()
+def new(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="The file to write.")] = Path(
+        "model.toml"
+    ),
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+    log: Log = None,
+) -> int:
+    """Write a commented model file to start from; an existing file is left alone."""
+    with _session(verbose, quiet, log):
+        from designer.model.template import TEXT
+
+        try:
+            with path.open("x", encoding="utf-8") as stream:
+                stream.write(TEXT)
+        except FileExistsError:
+            raise InputError(path, "PATH", "a file", "a name that is free") from None
+        except OSError as error:
+            raise InputError(
+                path, "PATH", error.strerror or str(error), "a file that can be written"
+            ) from None
+    if json:
+        _print_json({"format": 1, "files": [str(path)]})
+    elif not quiet:
+        print(f"written: {path}", file=sys.stderr)
+    return 0
+
+
+def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
+    answer = outcome.answer
+    if verb == "tolerance":
+        answer = {**{k: answer[k] for k in STUDY_KEYS}, "cost": answer["cost"]["study"]}
+    if json:
+        _print_json(answer)
+    elif not quiet:
+        from designer.cli import tables
+
+        shows: dict[str, Callable[[dict[str, Any]], None]] = {
+            "run": tables.run,
+            "synthesise": tables.synthesised,
+            "tolerance": tables.tolerance,
+        }
+        shows[verb](answer)
+        if "comparison" in answer:
+            tables.compared(answer["comparison"])
+        if outcome.folder is not None:
+            tables.files(outcome.folder, outcome.reused)
+    return 0 if outcome.satisfied else 1
+
+
+# The verbs that stand in files of their own register themselves.

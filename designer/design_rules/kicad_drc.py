@@ -1,0 +1,210 @@
+"""KiCad's design rule check of a board under our rules, and whether it understood them.
+
+Everything happens on copies in a scratch folder, without the board's project: its severities and
+exclusions hide nothing, and its net classes are not needed. Two checks are made. One of a board
+that breaks every rule (``board_specimen``): what KiCad does not report there, it does not
+understand. One of the board itself with a track besides that breaks a rule of its own: unless that
+is reported, KiCad has dropped the rules, and nothing it says of them counts.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from designer.base.sexpr import Expression, read, write
+from designer.board.kicad_names import circuit_net
+from designer.board.kicad_reader import BoardFile
+from designer.board.kicad_rules import CANARY, CustomRule, canary, rules_text
+from designer.design_rules.drc_specimen import canary_track, specimen
+
+PROGRAM = "kicad-cli"
+MISSING = "kicad-cli is not installed (KiCad 9)"
+NEEDED = 9
+"""KiCad's major version: older ones write another report."""
+PATIENCE = 600.0
+"""Seconds that a check may take; past it the rules are not run."""
+ASIDE = (-100.0, -100.0)
+"""Where the canary's track lies [mm], from the board's uppermost, leftmost pad."""
+
+_RULE = re.compile(r"\(rule '([^']*)' ")
+_ACTUAL = re.compile(r"actual ([0-9.]+)")
+_MINIMUM = re.compile(r"min width ([0-9.]+) mm")
+_NET = re.compile(r"\[([^\]]*)\]")
+
+
+@dataclass(frozen=True)
+class Violation:
+    """rule : id of the custom rule. actual : what KiCad measured, in mm or a count. where : in
+    KiCad's words, with the place on the board."""
+
+    rule: str
+    actual: float
+    where: str
+
+
+@dataclass(frozen=True)
+class DesignRuleCheck:
+    """version : KiCad's. misunderstood : rules that KiCad does not report when they are broken.
+    unconnected : nets of the circuit that are not all routed."""
+
+    version: str
+    violations: tuple[Violation, ...]
+    misunderstood: frozenset[str]
+    unconnected: frozenset[str]
+
+
+class CheckFailed(Exception):
+    """KiCad gave no answer that counts; says why."""
+
+
+def kicad_version() -> str | None:
+    """The version of the installed ``kicad-cli``; None where there is none."""
+    if shutil.which(PROGRAM) is None:
+        return None
+    try:
+        done = subprocess.run(
+            [PROGRAM, "--version"], capture_output=True, text=True, timeout=60, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() or None
+
+
+def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
+    """Check a board against the rules.
+
+    Raises
+    ------
+    CheckFailed : no KiCad, one that is too old, no report, or rules that KiCad has dropped.
+    """
+    version = kicad_version()
+    if version is None:
+        raise CheckFailed(MISSING)
+    if not version.split(".")[0].isdigit() or int(version.split(".")[0]) < NEEDED:
+        raise CheckFailed(f"kicad-cli {version} is older than KiCad {NEEDED}")
+    with tempfile.TemporaryDirectory(prefix="designer-drc-") as scratch:
+        place = Path(scratch)
+        text = rules_text([*rules, canary()])
+        broken = report(specimen(rules, breaking=True), text, place / "specimen")
+        heard = {v.rule for v in violations(broken, rules)}
+        answer = report(_with_canary(board), text, place / "board")
+    if not any(_is_canary(v) for v in answer["violations"]):
+        raise CheckFailed("KiCad has dropped the custom rules: a planted violation went unreported")
+    return DesignRuleCheck(
+        version,
+        violations(answer, rules),
+        frozenset(rule.id for rule in rules) - heard,
+        _unconnected(answer),
+    )
+
+
+def report(board: str, rules: str, place: Path) -> dict[str, Any]:
+    """KiCad's report on the text of a board under the text of a ``.kicad_dru``.
+
+    Raises
+    ------
+    CheckFailed : there is none.
+    """
+    place.mkdir()
+    (place / "board.kicad_pcb").write_text(board, encoding="utf-8")
+    (place / "board.kicad_dru").write_text(rules, encoding="utf-8")
+    out = place / "report.json"
+    options = ["--format", "json", "--units", "mm", "--severity-all", "--output", str(out)]
+    own = {"HOME": str(place), "KICAD_CONFIG_HOME": str(place / "config"), "LC_ALL": "C"}
+    try:
+        done = subprocess.run(
+            [PROGRAM, "pcb", "drc", *options, str(place / "board.kicad_pcb")],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            env={**os.environ, **own},
+            timeout=PATIENCE,
+            check=False,
+        )
+        found = json.loads(out.read_text(encoding="utf-8"))
+    except subprocess.TimeoutExpired:
+        raise CheckFailed(f"kicad-cli gave no answer within {PATIENCE:g} s") from None
+    except OSError:
+        said = (done.stderr or done.stdout).strip().splitlines()
+        raise CheckFailed(
+            f"kicad-cli wrote no report: {said[-1] if said else 'no reason'}"
+        ) from None
+    except ValueError:
+        raise CheckFailed("kicad-cli wrote a report that is no JSON") from None
+    if not isinstance(found, dict) or not isinstance(found.get("violations"), list):
+        raise CheckFailed("kicad-cli wrote a report of another kind")
+    return found
+
+
+def violations(found: Mapping[str, Any], rules: Sequence[CustomRule]) -> tuple[Violation, ...]:
+    """What a report says of our rules. A width names the board's setup in the place of the rule; it
+    is known by its limit and its net."""
+    by_id = {rule.id: rule for rule in rules}
+    out = []
+    for each in found["violations"]:
+        text = str(each.get("description", ""))
+        named, actual = _RULE.search(text), _ACTUAL.search(text)
+        id_ = named[1] if named else _width_rule(each, rules)
+        if id_ in by_id:
+            value = float(actual[1]) if actual else float("nan")
+            out.append(Violation(id_, value, _where(each)))
+    return tuple(out)
+
+
+def _width_rule(each: Mapping[str, Any], rules: Sequence[CustomRule]) -> str:
+    limit = _MINIMUM.search(str(each.get("description", "")))
+    if each.get("type") != "track_width" or limit is None:
+        return ""
+    for rule in rules:
+        if rule.constraint != "track_width" or abs(rule.limit - float(limit[1])) > 1e-4:
+            continue
+        if set(rule.nets) & set(_nets(each)):
+            return rule.id
+    return ""
+
+
+def _is_canary(each: Mapping[str, Any]) -> bool:
+    limit = _MINIMUM.search(str(each.get("description", "")))
+    named = _RULE.search(str(each.get("description", "")))
+    if named is not None and named[1] == CANARY:
+        return True
+    own = f"{canary().limit:.4f}"
+    return each.get("type") == "track_width" and limit is not None and limit[1] == own
+
+
+def _unconnected(found: Mapping[str, Any]) -> frozenset[str]:
+    return frozenset(
+        circuit_net(net) for each in found.get("unconnected_items", []) for net in _nets(each)
+    )
+
+
+def _nets(each: Mapping[str, Any]) -> list[str]:
+    """KiCad's names of the nets that a violation's items are on."""
+    words = [str(item.get("description", "")) for item in each.get("items", [])]
+    return [net for text in words for net in _NET.findall(text)]
+
+
+def _where(each: Mapping[str, Any]) -> str:
+    items = each.get("items", [])
+    words = " and ".join(str(item.get("description", "")) for item in items[:2])
+    at = items[0].get("pos", {}) if items else {}
+    if isinstance(at, dict) and {"x", "y"} <= at.keys():
+        words += f" ({at['x']} mm, {at['y']} mm)"
+    return "".join(ch if ch.isprintable() else "?" for ch in words)
+
+
+def _with_canary(board: BoardFile) -> str:
+    corners = [pad.at for footprint in board.footprints for pad in footprint.pads] or [(0.0, 0.0)]
+    x = min(at[0] for at in corners) + ASIDE[0]
+    y = min(at[1] for at in corners) + ASIDE[1]
+    whole = read(board.text, board.path)
+    return write(Expression((*whole.items, canary_track(x, y))))

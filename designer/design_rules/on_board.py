@@ -1,0 +1,195 @@
+"""Rules on a board: by KiCad's own check where that can say them, else read from the board file.
+
+Without a board, without KiCad, or where KiCad does not show that it understood a rule, the rule is
+not run: never a pass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from designer.board.component import Component
+from designer.board.kicad_names import POWER, circuit_net
+from designer.board.kicad_reader import BoardFile
+from designer.board.kicad_rules import CustomRule
+from designer.board.outline import LAYER
+from designer.catalog.design_rule import (
+    FAIL,
+    PASS,
+    Found,
+    NotRun,
+    Outcome,
+    Override,
+    Rule,
+    judged,
+    not_run,
+    shown,
+)
+from designer.catalog.design_rules import RULES
+from designer.circuit.netlist import NEGATIVE, POSITIVE
+from designer.design_rules.kicad_drc import CheckFailed, DesignRuleCheck, Violation, check
+
+NO_BOARD = "no board was given (--board FILE)"
+MOST = 5
+"""Names in a message."""
+_READ = "read from the board file"
+COPPER = frozenset({"clearance"})
+"""Rules that say nothing of a board without tracks."""
+
+
+def without_board(
+    rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str = NO_BOARD
+) -> tuple[Outcome, ...]:
+    """Every rule on a board, none of them run."""
+    return tuple(_idle(rule, rules, overrides, why) for rule in _wanted())
+
+
+def checked(
+    board: BoardFile,
+    components: Sequence[Component],
+    rules: Sequence[CustomRule],
+    overrides: Mapping[str, Override],
+) -> tuple[Outcome, ...]:
+    """Every rule on a board, with KiCad where that is installed and answers."""
+    try:
+        told: DesignRuleCheck | str = check(board, rules)
+    except CheckFailed as why:
+        told = str(why)
+    return on_board(board, components, rules, overrides, told)
+
+
+def on_board(
+    board: BoardFile,
+    components: Sequence[Component],
+    rules: Sequence[CustomRule],
+    overrides: Mapping[str, Override],
+    told: DesignRuleCheck | str,
+) -> tuple[Outcome, ...]:
+    """Every rule on a board. told : what KiCad found, or why it was not asked."""
+    said = {custom.id: custom for custom in rules}
+    out = []
+    for rule in _wanted():
+        override = overrides.get(rule.id)
+        try:
+            if rule.id in READ:
+                out.append(judged(rule, READ[rule.id](board, components), override))
+            elif isinstance(told, str):
+                out.append(_idle(rule, rules, overrides, told))
+            else:
+                out.append(_by_kicad(rule, said[rule.id], board, told, override))
+        except NotRun as reason:
+            out.append(_idle(rule, rules, overrides, str(reason)))
+    return tuple(out)
+
+
+def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """Between centres of pads [mm]: each supply pin, and the nearest pad on its net of the
+    capacitors that belong to the package."""
+    for package in components:
+        if package.kind != "op-amp":
+            continue
+        own = [c.reference for c in components if c.near == package.reference]
+        for pad in board.pads(package.reference):
+            if pad.net not in (POSITIVE, NEGATIVE):
+                continue
+            near = [
+                (math.dist(pad.at, other.at), reference)
+                for reference in own
+                for other in board.pads(reference)
+                if other.net == pad.net
+            ]
+            if not near:
+                raise NotRun(f"{package.reference} has no decoupling capacitor on {pad.net}")
+            distance, reference = min(near)
+            where = f"{package.reference}.{pad.number}"
+            yield Found(distance, where, more=f"to {reference}; {_READ}")
+
+
+def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """From each pad of the design's components to the board's edge [mm]."""
+    if not len(board.outline.sides):
+        raise NotRun(f"the board has no edge: nothing on {LAYER}")
+    if (at := board.outline.open_at) is not None:
+        raise NotRun(f"the edge on {LAYER} is not closed at ({at[0]:.2f} mm, {at[1]:.2f} mm)")
+    for component in components:
+        for pad in board.pads(component.reference):
+            where = f"{component.reference}.{pad.number}"
+            if not pad.corners:
+                raise NotRun(f"{where} has a shape that is not read")
+            room = board.outline.room(np.array(pad.corners))
+            yield Found(room, where, more=_READ)
+
+
+READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] = {
+    "decoupling-distance": decoupling_distance,
+    "board-outline": board_outline,
+}
+"""Rules that KiCad cannot say: they are read from the file."""
+
+
+def _by_kicad(
+    rule: Rule,
+    custom: CustomRule,
+    board: BoardFile,
+    told: DesignRuleCheck,
+    override: Override | None,
+) -> Outcome:
+    if custom.id in told.misunderstood:
+        raise NotRun("KiCad does not report a board that breaks this rule")
+    mine = [v for v in told.violations if v.rule == custom.id]
+    if mine:
+        return _broken(rule, custom, mine, override)
+    concerned = {circuit_net(net) for net in custom.nets}
+    if concerned:
+        lost = sorted(concerned & told.unconnected)
+        if lost:
+            raise NotRun(f"not routed yet: {', '.join(POWER.get(net, net) for net in lost)}")
+        if not concerned & board.routed:
+            raise NotRun("none of the nets that this speaks of is routed")
+    elif rule.id in COPPER and not board.routed:
+        raise NotRun("the board has no track and no zone yet")
+    if custom.constraint == "courtyard_clearance":
+        bare = [f.reference for f in board.footprints if f.wired and not f.courtyard]
+        if bare:
+            raise NotRun(f"footprints without a courtyard: {', '.join(bare[:MOST])}")
+    usual = _usual(rule, custom, override)
+    return Outcome(
+        rule, PASS, "no violation in KiCad's check", limit=custom.limit, override=override,
+        usual=usual,
+    )  # fmt: skip
+
+
+def _broken(
+    rule: Rule, custom: CustomRule, found: Sequence[Violation], override: Override | None
+) -> Outcome:
+    worst = (min if rule.least else max)(found, key=lambda v: v.actual)
+    text = f"{shown(worst.actual, rule.unit)} at {worst.where}"
+    if len(found) > 1:
+        text += f"; {len(found)} places in all"
+    usual = _usual(rule, custom, override)
+    return Outcome(rule, FAIL, text, worst.actual, custom.limit, worst.where, override, usual)
+
+
+def _usual(rule: Rule, custom: CustomRule, override: Override | None) -> float:
+    """The limit without the model file's; nan where only the table would say."""
+    if override is None:
+        return custom.limit
+    return float("nan") if rule.limit is None else rule.limit
+
+
+def _idle(
+    rule: Rule, rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str
+) -> Outcome:
+    limits = {custom.id: custom.limit for custom in rules}
+    made = not_run(rule, why, overrides.get(rule.id))
+    return Outcome(
+        made.rule, made.status, made.found, limit=limits.get(rule.id, made.limit),
+        override=made.override,
+    )  # fmt: skip
+
+
+def _wanted() -> list[Rule]:
+    return [rule for rule in RULES if rule.scope == "board"]

@@ -1,0 +1,138 @@
+"""What the rules look at: a design with its components, and what its circuit does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from designer.base.units import parse_quantity
+from designer.board.component import Component
+from designer.catalog.catalog import Catalog
+from designer.catalog.design_rule import NotRun
+from designer.catalog.entries import OpAmp
+from designer.check.synthesis_result import Synthesis
+from designer.circuit.design import Design
+from designer.circuit.netlist import Circuit
+from designer.circuit.nominal import circuit_flow, nominal_reduction, on_circuit
+from designer.circuit.reduction import Reduction
+from designer.design_rules.force_at_clearance import Forces, Statics
+from designer.design_rules.operating_point import Operating, operating, stuck
+from designer.model.find_responses import ModelResponse, peaks
+from designer.synthesis import output_loads
+from designer.synthesis.output_loads import Run
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A design, the circuit with its fittings, and the components of its board.
+
+    What takes time is computed when a rule first asks for it, and then kept.
+    """
+
+    made: Synthesis
+    circuit: Circuit
+    components: Sequence[Component]
+
+    @property
+    def design(self) -> Design:
+        return self.made.design
+
+    @property
+    def catalog(self) -> Catalog:
+        return self.made.catalog
+
+    @property
+    def found(self) -> Sequence[ModelResponse]:
+        return self.made.found
+
+    @property
+    def opamp(self) -> OpAmp:
+        """The catalogue's entry of the circuit's op-amp."""
+        return self.circuit.figures or self.catalog.opamp(self.circuit.opamp)
+
+    @cached_property
+    def reduction(self) -> Reduction:
+        """Of the nominal board."""
+        return nominal_reduction(replace(self.design, circuit=self.circuit))
+
+    @cached_property
+    def _runs(self) -> tuple[list[Run], dict[str, str]]:
+        if not self.found:
+            raise NotRun("the model file wants no response, so nothing says what the board does")
+        system = self.reduction.system()
+        drives = [circuit_flow(system, self.design, r).drive for r in self.found]
+        orbits = [on_circuit(system, self.design, r) for r in self.found]
+        return output_loads.runs([r.omega for r in self.found], drives, orbits)
+
+    @cached_property
+    def operating(self) -> Operating:
+        """Over the wanted responses and their starts from rest.
+
+        Raises
+        ------
+        NotRun : there is no orbit to go by.
+        """
+        runs, left_out = self._runs
+        met = operating(self.reduction, runs, left_out)
+        if met.left_out:
+            name, why = next(iter(met.left_out.items()))
+            raise NotRun(f"no answer of the exact circuit at {name}: {why}")
+        return met
+
+    @cached_property
+    def stuck(self) -> Operating:
+        """With each op-amp stuck at each rail, at the largest amplitude of the wanted responses."""
+        runs, left_out = self._runs
+        if not runs:
+            raise NotRun(f"no orbit of the exact circuit: {left_out}")
+        met = stuck(self.circuit, max(runs, key=lambda run: abs(run.drive.amplitude)))
+        if met.left_out:
+            name, why = next(iter(met.left_out.items()))
+            raise NotRun(f"no answer of the exact circuit with {name}: {why}")
+        return met
+
+    @cached_property
+    def forces(self) -> Forces:
+        """Disturbances as forces."""
+        return Statics(self.circuit).forces
+
+    @cached_property
+    def drive(self) -> float:
+        """Smallest amplitude of the wanted responses [V]."""
+        wanted = [self.design.amplitude(r.b) for r in self.found]
+        return min(wanted, default=self.design.amplitude())
+
+    @cached_property
+    def fastest(self) -> float:
+        """Frequency of the highest harmonic that matters [Hz]."""
+        highest = peaks(self.design.model, self.found).fastest
+        return highest / (2.0 * np.pi * self.design.errors.scales.seconds)
+
+    @cached_property
+    def watts(self) -> dict[str, float]:
+        """Rated power [W] by resistor, of what is ordered; without those that state none."""
+        return self._rated("resistor", "W")
+
+    @cached_property
+    def volts(self) -> dict[str, float]:
+        """Rated voltage [V] by capacitor, likewise."""
+        return self._rated("capacitor", "V")
+
+    @cached_property
+    def dielectrics(self) -> dict[str, str]:
+        """What each capacitor is made of, in words."""
+        found = (c for c in self.components if c.kind == "capacitor" and c.bought is not None)
+        return {c.parts[0]: c.bought.dielectric for c in found if c.bought is not None}
+
+    def _rated(self, kind: str, unit: str) -> dict[str, float]:
+        out = {}
+        for component in self.components:
+            if component.kind != kind or component.bought is None:
+                continue
+            for words in component.bought.rating.split(", "):
+                if words.endswith(unit):
+                    out[component.parts[0]] = parse_quantity(words, unit)
+        return out

@@ -1,0 +1,329 @@
+"""Which attractor a start leads to: settling, shooting, classification.
+
+Settle for 20 drive periods, look for the period n at which the strobe nearly repeats, polish by
+Newton's method on the n-period map and accept only what converged, is stable, lies where the
+settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800,
+4000 periods in all). Newton at once would be faster and wrong: it also lands on unstable orbits and
+on other attractors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import qmc
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.dynamics.flow import Flow, FlowResult, FlowStatus
+from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import ModeKey
+
+STAGES = (20, 20, 100, 660, 3200)
+STROBE_TOLERANCE = 1e-8
+"""Of the peak of each state (docs/definitions.md)."""
+ENGINE_ERROR = 1e-10
+"""Of the peak: contacts shallower and misses nearer than this are undecided."""
+WORTH = 1e-2
+"""Of the peak: how nearly a strobe must repeat to be worth polishing."""
+NEAR = 0.05
+"""Of the peak: how far a polished orbit may lie from where settling had arrived."""
+CLOSING = 400
+"""Most periods that are spent on seeing the settling trajectory close in on a polished orbit."""
+CHAOS = 0.02
+"""Growth of a tangent vector per drive period that is taken for chaos after 800 periods."""
+
+
+def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
+    """The attractor reached from state x (n,) at drive phase 0.
+
+    Returns an orbit of any status; it never raises for lack of an answer.
+    """
+    spent = 0
+    for stage, periods in enumerate(STAGES):
+        run = flow.run(x, periods, mode=mode)
+        spent += len(run.strobes) - 1
+        if run.status is not FlowStatus.DONE:
+            status = (
+                OrbitStatus.DIVERGED
+                if run.status is FlowStatus.DIVERGED
+                else OrbitStatus.NOT_SETTLED
+            )
+            return Orbit(status, reason=str(run.status), periods=spent)
+        x, mode = run.strobes[-1], run.mode
+        found, cost = _polish(flow, run)
+        spent += cost
+        if found is not None:
+            return replace(found, periods=spent)
+        if stage >= 3:
+            exponent, x, mode = lyapunov(flow, x, mode, 300)
+            spent += 300
+            if exponent * flow.drive.period > CHAOS:
+                return Orbit(
+                    OrbitStatus.APERIODIC, start=x, mode=mode, lyapunov=exponent, periods=spent
+                )
+    return Orbit(
+        OrbitStatus.NOT_SETTLED,
+        start=x,
+        mode=mode or (),
+        lyapunov=exponent,
+        reason=f"no period up to {MAX_PERIOD} and no chaos after {spent} drive periods: "
+        "quasi-periodic, of a longer period, or very slow",
+        periods=spent,
+    )
+
+
+def peaks_near(flow: Flow, x: Array, mode: ModeKey | None = None, points: int = 32) -> Array:
+    """(states,) peak of each state over the drive period that starts at x.
+
+    A state's value at the strobe may be tiny beside its peak, so strobes alone give no scale.
+    States that hardly move are measured against the largest.
+    """
+    peak = np.abs(flow.run(x, 1, mode=mode, points=points).strobes).max(axis=0)
+    return np.asarray(np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300)))
+
+
+def shoot(
+    flow: Flow, x: Array, n: int, mode: ModeKey | None = None, peak: Array | None = None
+) -> tuple[Array, Array] | None:
+    """A fixed point of the n-period map near x, with its monodromy matrix, or None.
+
+    Newton with at most eight evaluations; converged means that the map moves the point by less
+    than 1e-11 of the peak. Finds unstable orbits as well as stable ones, and does not check that
+    n is the least period.
+    """
+    size = len(x)
+    last = np.inf
+    if peak is None:
+        peak = peaks_near(flow, x, mode)
+    for _ in range(8):
+        run = flow.run(x, n, mode=mode, tangent=np.eye(size))
+        if run.status is not FlowStatus.DONE or run.tangent is None:
+            return None
+        step = run.strobes[-1] - x
+        error = float((np.abs(step) / peak).max())
+        if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
+            return x, run.tangent
+        try:
+            x = x - np.linalg.solve(run.tangent - np.eye(size), step)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
+            return None
+        last, mode = error, None
+    return None
+
+
+def shoot_symmetric(flow: Flow, x: Array, n: int) -> tuple[Array, Array] | None:
+    """A symmetric orbit of odd period n near x, by the half-period map, or None.
+
+    x(t + nT/2) = mirror · x(t); the paper's Eq. (9) is the case of one impact on each stop. Half
+    the work of ``shoot``, and it cannot leave for an asymmetric branch, so beyond a pitchfork it
+    follows the unstable symmetric orbit. Returns the point and the full monodromy matrix.
+
+    Raises
+    ------
+    InputError : n is even, or the system has no mirror.
+    """
+    mirror = flow.system.mirror
+    if n % 2 == 0 or mirror is None:
+        raise InputError(None, "n", n, "an odd period of a system with a mirror")
+    size, last = len(x), np.inf
+    peak = peaks_near(flow, x)
+    for _ in range(12):
+        run = flow.run(x, n, points=2, stretches=n, tangent=np.eye(size))
+        if run.status is not FlowStatus.DONE or run.tangent is None:
+            return None
+        step = mirror @ run.strobes[-1] - x
+        half = mirror @ run.tangent
+        error = float((np.abs(step) / peak).max())
+        if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
+            return x, half @ half
+        x = x - np.linalg.solve(half - np.eye(size), step)
+        if not np.all(np.isfinite(x)) or np.abs(x).max() > 1e6 * peak.max():
+            return None
+        last = error
+    return None
+
+
+def describe(
+    flow: Flow, x: Array, n: int, monodromy: Array, mode: ModeKey | None = None, laps: int = 3
+) -> Orbit:
+    """The orbit through the fixed point x (states,) of the n-period map, over laps·n periods.
+
+    Checks by running that the strobe repeats, counts impacts, refines extremes. Unstable orbits
+    want a single lap: what rounding leaves grows by their multipliers.
+    """
+    run = flow.run(x, laps * n, mode=mode, measure=True)
+    j = flow.system.displacement[0] if flow.system.displacement else 0
+    peak = np.abs(run.extremes).max(axis=1)
+    drift = np.abs(run.strobes - np.tile(run.strobes[:n], (laps + 1, 1))[: laps * n + 1])
+    multipliers = np.linalg.eigvals(monodromy).astype(complex)
+    counts = run.counts.reshape(laps, n, -1, 2).sum(axis=(1, 2))
+    # Entries at the very strobe may fall into one lap or the next: judge them together.
+    lower, upper = (round(c / laps) for c in counts.sum(axis=0))
+    once = run.impacts.time < n * flow.drive.period
+    status = OrbitStatus.PERIODIC
+    floor = ENGINE_ERROR * peak[j]
+    if (drift > STROBE_TOLERANCE * peak).any():
+        status = OrbitStatus.NOT_SETTLED
+    elif run.clipped_time > 0.0:
+        status = OrbitStatus.CLIPPED
+    elif min(run.penetration, run.miss) < floor or run.tangencies:
+        status = OrbitStatus.GRAZING
+    span = n * flow.drive.period
+    radius = float(np.abs(multipliers).max())
+    return Orbit(
+        status=status,
+        n=n,
+        p=upper,
+        q=lower,
+        start=run.strobes[0],
+        mode=flow.system.mode_at(x, flow.drive.offset, mode),
+        extremes=run.extremes,
+        impact_times=run.impacts.time[once],
+        impact_velocities=run.impacts.state[once, j + 1] if len(peak) > j + 1 else np.zeros(0),
+        impact_sides=run.impacts.side[once].astype(float),
+        asymmetry=asymmetry(flow, x, n, peak),
+        multipliers=multipliers,
+        lyapunov=float(np.log(radius) / span) if radius > 0.0 else -np.inf,
+        penetration=run.penetration,
+        miss=run.miss,
+        reason="" if status is OrbitStatus.PERIODIC else f"while classifying period {n}",
+    )
+
+
+def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> float:
+    """max over t of |x(t + nT/2) + x(t)| relative to each state's peak; nan for even n."""
+    if n % 2 == 0:
+        return float("nan")
+    trace = flow.run(x, n, points=points).strobes[:-1]
+    half = n * points // 2
+    return float((np.abs(np.roll(trace, -half, axis=0) + trace).max(axis=0) / peak).max())
+
+
+def lyapunov(
+    flow: Flow, x: Array, mode: ModeKey | None, periods: int, block: int = 5
+) -> tuple[float, Array, ModeKey]:
+    """Largest exponent per unit time over ``periods`` by the exact variational flow.
+
+    The tangent vector is renormalised every ``block`` periods. Returns the state reached too.
+    """
+    rng = np.random.default_rng(0)
+    v = rng.standard_normal((len(x), 1))
+    growth, done = 0.0, 0
+    while done < periods:
+        run = flow.run(x, block, mode=mode, tangent=v)
+        if run.status is not FlowStatus.DONE or run.tangent is None:
+            break
+        size = float(np.linalg.norm(run.tangent))
+        if done:  # the first block only turns the vector towards the leading direction
+            growth += np.log(max(size, 1e-300))
+        v, x, mode = run.tangent / max(size, 1e-300), run.strobes[-1], run.mode
+        done += block
+    span = max(done - block, 1) * flow.drive.period
+    return float(growth / span), x, mode if mode is not None else flow.system.start
+
+
+def starts(scale: Array, count: int, seed: int = 0) -> Array:
+    """(count, n) initial states: rest, then a scrambled Sobol set in the box ± scale."""
+    box = qmc.Sobol(len(scale), seed=seed).random(max(1, 1 << (count - 1).bit_length()))
+    return np.vstack([np.zeros((1, len(scale))), scale * (2.0 * box - 1.0)])[:count]
+
+
+def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
+    """The different attractors that these starts lead to, in order of discovery.
+
+    Mirror twins count as one; aperiodic ones are not told apart.
+    """
+    found: list[Orbit] = []
+    for x in states:
+        orbit = settle(flow, np.asarray(x, dtype=float))
+        if not any(same(flow, orbit, other) for other in found):
+            found.append(orbit)
+    return found
+
+
+def same(flow: Flow, a: Orbit, b: Orbit) -> bool:
+    """Whether two orbits are one, up to the strobe they start at and the mirror."""
+    if a.status is not b.status or {(a.n, a.p, a.q), (a.n, a.q, a.p)}.isdisjoint({(b.n, b.p, b.q)}):
+        return False
+    if a.status is not OrbitStatus.PERIODIC:
+        return True
+    peak = np.abs(b.extremes).max(axis=1)
+    laps = flow.run(b.start, b.n).strobes[:-1]
+    candidates = [laps]
+    if flow.system.mirror is not None:
+        candidates.append(mirrored_strobes(flow, b))
+    return any(bool((np.abs(c - a.start) < 1e-6 * peak).all(axis=1).any()) for c in candidates)
+
+
+def mirrored_strobes(flow: Flow, orbit: Orbit) -> Array:
+    """(n, states) strobes of the mirror twin: the orbit half a drive period on, reflected."""
+    assert flow.system.mirror is not None
+    trace = flow.run(orbit.start, orbit.n, points=2).strobes
+    return np.asarray(trace[1:-1:2] @ flow.system.mirror.T)
+
+
+def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
+    """The mirror twin of a periodic orbit, or None where the system has no mirror."""
+    if flow.system.mirror is None or orbit.status is not OrbitStatus.PERIODIC:
+        return None
+    x = mirrored_strobes(flow, orbit)[0]
+    found = shoot(flow, x, orbit.n)
+    return None if found is None else describe(flow, found[0], orbit.n, found[1])
+
+
+def _polish(flow: Flow, run: FlowResult) -> tuple[Orbit | None, int]:
+    """Try to turn the end of a settling run into a periodic orbit; also what it cost."""
+    strobes, cost = run.strobes, 1
+    peak = peaks_near(flow, strobes[-1], run.mode)
+    for n in range(1, min(MAX_PERIOD, len(strobes) - 1) + 1):
+        gap = np.abs(strobes[-1] - strobes[-1 - n]) / peak
+        if gap.max() > WORTH:
+            continue
+        found = shoot(flow, strobes[-1], n, run.mode, peak)
+        cost += 8 * n
+        if found is None:
+            continue
+        x, monodromy = found
+        laps = flow.run(x, n).strobes
+        least = next(
+            d
+            for d in range(1, n + 1)
+            if n % d == 0 and (np.abs(laps[d] - x) <= STROBE_TOLERANCE * peak).all()
+        )
+        if least < n:
+            shorter = shoot(flow, x, least, None, peak)
+            if shorter is None:
+                continue
+            x, monodromy = shorter
+        radius = float(np.abs(np.linalg.eigvals(monodromy)).max())
+        if radius >= 1.0 or (np.abs(x - strobes[-1]) / peak).max() >= NEAR:
+            continue
+        turns = int(np.clip(np.log(1e-4) / np.log(max(radius, 1e-3)), 2, CLOSING // n))
+        cost += turns * n
+        if not _closes_in(flow, run, x, turns * n, radius**turns, peak):
+            continue
+        orbit = describe(flow, x, least, monodromy)
+        cost += 5 * n
+        if orbit.status is not OrbitStatus.NOT_SETTLED:
+            return orbit, cost
+    return None, cost
+
+
+def _closes_in(
+    flow: Flow, run: FlowResult, x: Array, periods: int, factor: float, peak: Array
+) -> bool:
+    """Whether the settling trajectory itself goes to the orbit through x: a passing one leaves.
+
+    factor : what the multipliers say of the distance after ``periods``; ten times that is granted.
+    """
+    later = flow.run(run.strobes[-1], periods, mode=run.mode)
+    if later.status is not FlowStatus.DONE:
+        return False
+    before = float((np.abs(run.strobes[-1] - x) / peak).max())
+    after = float((np.abs(later.strobes[-1] - x) / peak).max())
+    return after <= max(10.0 * factor * before, STROBE_TOLERANCE)

@@ -1,0 +1,433 @@
+"""Exact flow of a piecewise-linear system under a sinusoidal drive.
+
+The general engine: any number of states and modes, constant terms, guards that see the drive. Each
+step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
+absent or found (see ``dynamics.kernel_general``). Four states with one stop pair take the modal
+fast path (``dynamics.modal_tables``) where only strobes, impact counts and tangents are asked for;
+a circuit that keeps to its working modes takes that of ``dynamics.kernel_four_state``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.linalg import matrix_balance
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.base.interruption import heed
+from designer.dynamics import kernel_four_state, kernel_modal, modal_tables, working_modes
+from designer.dynamics import kernel_general as kernel
+from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
+
+STEP = 0.5
+"""‖A h‖ of one step, after balancing."""
+MAX_EVENTS = 10_000
+"""Mode changes in one drive period past which the flow stops: chattering ends with a status."""
+
+
+CHUNK = 500
+"""Periods between two looks at ``interrupt``: some 10 to 100 ms of compiled work."""
+
+
+class FlowStatus(StrEnum):
+    """How a run of the flow ended."""
+
+    DONE = "done"
+    CHATTER = "too many events"
+    DIVERGED = "diverged"
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Entries into contact in order of time.
+
+    time : (k,); clearance, side : (k,) ints, side 1 upper and -1 lower; state : (k, n).
+    """
+
+    time: Array
+    clearance: kernel.Int
+    side: kernel.Int
+    state: Array
+
+
+@dataclass(frozen=True)
+class FlowResult:
+    """What happened over ``periods`` drive periods.
+
+    strobes : (periods · points + 1, n) states at the start and after each stretch.
+    counts : (periods · points, clearances, 2) impacts on the lower and the upper stop.
+    end : state (n,) and mode reached. tangent : (n, k) tangent vectors carried along, or None.
+    Where measured: impacts; extremes (n, 2) of each state; penetration, the smallest of all
+    contacts; miss, the nearest approach to a stop without contact (inf where there is none).
+    """
+
+    status: FlowStatus
+    strobes: Array
+    counts: kernel.Int
+    mode: ModeKey
+    tangent: Array | None
+    impacts: Impacts
+    extremes: Array
+    penetration: float
+    miss: float
+    tangencies: int
+    clipped_time: float
+
+
+class Flow:
+    """The flow of one system under one drive; keeps the tables of the modes it has met.
+
+    fast : take the modal fast path where it fits; False: always the general kernel.
+    """
+
+    def __init__(self, system: PiecewiseLinearSystem, drive: Drive, *, fast: bool = True) -> None:
+        self.system = system
+        self.drive = drive
+        self._modal = modal_tables.tables(system, drive) if fast and not system.working else None
+        self._working = working_modes.tables(system, drive) if fast else None
+        self._index: dict[ModeKey, int] = {}
+        self._keys: list[ModeKey] = []
+        self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
+
+    @property
+    def kernel(self) -> str:
+        """Which kernel carries it as long as all is usual: "modal", "circuit" or "general"."""
+        if self._modal is not None:
+            return "modal"
+        return "general" if self._working is None else "circuit"
+
+    def run(
+        self,
+        x: Array,
+        periods: int,
+        *,
+        mode: ModeKey | None = None,
+        tangent: Array | None = None,
+        measure: bool = False,
+        points: int = 1,
+        stretches: int | None = None,
+        max_events: int = MAX_EVENTS,
+        room: int | None = None,
+    ) -> FlowResult:
+        """Start at a strobe (drive phase 0) in state x (n,) and run for ``periods`` periods.
+
+        points : strobes per period; more than one gives a dense trace, as exact as the strobe.
+        stretches : stop after so many of the ``periods · points`` stretches.
+        room : impacts that the log holds; by itself it grows to what is met.
+        tangent : (n, k) vectors to be carried by the linearised flow.
+        measure : also log impacts and refine extremes, at about three times the cost.
+
+        Raises
+        ------
+        InputError : no period, no point, or a state of the wrong shape or not finite.
+        KeyboardInterrupt : ``interrupt`` was set by another thread.
+        """
+        x = np.array(x, dtype=float)
+        _check(x, self.system.size, periods, points)
+        n, c = self.system.size, len(self.system.clearances)
+        key = self.system.mode_at(x, self.drive.offset, mode)
+        stretches = periods * points if stretches is None else stretches
+        if self._modal is not None and points == 1 and not measure and stretches == periods:
+            return self._run_modal(self._modal, x, periods, key, tangent, max_events)
+        if self._working is not None and key in self.system.working:
+            found = self._run_working(
+                self._working, x, stretches, points, key, tangent, max_events, room, measure=measure
+            )
+            if found is not None:
+                return found
+        z = np.concatenate([x, [0.0, 1.0, 1.0]])
+        clock = np.zeros(2)
+        cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
+        phases = 2.0 * np.pi * np.arange(points) / points
+        anchor = np.stack([np.sin(phases), np.cos(phases)], axis=1)
+        capacity = (8 + 16 * periods if room is None else room) if measure else 0
+        log = kernel.Log(
+            strobes=np.empty((stretches + 1, n)),
+            impacts=np.zeros((stretches, c, 2), dtype=np.int64),
+            when=np.empty(capacity),
+            at=np.empty((capacity, n)),
+            stop=np.zeros((capacity, 2), dtype=np.int64),
+            extremes=np.tile([np.inf, -np.inf], (n, 1)),
+            graze=np.array([np.inf, np.inf, 0.0]),
+            clipped=np.zeros(1),
+        )
+        log.strobes[0] = x
+        depth = np.full(c, 0.0)
+        for j, side in enumerate(self.system.mode(key).sides):
+            # A contact that was already running has an unknown deepest point so far.
+            depth[j] = np.inf if side else 0.0
+        code = kernel.DONE
+        while cursor[0] < stretches:
+            heed()
+            code = kernel.advance(
+                self._tables,
+                z,
+                clock,
+                cursor,
+                self.drive.period / points,
+                anchor,
+                phi,
+                depth,
+                max_events,
+                min(int(cursor[0]) + CHUNK * points, stretches),
+                measure,
+                log,
+            )
+            if code == kernel.UNKNOWN_MODE:
+                self._link(int(cursor[1]), int(cursor[3]))
+            elif code != kernel.DONE:
+                break
+        if measure and clock[1] > capacity:  # more impacts than room: again, with room for all
+            return self.run(
+                x,
+                periods,
+                mode=mode,
+                tangent=tangent,
+                measure=True,
+                points=points,
+                stretches=stretches,
+                max_events=max_events,
+                room=int(clock[1]),
+            )
+        status = _STATUS[code]
+        done, k = int(cursor[0]), int(clock[1])
+        return FlowResult(
+            status=status,
+            strobes=log.strobes[: done + 1],
+            counts=log.impacts[:done],
+            mode=self._keys[int(cursor[1])],
+            tangent=None if tangent is None else phi,
+            impacts=Impacts(log.when[:k], log.stop[:k, 0], log.stop[:k, 1], log.at[:k]),
+            extremes=log.extremes,
+            penetration=float(log.graze[0]),
+            miss=float(log.graze[1]),
+            tangencies=int(log.graze[2]),
+            clipped_time=float(log.clipped[0]),
+        )
+
+    def _run_modal(
+        self,
+        tables: kernel_modal.ModalTables,
+        x: Array,
+        periods: int,
+        key: ModeKey,
+        tangent: Array | None,
+        max_events: int,
+    ) -> FlowResult:
+        """The same by the fast path: no impact log, no extremes."""
+        keys = modal_tables.keys(self.system)
+        cursor = np.array([keys.index(key), 0], dtype=np.int64)
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
+        strobes = np.empty((periods + 1, 4))
+        strobes[0] = x
+        counts = np.zeros((periods, 2), dtype=np.int64)
+        done, code = 0, kernel_modal.DONE
+        while done < periods and code == kernel_modal.DONE:
+            heed()
+            last = min(done + CHUNK, periods)
+            code = kernel_modal.advance(
+                tables,
+                strobes[done].copy(),
+                cursor,
+                self.drive.period,
+                phi,
+                max_events,
+                strobes[done : last + 1],
+                counts[done:last],
+            )
+            done += int(cursor[1])
+        nothing = np.zeros(0)
+        return FlowResult(
+            status=_STATUS[code],
+            strobes=strobes[: done + 1],
+            counts=counts[:done, None, :],
+            mode=keys[int(cursor[0])],
+            tangent=None if tangent is None else phi,
+            impacts=Impacts(nothing, counts[:0, 0], counts[:0, 0], np.zeros((0, 4))),
+            extremes=np.tile([np.inf, -np.inf], (4, 1)),
+            penetration=np.inf,
+            miss=np.inf,
+            tangencies=0,
+            clipped_time=0.0,
+        )
+
+    def _run_working(
+        self,
+        tables: working_modes.Tables,
+        x: Array,
+        stretches: int,
+        points: int,
+        key: ModeKey,
+        tangent: Array | None,
+        max_events: int,
+        room: int | None,
+        *,
+        measure: bool,
+    ) -> FlowResult | None:
+        """The same by the fast path of circuits; None where the run leaves the working modes."""
+        keys = self.system.working
+        cursor = np.array([keys.index(key), 0, measure], dtype=np.int64)
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
+        strobes = np.empty((stretches + 1, 4))
+        strobes[0] = x
+        counts = np.zeros((stretches, 2), dtype=np.int64)
+        capacity = (8 + 16 * stretches // points if room is None else room) if measure else 0
+        trail = working_modes.trail(capacity)
+        anchor = working_modes.anchors(points)
+        drive = np.array([self.drive.omega, self.drive.period, max_events])
+        done, code, chunk = 0, kernel_four_state.DONE, stretches if measure else CHUNK * points
+        while done < stretches and code == kernel_four_state.DONE:
+            heed()
+            last = min(done + chunk, stretches)
+            code = kernel_four_state.advance(
+                tables.data,
+                tables.ints,
+                strobes[done].copy(),
+                cursor,
+                drive,
+                anchor,
+                phi,
+                strobes[done : last + 1],
+                counts[done:last],
+                trail,
+            )
+            if code == kernel_four_state.LEFT:
+                return None
+            done += int(cursor[1])
+        met = int(trail.met[0])
+        if met > capacity and measure:  # more impacts than room: again, with room for all
+            return self._run_working(
+                tables, x, stretches, points, key, tangent, max_events, met, measure=True
+            )
+        return FlowResult(
+            status=_STATUS[code],
+            strobes=strobes[: done + 1],
+            counts=counts[:done, None, :],
+            mode=keys[int(cursor[0])],
+            tangent=None if tangent is None else phi,
+            impacts=Impacts(
+                trail.when[:met], np.zeros(met, dtype=np.int64), trail.stop[:met], trail.at[:met]
+            ),
+            extremes=trail.extremes,
+            penetration=float(trail.graze[0]) if measure else np.inf,
+            miss=float(trail.graze[1]),
+            tangencies=int(trail.graze[2]) if measure else 0,
+            clipped_time=0.0,
+        )
+
+    def _number(self, key: ModeKey) -> int:
+        """Index of the mode in the tables, which are filled on its first use."""
+        known = self._index.get(key)
+        if known is not None:
+            return known
+        number = len(self._keys)
+        mode = self.system.mode(key)
+        rows, width, guards = len(self._tables.step), self.system.size + 3, len(mode.guards)
+        if number >= rows or guards > self._tables.guard.shape[1]:
+            room = _empty_tables(
+                max(rows, 2 * (number + 1)),
+                max(guards, self._tables.guard.shape[1]),
+                width,
+                len(self.system.clearances),
+            )
+            for new, old in zip(room, self._tables, strict=True):
+                new[tuple(slice(0, s) for s in old.shape)] = old
+            self._tables = room
+        touched = [
+            self.system.contact_rows(j)[side] if side else None for j, side in enumerate(mode.sides)
+        ]
+        _fill(self._tables, number, mode, touched, self.drive)
+        self._index[key] = number
+        self._keys.append(key)
+        return number
+
+    def _link(self, number: int, guard: int) -> None:
+        """Give a guard its target, building the mode if it is new."""
+        target = self._number(self.system.mode(self._keys[number]).guards[guard].target)
+        self._tables.target[number, guard] = target
+
+
+def _check(x: Array, size: int, periods: int, points: int) -> None:
+    if x.shape != (size,) or not np.all(np.isfinite(x)):
+        raise InputError(None, "state", np.array2string(x), f"{size} finite numbers")
+    for name, value in (("periods", periods), ("points", points)):
+        if value < 1:
+            raise InputError(None, name, value, "at least 1")
+
+
+_STATUS = {
+    kernel.DONE: FlowStatus.DONE,
+    kernel.TOO_MANY_EVENTS: FlowStatus.CHATTER,
+    kernel.DIVERGED: FlowStatus.DIVERGED,
+}
+
+
+def augmented(mode: Mode, drive: Drive) -> Array:
+    """(n + 3, n + 3) M with z' = M z for z = (x, sin, cos, 1)."""
+    n = len(mode.d)
+    M = np.zeros((n + 3, n + 3))
+    M[:n, :n] = mode.A
+    M[:n, n] = drive.amplitude * mode.B
+    M[:n, n + 2] = mode.d + drive.offset * mode.B
+    M[n, n + 1] = drive.omega
+    M[n + 1, n] = -drive.omega
+    return M
+
+
+def _augmented_row(C: Array, D: float, e: float, drive: Drive) -> Array:
+    """C·x + D·u + e as a row over (x, sin, cos, 1)."""
+    return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
+
+
+def _step_length(A: Array, omega: float) -> float:
+    balanced, _ = matrix_balance(A, permute=False)
+    return STEP / max(float(np.linalg.norm(balanced, 2)), omega)
+
+
+def _fill(
+    tables: kernel.Tables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
+) -> None:
+    """touched : for each clearance the row of the displacement past the stop in contact."""
+    M = augmented(mode, drive)
+    h = _step_length(mode.A, drive.omega)
+    powers = tables.taylor[i]
+    powers[0] = np.eye(len(M))
+    for k in range(1, kernel.ORDER + 1):
+        powers[k] = powers[k - 1] @ M * (h / k)
+    tables.step[i] = h
+    tables.propagator[i] = powers[::-1].sum(axis=0)
+    tables.guards[i] = len(mode.guards)
+    tables.side[i] = mode.sides
+    tables.clipped[i] = mode.clipped
+    for j, past in enumerate(touched):
+        if past is not None:
+            tables.depth[i, j] = _augmented_row(past[:-2], past[-2], past[-1], drive) @ powers
+    for g, guard in enumerate(mode.guards):
+        taylor = _augmented_row(guard.C, guard.D, guard.e, drive) @ powers
+        tables.guard[i, g] = taylor
+        # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
+        weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
+        tables.chord[i, g] = weights @ np.abs(taylor) * (1.0 + 1e-9)
+        tables.target[i, g] = -1
+        tables.clearance[i, g] = guard.clearance
+
+
+def _empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.Tables:
+    order = kernel.ORDER + 1
+    return kernel.Tables(
+        step=np.zeros(modes),
+        propagator=np.zeros((modes, width, width)),
+        taylor=np.zeros((modes, order, width, width)),
+        guard=np.zeros((modes, guards, order, width)),
+        chord=np.zeros((modes, guards, width)),
+        guards=np.zeros(modes, dtype=np.int64),
+        target=np.full((modes, guards), -1, dtype=np.int64),
+        clearance=np.full((modes, guards), -1, dtype=np.int64),
+        depth=np.zeros((modes, clearances, order, width)),
+        side=np.zeros((modes, clearances), dtype=np.int64),
+        clipped=np.zeros(modes, dtype=np.int64),
+    )

@@ -1,0 +1,100 @@
+"""What a response is, in one normal form whichever engine made it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.arrays import Array
+
+Complex = NDArray[np.complex128]
+MAX_PERIOD = 16
+"""Largest n of an n-p-q response, in drive periods (docs/definitions.md)."""
+SYMMETRY_TOLERANCE = 1e-3
+"""Of the peak: below it an orbit counts as symmetric."""
+
+
+class OrbitStatus(StrEnum):
+    """What is known of a response."""
+
+    PERIODIC = "periodic"
+    APERIODIC = "aperiodic"
+    GRAZING = "grazing"
+    CLIPPED = "clipped"
+    NOT_SETTLED = "not settled"
+    DIVERGED = "diverged"
+    FAILED = "failed"
+
+
+ANSWERS = frozenset(
+    {OrbitStatus.PERIODIC, OrbitStatus.APERIODIC, OrbitStatus.GRAZING, OrbitStatus.CLIPPED}
+)
+"""Statuses that answer the question where no response was wanted."""
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A steady response.
+
+    Parameters
+    ----------
+    status : see ``OrbitStatus``; n, p, q are 0 unless it is periodic, grazing or clipped.
+    n, p, q : least period in drive periods, impacts on the upper and on the lower stop in n.
+    start : (states,) state at a strobe of the orbit; mode : key of the mode that holds there.
+    extremes : (states, 2) least and greatest value of each state, refined.
+    impact_times, impact_velocities, impact_sides : (k,) over n periods, in order; velocity of the
+        moving state at entry; side 1 upper, -1 lower.
+    asymmetry : max |x(t + nT/2) + x(t)| over the peak of each state, worst state (n odd; else nan).
+    multipliers : (states,) Floquet multipliers, complex; empty where the engine has none.
+    lyapunov : largest exponent per unit of the system's time (nan where unknown).
+    penetration, miss : smallest penetration and nearest miss, in units of the moving state.
+    reason : why, where status is failed, not settled or diverged.
+    periods : drive periods that the search cost.
+    """
+
+    status: OrbitStatus
+    n: int = 0
+    p: int = 0
+    q: int = 0
+    start: Array = field(default_factory=lambda: np.zeros(0))
+    mode: tuple[int, ...] = ()
+    extremes: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    impact_times: Array = field(default_factory=lambda: np.zeros(0))
+    impact_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    impact_sides: Array = field(default_factory=lambda: np.zeros(0))
+    asymmetry: float = float("nan")
+    multipliers: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    lyapunov: float = float("nan")
+    penetration: float = float("inf")
+    miss: float = float("inf")
+    reason: str = ""
+    periods: int = 0
+
+    @property
+    def symmetric(self) -> bool | None:
+        """Whether the orbit maps to itself under x → -x, half a period later; None if unknown."""
+        if self.status is not OrbitStatus.PERIODIC:
+            return None
+        if self.n % 2 == 0:
+            return False
+        return bool(self.asymmetry < SYMMETRY_TOLERANCE) if np.isfinite(self.asymmetry) else None
+
+    @property
+    def response(self) -> str:
+        """ "n-p-q" of a periodic orbit, otherwise its status."""
+        if self.status is OrbitStatus.PERIODIC:
+            return f"{self.n}-{self.p}-{self.q}"
+        return str(self.status)
+
+    @property
+    def radius(self) -> float:
+        """Largest modulus of the multipliers; nan where there are none."""
+        return float(np.abs(self.multipliers).max()) if len(self.multipliers) else float("nan")
+
+
+def failed(reason: str) -> Orbit:
+    """An orbit that could not be computed, with the reason."""
+    return Orbit(OrbitStatus.FAILED, reason=reason)

@@ -1,0 +1,181 @@
+"""A piecewise-linear system with one sinusoidal drive: the common ground of model and circuit.
+
+In each mode the state x (n entries) follows
+
+    x' = A x + B u(t) + d,      u(t) = amplitude · sin(ω t + phase) + offset
+
+until a guard becomes positive. A guard is a linear function C x + D u + e of state and drive,
+negative inside its mode, and names the mode on its other side. A mode's key is a tuple of small
+integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an op-amp: -1 at its
+lower limit, 0 linear, 1 at its upper limit; a diode: 1 while it conducts, else 0). Modes are built
+when first entered and kept, never enumerated.
+
+The vector field is continuous across every boundary (springs and limiters are), so a crossing
+changes the mode and nothing else: the saltation matrix is the identity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+
+LONGEST_WALK = 512
+"""Mode changes after which the search for the mode of a state gives up."""
+
+ROUNDING = 1e-14
+"""Of the sum of a guard's terms' magnitudes: what cannot be told from zero."""
+
+ModeKey = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Guard:
+    """One way out of a mode.
+
+    C : (n,), D, e : the linear function C·x + D·u + e, negative while the mode lasts.
+    target : key of the mode that is entered when it becomes positive.
+    clearance : index of the clearance whose contact begins or ends here, or -1. Such guards are
+        scaled to displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop.
+    """
+
+    C: Array
+    D: float
+    e: float
+    target: ModeKey
+    clearance: int = -1
+
+
+@dataclass(frozen=True)
+class Mode:
+    """The linear system that holds while no guard is positive.
+
+    A : (n, n); B, d : (n,); guards : ways out.
+    sides : for each clearance -1, 0 or 1: in contact with the lower stop, open, with the upper.
+    clipped : an element that ought to be linear is at its limit.
+    """
+
+    A: Array
+    B: Array
+    d: Array
+    guards: tuple[Guard, ...]
+    sides: tuple[int, ...]
+    clipped: bool = False
+
+
+@dataclass(frozen=True)
+class Drive:
+    """u(t) = amplitude · sin(omega · t) + offset; omega in rad per unit of the system's time.
+
+    Raises
+    ------
+    InputError : omega is not positive, or anything is not finite.
+    """
+
+    omega: float
+    amplitude: float = 1.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.omega < np.inf):
+            raise InputError(None, "omega", self.omega, "a finite number > 0")
+        for name in ("amplitude", "offset"):
+            if not np.isfinite(getattr(self, name)):
+                raise InputError(None, name, getattr(self, name), "a finite number")
+
+    @property
+    def period(self) -> float:
+        return 2.0 * np.pi / self.omega
+
+
+@dataclass
+class PiecewiseLinearSystem:
+    """Named states and a rule that builds the mode for a key.
+
+    Parameters
+    ----------
+    states : names of the n states.
+    build : called once for each key that is entered; raises KeyError for a key that cannot be.
+    start : key of the mode that holds near x = 0.
+    clearances : names of the clearances, in the order of ``Mode.sides``.
+    displacement : index of the state that moves in each clearance.
+    mirror : (n, n) M with x → M x, u → -u a symmetry of the system, or None.
+    working : keys of the modes that a board as it should be moves between, ``start`` first; the
+        fast path of circuits tabulates them.
+    """
+
+    states: tuple[str, ...]
+    build: Callable[[ModeKey], Mode]
+    start: ModeKey
+    clearances: tuple[str, ...]
+    displacement: tuple[int, ...]
+    mirror: Array | None = None
+    working: tuple[ModeKey, ...] = ()
+    _modes: dict[ModeKey, Mode] = field(default_factory=dict, repr=False)
+
+    @property
+    def size(self) -> int:
+        return len(self.states)
+
+    def mode(self, key: ModeKey) -> Mode:
+        """The mode of this key, built on its first use."""
+        known = self._modes.get(key)
+        if known is None:
+            known = self._modes[key] = self.build(key)
+        return known
+
+    def mode_at(self, x: Array, u: float, near: ModeKey | None = None) -> ModeKey:
+        """Key of the mode that holds at state x (n,) and drive u.
+
+        Walks from ``near`` (default: ``start``) across the most violated guard until none is
+        violated. Where that walk meets a mode twice it goes on across the first violated guard
+        in the key's order, which cannot cycle in a network whose every state and drive has
+        exactly one answer (Murty's rule for such complementarity problems). From then on a
+        violation that is only rounding does not count: on a boundary two modes hold.
+
+        Raises
+        ------
+        ArithmeticError : no mode holds, within a bounded walk.
+        """
+        key = self.start if near is None else near
+        seen: set[ModeKey] = set()
+        cycling = False
+        for _ in range(LONGEST_WALK):
+            mode = self.mode(key)
+            cycling = cycling or key in seen
+            seen.add(key)
+            values = [float(g.C @ x) + g.D * u + g.e for g in mode.guards]
+            floors = [ROUNDING * _size(g, x, u) if cycling else 0.0 for g in mode.guards]
+            violated = [i for i, value in enumerate(values) if value > floors[i]]
+            if not violated:
+                return key
+            chosen = violated[0] if cycling else max(violated, key=values.__getitem__)
+            key = mode.guards[chosen].target
+        raise ArithmeticError(f"no mode holds at x = {x}, u = {u}")
+
+    def contact_rows(self, clearance: int) -> dict[int, Array]:
+        """How far the displacement is past each stop, by side (1 upper, -1 lower).
+
+        Rows (n + 2,) over (states, drive, 1), scaled to displacement and positive in contact: the
+        guards of the mode that holds at rest. They hold however deep the contact is.
+        """
+        rest = self.mode(self.start)
+        rows: dict[int, Array] = {}
+        for guard in rest.guards:
+            if guard.clearance == clearance:
+                side = self.mode(guard.target).sides[clearance]
+                rows[side] = np.concatenate([guard.C, [guard.D, guard.e]])
+        return rows
+
+    @property
+    def built(self) -> int:
+        """How many modes have been built so far."""
+        return len(self._modes)
+
+
+def _size(guard: Guard, x: Array, u: float) -> float:
+    return float(np.abs(guard.C) @ np.abs(x)) + abs(guard.D * u) + abs(guard.e)

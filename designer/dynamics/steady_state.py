@@ -1,0 +1,252 @@
+"""The steady motion that a start leads to, as a bifurcation diagram shows it.
+
+A transient is run and left out; over the periods kept after it the least displacement of each and
+every impact on the upper stop are noted, and the motion is named n-p-q by the rules of
+``dynamics.attractors``. Two engines: the compiled one for models (``dynamics.kernel_sweep`` and
+``dynamics.kernel_classify``), and the general flow, which is slow and obvious, and serves boards
+and whatever the fast path does not fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.interruption import interrupt
+from designer.dynamics import attractors, kernel_classify, kernel_modal, kernel_sweep
+from designer.dynamics.attractors import CHAOS, lyapunov, peaks_near, settle
+from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
+from designer.dynamics.kernel_modal import ModalTables
+from designer.dynamics.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, OrbitStatus
+
+SURELY = 1e-6
+"""Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
+REPEAT = 1e-2
+"""Of the peak: strobes further apart than this are not taken for a repetition."""
+ROOM = 48
+"""Impacts on the upper stop per period that are kept at first; more where there are more."""
+_STATUS = {
+    kernel_classify.PERIODIC: OrbitStatus.PERIODIC,
+    kernel_classify.APERIODIC: OrbitStatus.APERIODIC,
+    kernel_classify.NOT_SETTLED: OrbitStatus.NOT_SETTLED,
+    kernel_classify.CHATTER: OrbitStatus.NOT_SETTLED,
+    kernel_classify.DIVERGED: OrbitStatus.DIVERGED,
+}
+_STOPPED = {
+    kernel_modal.TOO_MANY_EVENTS: OrbitStatus.NOT_SETTLED,
+    kernel_modal.DIVERGED: OrbitStatus.DIVERGED,
+}
+
+
+@dataclass(frozen=True)
+class Course:
+    """Drive periods: left out, kept and shown, and added at most where the motion is undecided."""
+
+    settle: int = 500
+    keep: int = 30
+    patience: int = 4000
+
+    @property
+    def tangents(self) -> int:
+        """Of those left out, the last ones, over which the exponent is taken."""
+        return self.settle // 2
+
+
+@dataclass(frozen=True)
+class Steady:
+    """What a start leads to.
+
+    status : periodic, aperiodic, not settled or diverged; of a board also clipped (an op-amp is at
+    its limit). Never grazing: a count within rounding of a tangency is given as it was run.
+    n, p, q : 0 unless periodic. symmetric : None unless periodic. lyapunov : largest exponent per
+    unit of the system's time; of a periodic motion, by its multipliers. radius : largest modulus
+    of the multipliers (nan unless periodic). start : (states,) a strobe of the orbit, or where
+    the motion was left. end : (states,) strobe at the end of what is shown. minima : (keep,) least
+    first displacement in each period kept. velocities : (k,) of it where contact with the upper
+    stop begins, in those periods. periods : run in all.
+    """
+
+    status: OrbitStatus
+    n: int
+    p: int
+    q: int
+    symmetric: bool | None
+    lyapunov: float
+    radius: float
+    start: Array
+    end: Array
+    minima: Array
+    velocities: Array
+    periods: int
+
+    @property
+    def response(self) -> str:
+        """ "n-p-q" of a periodic motion, otherwise its status."""
+        if self.status is OrbitStatus.PERIODIC:
+            return f"{self.n}-{self.p}-{self.q}"
+        return str(self.status)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A system under a drive: how to make its flow, its drive's period, the fast path's tables
+    (None: by the flow)."""
+
+    flow: Callable[[], Flow]
+    period: float
+    tables: ModalTables | None = None
+
+    def steady(self, x: Array, course: Course) -> Steady:
+        """What the start x (states,) leads to.
+
+        Raises
+        ------
+        KeyboardInterrupt : ``dynamics.flow.interruption`` was set by another thread.
+        """
+        if interrupt.is_set():
+            raise KeyboardInterrupt
+        if self.tables is None:
+            return by_flow(self.flow(), x, course)
+        return _by_kernel(self.flow, self.tables, self.period, x, course)
+
+
+def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
+    """By the general flow, period after period."""
+    exponent, state = float("nan"), np.array(x, dtype=float)
+    free = course.settle - course.tangents
+    spent, status = course.settle + course.keep, OrbitStatus.NOT_SETTLED
+    if free:
+        run = flow.run(state, free)
+        if run.status is not FlowStatus.DONE:
+            return _stopped(run.status, state, spent)
+        state = run.strobes[-1]
+    if course.tangents:
+        exponent, state, _ = lyapunov(flow, state, None, course.tangents)
+    strobes, minima, velocities = [state], [], []
+    j = flow.system.displacement[0] if flow.system.displacement else 0
+    for _ in range(course.keep):
+        run = flow.run(strobes[-1], 1, measure=True)
+        if run.status is not FlowStatus.DONE:
+            return _stopped(run.status, strobes[-1], spent)
+        strobes.append(run.strobes[-1])
+        minima.append(float(run.extremes[j, 0]))
+        upper = run.impacts.side > 0
+        velocities += [float(v) for v in run.impacts.state[upper, j + 1]] if upper.any() else []
+    end = strobes[-1]
+    n = p = q = 0
+    symmetric, radius, start = None, float("nan"), end
+    growth = exponent * flow.drive.period
+    if course.tangents >= kernel_classify.SPAN and growth > CHAOS and not _repeats(flow, strobes):
+        status = OrbitStatus.APERIODIC
+    else:
+        orbit = settle(flow, end)
+        if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
+            orbit = replace(orbit, status=OrbitStatus.PERIODIC)
+        status, spent = orbit.status, spent + orbit.periods
+        if status is OrbitStatus.PERIODIC:
+            n, p, q, symmetric, radius = orbit.n, orbit.p, orbit.q, orbit.symmetric, orbit.radius
+        if np.isfinite(orbit.lyapunov):
+            exponent = orbit.lyapunov
+        start = orbit.start if len(orbit.start) else end
+    return Steady(
+        status,
+        n,
+        p,
+        q,
+        symmetric,
+        exponent,
+        radius,
+        start,
+        end,
+        np.array(minima),
+        np.array(velocities),
+        spent,
+    )
+
+
+def _repeats(flow: Flow, strobes: list[Array]) -> bool:
+    """Whether the last strobe is near an earlier one, up to the largest period."""
+    peak = peaks_near(flow, strobes[-1])
+    earlier = strobes[-1 - min(MAX_PERIOD, len(strobes) - 1) : -1]
+    return any(bool((np.abs(s - strobes[-1]) <= REPEAT * peak).all()) for s in earlier)
+
+
+def _stopped(status: FlowStatus, x: Array, spent: int) -> Steady:
+    diverged = status is FlowStatus.DIVERGED
+    return _nothing(OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED, x, spent)
+
+
+def _nothing(status: OrbitStatus, x: Array, spent: int) -> Steady:
+    nan, none = float("nan"), np.zeros(0)
+    return Steady(status, 0, 0, 0, None, nan, nan, x, x, none, none, spent)
+
+
+def _by_kernel(
+    flow: Callable[[], Flow], tables: ModalTables, period: float, x: Array, course: Course
+) -> Steady:
+    room = ROOM * course.keep
+    while True:
+        at = np.array(x, dtype=float)
+        strobes, minima = np.empty((course.keep + 1, 4)), np.empty(course.keep)
+        velocities, peak, cursor = np.empty(room), np.zeros(4), np.zeros(3, dtype=np.int64)
+        growth = kernel_sweep.travel(
+            tables,
+            at,
+            period,
+            MAX_EVENTS,
+            course.settle,
+            course.tangents,
+            strobes,
+            minima,
+            velocities,
+            peak,
+            cursor,
+        )
+        if cursor[1] <= room:
+            break
+        room = int(cursor[1])
+    spent = course.settle + course.keep
+    if cursor[2] != kernel_modal.DONE:
+        return _nothing(_STOPPED[int(cursor[2])], np.array(x, dtype=float), spent)
+    peak = np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300))
+    orbit, facts, counted = np.empty(4), np.full(3, np.nan), np.zeros(4, dtype=np.int64)
+    code = kernel_classify.classify(
+        tables,
+        strobes,
+        period,
+        MAX_EVENTS,
+        course.patience,
+        growth,
+        course.tangents,
+        peak,
+        orbit,
+        facts,
+        counted,
+    )
+    periodic = code == kernel_classify.PERIODIC
+    return Steady(
+        status=_STATUS[code],
+        n=int(counted[0]) if periodic else 0,
+        p=int(counted[1]) if periodic else 0,
+        q=int(counted[2]) if periodic else 0,
+        symmetric=_symmetric(flow, facts[1], orbit, int(counted[0]), peak) if periodic else None,
+        lyapunov=float(facts[2]) / period,
+        radius=float(facts[0]) if periodic else float("nan"),
+        start=orbit,
+        end=strobes[-1],
+        minima=minima,
+        velocities=velocities[: int(cursor[1])].copy(),
+        periods=spent + int(counted[3]),
+    )
+
+
+def _symmetric(flow: Callable[[], Flow], half: float, x: Array, n: int, peak: Array) -> bool:
+    """By the asymmetry half a period later; where that leaves it open, at all times."""
+    if n % 2 == 0 or half >= SYMMETRY_TOLERANCE:
+        return False
+    if half < SURELY:
+        return True
+    return attractors.asymmetry(flow(), x, n, peak) < SYMMETRY_TOLERANCE

@@ -1,0 +1,27 @@
+"""Which response of a design is meant: two may share ω, or even ω and b, so its number leads."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from designer.model.find_responses import ModelResponse
+
+
+@dataclass(frozen=True)
+class Label:
+    """number : in the order of the model file, from 1. expected : n-p-q, None where nothing was."""
+
+    number: int
+    omega: float
+    b: float
+    expected: str | None
+
+    @classmethod
+    def of(cls, number: int, response: ModelResponse) -> Label:
+        """The label of response number ``number``."""
+        return cls(number, response.omega, response.b, response.expected)
+
+    def as_dict(self) -> dict[str, Any]:
+        """``number``, ``omega``, ``b`` and ``expected``."""
+        return asdict(self)

@@ -1,0 +1,133 @@
+"""The pieces of a trade, each kept as soon as it is done: interrupted work goes on from them.
+
+Of each response one piece with every rung, and one for every ``CHUNK`` boards. They stand in one
+file of the design folder, which goes when the trade is finished.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from designer.base.errors import InputError
+from designer.base.manifest import read_json
+from designer.base.plain_json import FORMAT, dumps, plain
+from designer.fidelity.label import Label
+from designer.fidelity.rung_errors import Compared, Truth
+from designer.fidelity.yields import Tally
+from designer.spice.deck import SolverSettings
+
+PIECES = "trade-pieces.json"
+CHUNK = 100
+"""Boards of a piece."""
+
+
+class Pieces:
+    """Pieces by name, as they were found in ``known`` or are made now.
+
+    save : puts the text of the file where it belongs; by default nowhere.
+    """
+
+    def __init__(
+        self,
+        known: Mapping[str, Any] | None = None,
+        save: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._pieces, self._save = dict(known or {}), save
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._pieces
+
+    def piece(self, name: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+        """What there is of this name, or what is made and kept now."""
+        if name not in self._pieces:
+            began = time.perf_counter()
+            made = plain(make())
+            self._pieces[name] = {**made, "elapsed": time.perf_counter() - began}
+            self._save(dumps({"format": FORMAT, "pieces": self._pieces}, indent=None))
+        return dict(self._pieces[name])
+
+    @property
+    def seconds(self) -> float:
+        """Time that the pieces took, s, whenever they were made."""
+        return math.fsum(piece["elapsed"] for piece in self._pieces.values())
+
+
+def read_pieces(path: Path) -> dict[str, Any]:
+    """The pieces in a file; none where there is no file.
+
+    Raises
+    ------
+    InputError : it holds something else.
+    """
+    if not path.exists():
+        return {}
+    found = read_json(path).get("pieces")
+    if not (
+        isinstance(found, dict)
+        and all(isinstance(p, dict) and isinstance(p.get("elapsed"), float) for p in found.values())
+    ):
+        raise InputError(path, "pieces", "something else", "the pieces of a trade, or no file")
+    return found
+
+
+def rungs_json(
+    rows: tuple[Compared, ...], truth: Truth, settings: SolverSettings | None, seconds: float
+) -> dict[str, Any]:
+    """A response on every rung; settings, seconds : as in ``rungs.Measured``."""
+    return {
+        "rows": [asdict(row) for row in rows],
+        "truth": asdict(truth),
+        "settings": None if settings is None else asdict(settings),
+        "seconds": seconds,
+    }
+
+
+def rungs(
+    said: Mapping[str, Any],
+) -> tuple[tuple[Compared, ...], Truth, SolverSettings | None, float]:
+    """The inverse of ``rungs_json``; numbers that are not finite come back as nan."""
+    settings = said["settings"]
+    return (
+        tuple(_compared(row) for row in said["rows"]),
+        _truth(said["truth"]),
+        None if settings is None else SolverSettings(**settings),
+        _number(said["seconds"]),
+    )
+
+
+def tally(said: Mapping[str, Any]) -> Tally:
+    """Counts of a piece of boards."""
+    return Tally(**{f.name: said[f.name] for f in fields(Tally)})
+
+
+def _compared(said: Mapping[str, Any]) -> Compared:
+    return Compared(
+        **{
+            **said,
+            "label": Label(**said["label"]),
+            "seconds": _number(said["seconds"]),
+            "error": {of: _number(v) for of, v in said["error"].items()},
+            "velocity": {of: _number(v) for of, v in said["velocity"].items()},
+            "numerical": _number(said["numerical"]),
+        }
+    )
+
+
+def _truth(said: Mapping[str, Any]) -> Truth:
+    return Truth(
+        **{
+            **said,
+            "label": Label(**said["label"]),
+            "error": _number(said["error"]),
+            "velocity": _number(said["velocity"]),
+        }
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)

@@ -1,0 +1,137 @@
+"""Every rung's answer on one response beside the two truths: n-p-q, waveform, impact speeds.
+
+``board``: the nominal circuit on the rung ``full`` at its finest step. ``equations``: the exact
+flow of the model. What follows from the differences is for ``fidelity.trade_study`` to say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.fidelity.label import Label
+from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, Answer
+from designer.yields.exact_rung import images, waveform_error
+
+BOARD, EQUATIONS = "board", "equations"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One rung at one setting on one response.
+
+    response : n-p-q or status. seconds : CPU time of a drive period. gate : whether ngspice's
+    setting passed the numerics gate; None of what ngspice does not compute.
+    right : whether its n-p-q is the truth's (either twin), by truth. error : RMS difference of x1
+    over its peak; velocity : largest relative difference of an impact's velocity; both by truth,
+    nan where they do not apply. numerical : error against the exact flow of the rung's own
+    equations, or where there is none its own finest run; nan for what it is measured against.
+    """
+
+    label: Label
+    rung: str
+    level: str
+    settings: Mapping[str, Any]
+    response: str
+    reason: str
+    seconds: float
+    gate: bool | None
+    right: Mapping[str, bool]
+    error: Mapping[str, float]
+    velocity: Mapping[str, float]
+    numerical: float
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The board's. response : n-p-q or status. sure : whether its two finest steps show the same.
+    error, velocity : what they differ by. periodic : whether it has a period, impacts : and any
+    impacts in it, by truth."""
+
+    label: Label
+    response: str
+    sure: bool
+    error: float
+    velocity: float
+    periodic: Mapping[str, bool]
+    impacts: Mapping[str, bool]
+
+
+def compare(label: Label, some: Sequence[Answer]) -> tuple[tuple[Compared, ...], Truth]:
+    """The answers to one response beside both truths, and the board's."""
+    exact = next(a for a in some if a.rung == MODEL)
+    top = [a for a in some if a.rung == TOP]
+    if len(top) < 2:  # without a run nothing is sure
+        last, drawn = Orbit(OrbitStatus.FAILED), np.zeros(0)
+        sure, error, velocity = False, math.nan, math.nan
+    else:
+        last, drawn = top[-1].orbit, top[-1].shown
+        sure = alike(top[-2].orbit, last)
+        error, velocity = _waveform(top[-2].shown, drawn), difference(top[-2].orbit, last)
+    against = {BOARD: (last, drawn), EQUATIONS: (exact.orbit, exact.shown)}
+    rows = tuple(
+        Compared(
+            label,
+            a.rung,
+            a.level,
+            a.settings,
+            a.orbit.response,
+            a.reason,
+            a.seconds,
+            a.gate,
+            {of: alike(a.orbit, orbit) for of, (orbit, _) in against.items()},
+            {of: _waveform(a.shown, shown) for of, (_, shown) in against.items()},
+            {of: difference(a.orbit, orbit) for of, (orbit, _) in against.items()},
+            _numerical(a, some),
+        )
+        for a in some
+    )
+    periodic = {of: o.status is OrbitStatus.PERIODIC for of, (o, _) in against.items()}
+    impacts = {of: periodic[of] and o.p + o.q > 0 for of, (o, _) in against.items()}
+    return rows, Truth(label, last.response, sure, error, velocity, periodic, impacts)
+
+
+def difference(first: Orbit, second: Orbit) -> float:
+    """Largest difference of the impacts' speeds on a stop, over the second orbit's fastest there,
+    side by side in order of size; nan where the counts differ or an orbit has no period. A twin
+    counts as the same: sides may be exchanged."""
+    if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
+        return math.nan
+    best = math.nan
+    for turn in (1.0, -1.0):
+        worst = 0.0
+        for side in (1.0, -1.0):
+            a = np.sort(np.abs(first.impact_velocities[first.impact_sides == side]))
+            b = np.sort(np.abs(second.impact_velocities[second.impact_sides == turn * side]))
+            if len(a) != len(b):
+                worst = math.nan
+                break
+            if len(a):
+                worst = max(worst, float((np.abs(a - b) / b.max()).max()))
+        best = worst if math.isnan(best) else min(best, worst) if worst == worst else best
+    return best
+
+
+def alike(first: Orbit, second: Orbit) -> bool:
+    """Whether two orbits are the same n-p-q, either twin; both without a period are alike too."""
+    if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
+        return first.status is second.status and first.status is OrbitStatus.APERIODIC
+    return first.n == second.n and sorted((first.p, first.q)) == sorted((second.p, second.q))
+
+
+def _numerical(answer: Answer, some: Sequence[Answer]) -> float:
+    own = {RK4: MODEL, "ideal": CIRCUIT}.get(answer.rung, answer.rung)
+    finest = [a for a in some if a.rung == own][-1]
+    return math.nan if finest is answer else _waveform(answer.shown, finest.shown)
+
+
+def _waveform(shown: Array, wanted: Array) -> float:
+    if not len(wanted):
+        return math.nan
+    return waveform_error(shown, images(wanted, mirror=True))

@@ -1,0 +1,272 @@
+"""Every rung on one response of a design: its answer at several steps, and what a period costs.
+
+The rungs, by what they compute: the model (fixed-step Runge-Kutta as the paper's baseline, and the
+exact flow), the nominal circuit by the exact flow, and ngspice with ideal op-amps, with bandwidth
+and slew (``dynamic``), with a macromodel (``full``). The largest step of ngspice is a fraction of
+the period that follows the shortest contact (``numerics_gate.first_steps``): "step ×1, reltol
+1e-05" is what the numerics gate tries first, "step ×4" four times that step, so coarser. The
+tolerance goes with the step, for beside a tight one ngspice takes the small steps anyway. Of each
+setting it is said whether it passes the gate (``fidelity.gate``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.check.synthesis_result import Synthesis
+from designer.circuit import nominal
+from designer.circuit.ensemble import displacement
+from designer.circuit.netlist import Excitation
+from designer.circuit.nominal import on_circuit
+from designer.dynamics.flow import Flow
+from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.fidelity import gate as trade_gate
+from designer.fidelity import runge_kutta
+from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
+from designer.fidelity.gate import Run
+from designer.model.find_responses import ModelResponse
+from designer.model.model import Dimensionless
+from designer.spice import numerics_gate as gate
+from designer.spice.deck import SolverSettings
+from designer.spice.numerics_gate import Subject
+from designer.spice.opamp_model import RUNGS as SPICE_RUNGS
+from designer.spice.opamp_model import Rung
+from designer.spice.pool import SpicePool
+from designer.spice.read_orbit import Read, Reading, read
+from designer.spice.simulator import SimulationFailed, Waveforms
+
+RK4, MODEL, CIRCUIT = "rk4", "model", "circuit"
+RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS)
+TOP: Rung = "full"
+"""The most faithful rung."""
+LEVELS = ((4.0, 1e-3), (2.0, 1e-4), (1.0, gate.RELTOL), (0.5, 0.1 * gate.RELTOL))
+"""ngspice's largest step over the one that the gate tries first, and its relative tolerance."""
+STEPS = (0.04, 0.02, 0.01, runge_kutta.PAPERS_STEP)
+"""Of Runge-Kutta, in dimensionless time."""
+SETTLED = 40
+"""Drive periods of Runge-Kutta before it is judged, from the exact orbit."""
+TIMED = 8
+"""Drive periods of a timed run of ngspice."""
+ROUNDS = 3
+BASELINE = 4
+"""Periods of a timed run of Runge-Kutta and of the exact flow, at least."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one rung at one setting says of a response.
+
+    level : names the setting alike for all responses. settings : of the solver. orbit : in model
+    units as far as it is used: n-p-q, status, impacts. shown : (n · POINTS,) first displacement in
+    model units; empty where there is none. seconds : CPU time of a drive period. reason : why there
+    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs.
+    """
+
+    rung: str
+    level: str
+    settings: dict[str, Any]
+    orbit: Orbit
+    shown: Array
+    seconds: float = float("nan")
+    reason: str = ""
+    gate: bool | None = None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A response on every rung.
+
+    subject : its nominal circuit. settings : those of ngspice with ideal op-amps that pass the
+    gate; None where none do. seconds : CPU time of a drive period at these, nan without.
+    """
+
+    response: ModelResponse
+    subject: Subject
+    answers: tuple[Answer, ...]
+    settings: SolverSettings | None
+    seconds: float
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A response with what ngspice and the exact flow need of it."""
+
+    response: ModelResponse
+    model: Dimensionless
+    volts: Array
+    subject: Subject
+
+
+def subject(made: Synthesis, r: ModelResponse) -> Subject:
+    """The nominal circuit of a design, on the orbit that this response has there."""
+    reduction = nominal.nominal_reduction(made.design)
+    scales = made.design.errors.scales
+    excitation = Excitation(scales.frequency(r.omega), made.design.amplitude(r.b))
+    return Subject(reduction, excitation, on_circuit(reduction.system(), made.design, r))
+
+
+def measured(
+    made: Synthesis,
+    r: ModelResponse,
+    pool: SpicePool,
+    clock: SpiceClock,
+    *,
+    levels: Sequence[tuple[float, float]] = LEVELS,
+    rounds_: int = ROUNDS,
+) -> Measured:
+    """What every rung says of a response of the design, and what it costs.
+
+    pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
+    """
+    one = subject(made, r)
+    asked = _Asked(r, replace(made.design.model, b=r.b), made.design.volts(r.b), one)
+    entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
+    entrants = [entrant for _, entrant in entries]
+    settings = None
+    if one.orbit.status is OrbitStatus.PERIODIC:
+        (word,) = gate.check(pool, [one])
+        settings = word.settings if word.passed else None
+    if settings is not None:
+        entrants.append(_timed(one, settings, clock))
+    seconds = [float(s) for s in np.median(rounds(entrants, rounds_), axis=0)]
+    answers = tuple(
+        replace(answer, seconds=s)
+        for (answer, _), s in zip(entries, seconds[: len(entries)], strict=True)
+    )
+    return Measured(r, one, answers, settings, seconds[-1] if settings else float("nan"))
+
+
+def _exact(asked: _Asked) -> Iterator[tuple[Answer, Entrant]]:
+    """Runge-Kutta at its steps, and both exact flows."""
+    r, model, omega = asked.response, asked.model, asked.response.omega
+    flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
+    start = r.orbit.start
+    for step in STEPS:
+        steps = max(1, round(flow.drive.period / step / POINTS)) * POINTS
+        answer = Answer(
+            RK4,
+            f"Δt = {step:g}",
+            {"steps_a_period": steps},
+            *_runge_kutta(model, r, steps),
+        )
+        yield (
+            answer,
+            here(RK4, lambda n, s=steps: runge_kutta.run(model, omega, start, n, s), BASELINE),  # type: ignore[misc]
+        )
+    yield (
+        Answer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
+        here(MODEL, lambda n: flow.run(start, n), BASELINE),
+    )
+    own, subject = asked.subject.orbit, asked.subject
+    on = Flow(subject.system, subject.excitation.drive)
+    begin = own.start if len(own.start) else np.zeros(on.system.size)
+    yield (
+        Answer(
+            CIRCUIT,
+            "exact",
+            {},
+            _in_model_units(own, asked.volts),
+            _drawn(on, own, float(asked.volts[0])),
+        ),
+        here(CIRCUIT, lambda n: on.run(begin, n), BASELINE),
+    )
+
+
+def _runge_kutta(model: Dimensionless, r: ModelResponse, steps: int) -> tuple[Orbit, Array]:
+    """The orbit that Runge-Kutta settles on, read off as ngspice's are, and its displacement."""
+    n = r.orbit.n or MAX_PERIOD
+    x = runge_kutta.run(model, r.omega, r.orbit.start, SETTLED * n, steps)
+    states = runge_kutta.trace(model, r.omega, x, 4 * n, steps, steps)
+    period = 2.0 * np.pi / r.omega
+    time = np.arange(len(states)) * period / steps
+    names = tuple(f"x{i}" for i in range(4))
+    signals = dict(zip(names, states.T, strict=True)) | {"u": np.sin(r.omega * time)}
+    positions = {p for stop in model.second_order().clearances for p in stop.positions}
+
+    def row(side: int) -> Array | None:
+        return np.array([side, 0.0, 0.0, 0.0, 0.0, -model.b]) if side in positions else None
+
+    reading = Reading(period, 0, names, np.zeros(4), row(1), row(-1), "u", 0, keep=True)
+    found = read(Waveforms(time, signals, "", 0.0), reading)
+    return found.orbit, _traced(found, 1.0)
+
+
+def _spice(
+    asked: _Asked, pool: SpicePool, clock: SpiceClock, levels: Sequence[tuple[float, float]]
+) -> Iterator[tuple[Answer, Entrant]]:
+    subject = asked.subject
+    if not len(subject.orbit.start):
+        return
+    contact = gate.shortest_contact(subject.orbit, subject.system, subject.excitation)
+    first = gate.first_steps(subject, contact)
+    on = gate.warmed(pool, [replace(subject, rung=rung) for rung in SPICE_RUNGS])
+    ladder = [(max(1, round(first / factor)), reltol) for factor, reltol in levels]
+    names = [f"step ×{factor:g}, reltol {reltol:g}" for factor, reltol in levels]
+    asks: list[tuple[Subject, int, SolverSettings]] = []
+    for one in on:
+        for k, own in enumerate(ladder):
+            settings = _own(one, own)
+            asks.append((one, k, settings))
+            asks += [(one, k, other) for other in trade_gate.companions(settings)]
+    jobs = [gate.job(one, said, keep=said == _own(one, ladder[k])) for one, k, said in asks]
+    heard = dict(pool.map(jobs))
+    runs: dict[tuple[Rung, int], list[Run]] = {}
+    for i, (one, k, _) in enumerate(asks):
+        runs.setdefault((one.rung, k), []).append(heard[i])
+    for one in on:
+        for k, own in enumerate(ladder):
+            settings = _own(one, own)
+            found, half, gear = runs[one.rung, k]
+            passed = trade_gate.passed(one, found, (half, gear))
+            entrant = _timed(one, settings, clock)
+            said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
+            said["discarded_periods"] = one.discard
+            if isinstance(found, SimulationFailed):
+                orbit, shown = Orbit(OrbitStatus.FAILED, reason=found.reason), np.zeros(0)
+            else:
+                orbit = _in_model_units(found.orbit, asked.volts)
+                shown = _traced(found, float(asked.volts[0]))
+            yield (
+                Answer(one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
+                entrant,
+            )
+
+
+def _own(subject: Subject, ladder: tuple[int, float]) -> SolverSettings:
+    """Settings of so many steps a period and this tolerance."""
+    steps, reltol = ladder
+    return SolverSettings("trap", subject.period / steps, reltol)
+
+
+def _timed(subject: Subject, settings: SolverSettings, clock: SpiceClock) -> Entrant:
+    """A short run from the orbit, for its time."""
+    least = TIMED - 4 * (subject.orbit.n or MAX_PERIOD)
+    short = replace(subject, discard=max(least, 0))
+    return clock.entrant(subject.rung, gate.job(short, settings), gate.length(short))
+
+
+def _in_model_units(orbit: Orbit, volts: Array) -> Orbit:
+    return replace(orbit, impact_velocities=orbit.impact_velocities / volts[1])
+
+
+def _drawn(flow: Flow, orbit: Orbit, volts: float) -> Array:
+    if orbit.status is not OrbitStatus.PERIODIC:
+        return np.zeros(0)
+    return displacement(flow, orbit) / volts
+
+
+def _traced(found: Read, volts: float) -> Array:
+    """(n · POINTS,) first displacement of a run's last n periods."""
+    if not found.orbit.n or found.trace is None:
+        return np.zeros(0)
+    time, states = found.trace
+    count = found.orbit.n * POINTS
+    grid = time[-1] * np.arange(count) / count
+    return np.asarray(np.interp(grid, time, states[:, 0])) / volts

@@ -1,0 +1,310 @@
+"""What a trade is told in: JSON by the keys of docs/contract.md, a table, and the front."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from designer.base.figure_style import CIRCUIT, GRID, MUTED, NGSPICE, new_figure, styled
+from designer.base.figure_style import MODEL as OF_THE_MODEL
+from designer.base.plain_json import FORMAT, plain
+from designer.fidelity.rung_errors import BOARD, EQUATIONS, Compared, Truth
+from designer.fidelity.rungs import RUNGS
+from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
+from designer.fidelity.yields import BoardTrade, LeftOut
+
+TITLES = {
+    "rk4": "model, Runge-Kutta",
+    "model": "model, exact",
+    "circuit": "circuit, exact",
+    "ideal": "ngspice, ideal op-amps",
+    "dynamic": "ngspice, bandwidth and slew",
+    "full": "ngspice, full op-amps",
+}
+_LOOKS = {
+    "rk4": ("#0072b2", "s"),
+    "model": (OF_THE_MODEL, "o"),
+    "circuit": (CIRCUIT, "o"),
+    "ideal": ("#e6a817", "^"),
+    "dynamic": (NGSPICE, "D"),
+    "full": ("#8c1c13", "v"),
+}
+
+
+def trade_json(
+    found: Trade, provenance: Mapping[str, Any], seconds: float, title: str
+) -> dict[str, Any]:
+    """``rungs``, ``cheapest``, ``truths``, ``boards`` and ``left_out``."""
+    boards = [r.boards for r in found.responses]
+    document = {
+        "format": FORMAT,
+        "title": title,
+        "rungs": [_row(row) for r in found.responses for row in r.rows],
+        "truths": [_truth(r.truth) for r in found.responses],
+        "boards": [_boards(b) for b in boards if isinstance(b, BoardTrade)],
+        "left_out": [
+            {**b.label.as_dict(), "reason": b.reason} for b in boards if isinstance(b, LeftOut)
+        ],
+        "cheapest": [_cheapest(c) for c in found.cheapest],
+        "provenance": dict(provenance),
+        "cost": {"seconds": seconds},
+    }
+    return dict(plain(document))
+
+
+def _row(row: Compared) -> dict[str, Any]:
+    return {
+        **row.label.as_dict(),
+        "rung": row.rung,
+        "level": row.level,
+        "settings": row.settings,
+        "response": row.response,
+        "reason": row.reason,
+        "gate": row.gate,
+        "right": dict(row.right),
+        "error": row.error[BOARD],
+        "error_of_equations": row.error[EQUATIONS],
+        "impact_velocity_error": row.velocity[BOARD],
+        "impact_velocity_error_of_equations": row.velocity[EQUATIONS],
+        "numerical_error": row.numerical,
+        "seconds_per_period": row.seconds,
+    }
+
+
+def _truth(truth: Truth) -> dict[str, Any]:
+    return {
+        **truth.label.as_dict(),
+        "response": truth.response,
+        "sure": truth.sure,
+        "uncertainty": truth.error,
+        "impact_velocity_uncertainty": truth.velocity,
+        "periodic": dict(truth.periodic),
+        "impacts": dict(truth.impacts),
+    }
+
+
+def _boards(b: BoardTrade) -> dict[str, Any]:
+    difference, low, high = b.difference
+    counts = {k: v for k, v in b.__dict__.items() if k not in ("label", "seconds")}
+    return {
+        **b.label.as_dict(),
+        **counts,
+        "difference": difference,
+        "low": low,
+        "high": high,
+        "seconds_per_board": b.seconds,
+    }
+
+
+def _cheapest(c: Cheapest) -> dict[str, Any]:
+    label = dict.fromkeys(("number", "omega", "b", "expected"))
+    return {
+        **(label if c.label is None else c.label.as_dict()),
+        "question": c.question,
+        "of": c.of,
+        "rung": c.rung,
+        "level": c.level,
+        "bound": c.bound,
+        "measured": c.measured,
+        "shown": c.shown,
+        "seconds": c.seconds,
+        "note": c.note,
+    }
+
+
+def name(row: Mapping[str, Any]) -> str:
+    """A response as people are told of it: its number, ω and b."""
+    return f"{row['number']}: ω = {row['omega']:g}, b = {row['b']:g}"
+
+
+def sheet(answer: Mapping[str, Any]) -> str:
+    """trade.md: the cheapest rung for each question, then every rung, from the JSON object."""
+    lines = [
+        f"# Time and error: {answer['title']}",
+        "",
+        f"Made by `designer trade` with `--boards {_boards_asked(answer)} --seed "
+        f"{answer['provenance']['seed']}`; the data are in `trade.json`.",
+        "",
+        "The cheapest rung and setting that answers each question, for all responses together, and "
+        "against what its error is measured: `board` is the nominal circuit with full op-amps in "
+        "ngspice at the finest step, `equations` the exact flow of the model, `ideal` ngspice with "
+        "ideal op-amps on the same boards. Where the bound is not kept by any rung, the one that "
+        "comes nearest is named. A setting of ngspice that did not pass the numerics gate is never "
+        "named; the board itself is, by what its two finest steps differ by, where nothing less "
+        "will do.",
+        "",
+        "| question | against | rung | setting | measured | kept | CPU seconds | |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    alone = len(answer["truths"]) == 1
+    lines += [_answered(c) for c in answer["cheapest"] if c["number"] is None or alone]
+    lines += [
+        "",
+        "Seconds are of one drive period of each response, for yields of one board of each. "
+        "Measured is the largest error with the uncertainty of what it is measured against, or the "
+        "number of responses with another n-p-q.",
+        "",
+        "## By response",
+        "",
+        "Error of x₁ (RMS over its peak) against the board, and CPU milliseconds of a drive period;"
+        " another n-p-q than the board's is named. `step ×4` is four times the step that the gate "
+        "tries first, so coarser; `step ×0.5` is finer.",
+        "",
+    ]
+    kinds = list(dict.fromkeys((row["rung"], row["level"]) for row in answer["rungs"]))
+    heads = [f"{name(t)}: {t['response']}" for t in answer["truths"]]
+    lines += ["| rung | setting | " + " | ".join(heads) + " |", "|---" * (2 + len(heads)) + "|"]
+    by = {(row["rung"], row["level"], row["number"]): row for row in answer["rungs"]}
+    for rung, level in kinds:
+        cells = [_cell(by.get((rung, level, t["number"]))) for t in answer["truths"]]
+        lines.append(f"| {TITLES[rung]} | {level} | {' | '.join(cells)} |")
+    if answer["boards"]:
+        lines += [
+            "",
+            "## Boards",
+            "",
+            "Yield of the exact circuit less that of ngspice with ideal op-amps on the boards that "
+            "both decided, with its 95 % interval. The interval holds for all boards that were "
+            "asked: those that one of them left undecided count as ok on the exact circuit alone "
+            "for its upper end, and in ngspice alone for its lower end.",
+            "",
+            "| response | boards | ok | only exact | only ngspice | undecided | difference |"
+            " interval |",
+            "|---|---|---|---|---|---|---|---|",
+        ]
+        lines += [
+            f"| {name(b)} | {b['boards']} | {b['ok']} | {b['lost']} | {b['gained']} | "
+            f"{b['undecided']} | {_percent(b['difference'])} | {_percent(b['low'])} to "
+            f"{_percent(b['high'])} |"
+            for b in answer["boards"]
+        ]
+    if answer["left_out"]:
+        lines += ["", "No boards were asked of:", ""]
+        lines += [f"- {name(row)}: {row['reason']}" for row in answer["left_out"]]
+    return "\n".join(lines) + "\n"
+
+
+def _boards_asked(answer: Mapping[str, Any]) -> int:
+    return int(answer["provenance"]["settings"]["trade"]["boards"])
+
+
+def _answered(c: Mapping[str, Any]) -> str:
+    start = f"| {c['question']} | {c['of']} |"
+    if c["rung"] is None:
+        kept = "–" if c["shown"] is None else "no"
+        return f"{start} – | – | – | {kept} | – | {c['note']} |"
+    kept = "yes" if c["shown"] else "no"
+    return (
+        f"{start} {TITLES[c['rung']]} | {c['level']} | {_measured(c)} | {kept} | "
+        f"{_short(c['seconds'])} | {c['note']} |"
+    )
+
+
+def _measured(c: Mapping[str, Any]) -> str:
+    if c["measured"] is None:
+        return "–"
+    return f"{c['measured']:.0f} wrong" if c["question"] == RESPONSE else _percent(c["measured"])
+
+
+def _cell(row: Mapping[str, Any] | None) -> str:
+    if row is None:
+        return "–"
+    error = _percent(row["error"]) if row["right"][BOARD] else row["response"]
+    seconds = row["seconds_per_period"]
+    said = f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
+    return f"{said} (gate not passed)" if row["gate"] is False else said
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None else f"{100.0 * value:.2g} %"
+
+
+def _short(value: float | None) -> str:
+    """To two figures, without an exponent where it need not be."""
+    if value is None:
+        return "–"
+    return f"{float(f'{value:.2g}'):.10g}"
+
+
+KEYS = {"trade": "error", "trade-numerics": "numerical_error"}
+"""Pictures, and which error each shows."""
+_AXES = {
+    "error": "RMS error of x₁ / peak,\nagainst the board",
+    "numerical_error": "RMS error of x₁ / peak, against\nthe rung's own equations",
+}
+_PALE = 0.3
+"""Opacity of what did not pass the gate."""
+
+
+@styled
+def front(answer: Mapping[str, Any], key: str = "error") -> Figure:
+    """Error over the time of a drive period, a panel for each response; hollow where the n-p-q is
+    not the board's, pale where ngspice's setting did not pass the gate. What the error is measured
+    against is not shown.
+
+    key : "error", against the board, where a line joins what no other rung beats in both; or
+    "numerical_error", against the exact flow of the rung's own equations, or its finest run, so
+    that rungs do not compete.
+    """
+    truths = answer["truths"]
+    columns = min(3, len(truths))
+    rows = -(-len(truths) // columns)
+    figure = new_figure(max(3.3 * columns, 7.2), 2.7 * rows + 0.9)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+    for axes in grid[len(truths) :]:
+        axes.set_visible(False)
+    # Neither none nor exactly 0: those are not on the axes.
+    shown = [row for row in answer["rungs"] if row[key] and row["seconds_per_period"]]
+    for i, (axes, truth) in enumerate(zip(grid, truths, strict=False)):
+        _panel(axes, [row for row in shown if row["number"] == truth["number"]], key)
+        axes.set_title(f"{name(truth)}: {truth['response']}", loc="left")
+        if i % columns == 0:
+            axes.set_ylabel(_AXES[key])
+        if i + columns >= len(truths):
+            axes.set_xlabel("CPU seconds of a drive period")
+            axes.tick_params(labelbottom=True)  # also where the row below is not full
+    used = [r for r in RUNGS if any(row["rung"] == r for row in shown)]
+    handles = [_mark(*_LOOKS[r], TITLES[r]) for r in used]
+    if any(not row["right"][BOARD] for row in shown):
+        handles.append(_mark(MUTED, "o", "hollow: another n-p-q", mfc="white"))
+    if any(row["gate"] is False for row in shown):
+        handles.append(_mark(MUTED, "o", "pale: gate not passed", alpha=_PALE))
+    if key == "error":
+        handles.append(Line2D([], [], color=MUTED, lw=0.9, label="front"))
+    handles.append(Line2D([], [], color=MUTED, lw=0.9, ls=(0, (4, 2)), label="0.1 %"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _mark(colour: str, marker: str, label: str, **look: Any) -> Line2D:
+    return Line2D([], [], ls="", marker=marker, color=colour, ms=5, label=label, **look)
+
+
+def _panel(axes: Axes, rows: Sequence[Mapping[str, Any]], key: str) -> None:
+    points = []
+    for row in rows:
+        colour, marker = _LOOKS[row["rung"]]
+        right, passed = row["right"][BOARD], row["gate"] is not False
+        at = row["seconds_per_period"], row[key]
+        face, alpha = colour if right else "white", None if passed else _PALE
+        axes.plot(*at, ls="", marker=marker, ms=5, color=colour, mfc=face, alpha=alpha, zorder=3)
+        if right and passed:
+            points.append(at)
+    line: list[tuple[float, float]] = []
+    for at in sorted(points):
+        if not line or at[1] < line[-1][1]:
+            line.append(at)
+    if key == "error" and line:
+        axes.plot([p[0] for p in line], [p[1] for p in line], color=MUTED, lw=0.9, zorder=2)
+    axes.axhline(WAVEFORM, color=MUTED, lw=0.9, ls=(0, (4, 2)), zorder=1)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    axes.grid(True, color=GRID, lw=0.6)

@@ -1,0 +1,210 @@
+"""The question of boards: how far the exact circuit's yield is from ngspice's on the same boards.
+
+Boards of the model file's spread, started on the nominal orbit, each by both engines. Where they
+differ by D = +1 or -1 a board, the mean of D is the error of the exact circuit's yield. Its 95 %
+interval joins the Wilson limits of both shares with their correlation (Zou and Donner, Statistics
+in Medicine 27, 2008, 1693): boards without any difference still leave room for one. Boards that an
+engine has no answer to are asked all the same, and may differ either way: D = +1 on each for the
+upper end, -1 for the lower one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+
+from designer.base.proportion import wilson
+from designer.check.checked_design import Checked
+from designer.check.synthesis_result import Synthesis
+from designer.dynamics.orbit import OrbitStatus
+from designer.fidelity import rungs
+from designer.fidelity.label import Label
+from designer.spice.deck import SolverSettings
+from designer.spice.pool import SpicePool
+from designer.yields import exact_rung, study_plan
+from designer.yields.ngspice_runs import hear
+from designer.yields.ngspice_sampling import Ask, Kind, Why
+from designer.yields.verdict import StudyPlan, Verdict
+
+BOARDS = 400
+"""Boards of each response: with no difference at all, fewer leave room for more than 1 %."""
+REFINEMENTS = 3
+"""How often ngspice's step is halved for a board at most: further than in a study, for here ngspice
+is what is measured against, and what it leaves open widens the interval both ways."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A response of which no boards were asked, and why."""
+
+    label: Label
+    reason: str
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts of boards, which add up.
+
+    decided : by both engines. ok : by the exact circuit. gained, lost : boards that only ngspice
+    calls ok, and that only the exact circuit does. undecided : boards of which one of them does not
+    say whether they show the response. runs, periods : of ngspice, and their drive periods.
+    seconds : CPU time of the exact circuit.
+    """
+
+    decided: int = 0
+    ok: int = 0
+    gained: int = 0
+    lost: int = 0
+    undecided: int = 0
+    runs: int = 0
+    periods: float = 0.0
+    seconds: float = 0.0
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class BoardTrade:
+    """One response on its boards; see ``Tally``.
+
+    boards : that both engines decided. periods : drive periods of ngspice for a board, mean.
+    seconds : CPU time of a board, by rung.
+    """
+
+    label: Label
+    boards: int
+    ok: int
+    gained: int
+    lost: int
+    undecided: int
+    periods: float
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, label: Label, tally: Tally, spice: float) -> BoardTrade:
+        """spice : CPU time of a drive period of ngspice at the gate's settings."""
+        asked = tally.decided + tally.undecided
+        periods = tally.periods / tally.runs if tally.runs else math.nan
+        exactly = tally.seconds / asked if asked else math.nan
+        return cls(
+            label,
+            tally.decided,
+            tally.ok,
+            tally.gained,
+            tally.lost,
+            tally.undecided,
+            periods,
+            {"circuit": exactly, "ideal": periods * spice},
+        )
+
+    @property
+    def asked(self) -> int:
+        """Boards, decided or not."""
+        return self.boards + self.undecided
+
+    @property
+    def difference(self) -> tuple[float, float, float]:
+        """Exact circuit's yield less ngspice's on the boards that both decided, and the 95 %
+        interval that holds however the undecided ones would have turned out."""
+        d = (self.lost - self.gained) / self.boards if self.boards else math.nan
+        _, high = _interval(self.lost + self.undecided, self.gained, self.asked)
+        low, _ = _interval(self.lost, self.gained + self.undecided, self.asked)
+        return d, low, high
+
+    @property
+    def bound(self) -> float:
+        """How large the difference may be."""
+        _, low, high = self.difference
+        return max(abs(low), abs(high))
+
+    def off(self, bound: float) -> bool:
+        """Whether the yields are shown to differ by more than this."""
+        _, low, high = self.difference
+        return low > bound or high < -bound
+
+
+def question(
+    made: Synthesis,
+    number: int,
+    settings: SolverSettings | None,
+    *,
+    samples: int,
+    seed: int,
+) -> StudyPlan | str:
+    """The study of response ``number`` alone; where it can be no question of one, why not.
+
+    settings : of ngspice, those that passed the gate.
+    """
+    response = made.found[number - 1]
+    if not response.found:
+        return "the model does not show it"
+    nominal = rungs.subject(made, response)
+    if nominal.orbit.status is not OrbitStatus.PERIODIC:
+        return f"the nominal circuit is {nominal.orbit.response}"
+    if settings is None:
+        return "the numerics gate did not pass"
+    checked = Checked(response, nominal.orbit, nominal.excitation, None)
+    plan = study_plan.plan_study(
+        made.modelfile, made.design, [checked], made.catalog, samples=samples, seed=seed
+    )
+    (asked,) = plan.questions
+    return replace(plan, questions=(replace(asked, settings=settings),))
+
+
+def tally(
+    plan: StudyPlan,
+    samples: range,
+    pool: SpicePool,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> Tally:
+    """These boards of a study of one response, by both engines; progress : called once a board."""
+    exact_rung.block(plan, samples[:1], jobs)  # what is compiled on the way is no cost of a board
+    began = time.process_time()
+    answers = exact_rung.block(plan, samples, jobs)
+    seconds = time.process_time() - began
+    asks = [Ask(a.sample, 0, Kind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED]
+    hearings = hear(plan, asks, pool, jobs, progress, refinements=REFINEMENTS)
+    heard = {h.sample: h for h in hearings}
+    asked = plan.questions[0]
+    both = []
+    for answer in answers:
+        hearing = heard.get(answer.sample)
+        said = None if hearing is None else hearing.survives(asked)
+        if answer.verdict in (Verdict.OK, Verdict.LOST) and said is not None:
+            both.append((answer.verdict is Verdict.OK, said))
+    # The first run of each; too long a way is none.
+    periods = [h.periods + 4 * max(asked.start.n, 1) for h in heard.values() if h.response]
+    return Tally(
+        decided=len(both),
+        ok=sum(mine for mine, _ in both),
+        gained=sum(theirs and not mine for mine, theirs in both),
+        lost=sum(mine and not theirs for mine, theirs in both),
+        undecided=len(answers) - len(both),
+        runs=len(periods),
+        periods=float(sum(periods)),
+        seconds=seconds,
+    )
+
+
+def _interval(lost: int, gained: int, n: int) -> tuple[float, float]:
+    """95 % interval of the difference of two yields on the same n boards."""
+    if n == 0:
+        return -1.0, 1.0
+    up, down = lost / n, gained / n
+    (up_low, up_high), (down_low, down_high) = wilson(lost, n), wilson(gained, n)
+    # A board counts for one share at most: they go against each other.
+    rest = (1.0 - up) * (1.0 - down)
+    against = math.sqrt(up * down / rest) if rest > 0.0 else 1.0
+    d = up - down
+    return (
+        d - _joined(up - up_low, down_high - down, against),
+        d + _joined(up_high - up, down - down_low, against),
+    )
+
+
+def _joined(a: float, b: float, against: float) -> float:
+    return math.sqrt(a * a + b * b + 2.0 * against * a * b)

@@ -1,0 +1,129 @@
+"""What to set on the bench: the generator for each response, and the scale card."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from designer.base.csv_tables import csv_text
+from designer.check import checked_design
+from designer.circuit.design import Design, settings
+from designer.dynamics.orbit import OrbitStatus
+from designer.model.find_responses import ModelResponse
+from designer.model.model import STATES
+from designer.model.model_file import ModelFile
+from designer.yields import study_plan
+from designer.yields.start_recipe import Recipe, hertz, volts
+from designer.yields.start_recipe_search import find_recipes
+
+if TYPE_CHECKING:
+    from designer.check.synthesis_result import Synthesis
+
+COLUMNS = (
+    "omega",
+    "expect",
+    "frequency_hz",
+    "amplitude_v_peak",
+    "amplitude_vpp",
+    "offset_v",
+    "load",
+    "start",
+)
+LOAD = "high-Z"
+NO_RECIPE = "none: the nominal circuit does not show the wanted response"
+
+
+def setup_csv(
+    design: Design, found: Sequence[ModelResponse], recipes: Sequence[Recipe | None]
+) -> str:
+    """``setup.csv``, in digits that a generator takes; ``design.json`` has all of them.
+
+    recipes : how to start each response; None where the nominal circuit does not show it.
+    """
+    rows = [
+        {
+            "omega": repr(s.omega),
+            "expect": s.expect or "",
+            "frequency_hz": hertz(s.frequency_hz),
+            "amplitude_v_peak": volts(s.amplitude_v_peak),
+            "amplitude_vpp": repr(2.0 * float(volts(s.amplitude_v_peak))),
+            "offset_v": repr(s.offset_v),
+            "load": LOAD,
+            "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
+        }
+        for s, r, recipe in zip(settings(design, found), found, recipes, strict=True)
+    ]
+    return csv_text(COLUMNS, rows)
+
+
+def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
+    """A start recipe for each response of a design, found on its circuit; None where the model or
+    the nominal circuit does not show it."""
+    checked = checked_design.check(made.design, made.found, None)
+    shown = [
+        i
+        for i, c in enumerate(checked)
+        if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
+    ]
+    plan = study_plan.plan_study(
+        made.modelfile,
+        made.design,
+        [checked[i] for i in shown],
+        made.catalog,
+        samples=1,  # neither this nor the seed matters to a recipe
+        seed=0,
+    )
+    known = dict(zip(shown, find_recipes(plan, jobs), strict=True))
+    return tuple(known.get(i) for i in range(len(checked)))
+
+
+def scales_csv(modelfile: ModelFile, design: Design, found: Sequence[ModelResponse]) -> str:
+    """``scales.csv``: what a volt and a second on the bench stand for.
+
+    A response that is wanted at a clearance of its own is driven harder or softer instead of
+    moving the threshold, so its volts stand for other lengths and have rows of their own.
+    """
+    scales, b0 = design.errors.scales, design.model.b
+    rows = [
+        ("model time per circuit second", 1.0 / scales.seconds, "1/s", b0),
+        ("circuit seconds per unit of model time", scales.seconds, "s", b0),
+    ]
+    if modelfile.mechanical is not None:
+        slow = modelfile.mechanical.time_scale / scales.seconds
+        rows.append(("mechanism seconds per circuit second", slow, "s/s", b0))
+    if design.circuit.stops:
+        rows.append(("threshold of contact", scales.threshold, "V", b0))
+        if abs(scales.offcentre) > 1e-9:
+            rows.append(("threshold of contact, lower stop", scales.threshold_lower, "V", b0))
+    for b in dict.fromkeys([b0, *(r.b for r in found)]):
+        rows += _amplitudes(modelfile, design, b)
+    return csv_text(
+        ("quantity", "value", "unit", "b"),
+        [{"quantity": q, "value": repr(float(v)), "unit": u, "b": repr(b)} for q, v, u, b in rows],
+    )
+
+
+def _amplitudes(
+    modelfile: ModelFile, design: Design, b: float
+) -> list[tuple[str, float, str, float]]:
+    volts = [float(v) for v in design.volts(b)]
+    gain = (b / design.model.b) * sum(float(g) for g in design.errors.drive_gain)
+    rows = [(f"volts per unit of {s}", v, "V", b) for s, v in zip(STATES, volts, strict=True)]
+    mechanical = modelfile.mechanical
+    if mechanical is None:
+        rows += [
+            (f"model units of {s} per volt", 1.0 / v, "1/V", b)
+            for s, v in zip(STATES, volts, strict=True)
+        ]
+        return [*rows, ("model force per generator volt", gain, "1/V", b)]
+    length, speed = mechanical.length_scale, mechanical.length_scale / mechanical.time_scale
+    for i, (s, v) in enumerate(zip(STATES, volts, strict=True)):
+        name = f"metres per volt of {s}" if i % 2 == 0 else f"metres per second per volt of {s}"
+        rows.append((name, (speed if i % 2 else length) / v, "m/s/V" if i % 2 else "m/V", b))
+    return [*rows, ("newtons per generator volt", gain * mechanical.force_scale, "N/V", b)]
+
+
+def _coexisting(response: ModelResponse) -> str:
+    """What other starts may end on."""
+    others = ", ".join(o.response for o in response.others)
+    return f"; other starts may end on {others}" if others else ""

@@ -1,0 +1,188 @@
+"""The verb ``bifurcation``: what is made of a request, what is written and in which order."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from designer.base.checks import cores
+from designer.base.design_folder import Folder, StageName
+from designer.base.errors import InputError
+from designer.base.plain_json import dumps, plain
+from designer.base.progress import Progress
+from designer.base.version import __version__
+from designer.bifurcations import basins, captions, parameter_map, sweep, window_ends
+from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.store import GridStore, SweepStore, work_hash
+from designer.bifurcations.sweep import SweepPlan
+from designer.catalog.catalog import load_catalog
+from designer.circuit.swept_board import BoardSubject, Subject
+from designer.jobs.bifurcation_request import Plan, Request, plan_of
+from designer.jobs.origin import provenance
+from designer.jobs.synthesise_job import read_design, source
+from designer.model.model_file import ModelFile, read_model_file
+from designer.model.swept_model import ModelSubject
+
+FORMAT = 1
+
+
+def answer(
+    path: Path, request: Request, out: Path | None, progress: Progress
+) -> tuple[dict[str, Any], bool]:
+    """The JSON object of the verb, and whether it was there already.
+
+    Raises
+    ------
+    InputError : the options do not fit together, a value lies outside its domain, or a file stands
+        in the way. Nothing is written then.
+    """
+    began = time.perf_counter()
+    modelfile, subject = _subject(path, request, progress)
+    plan = plan_of(request, subject, modelfile)
+    said = _provenance(modelfile, request, plan)
+    if out is None:
+        made, _ = _make(plan, request, modelfile.title, None, said, progress)
+        return {**made, "cost": {**made["cost"], "seconds": time.perf_counter() - began}}, False
+    folder = Folder(out)
+    inputs = {
+        "model": modelfile.sha256,
+        "version": __version__,
+        "subject": "circuit" if request.circuit else "model",
+        "work": work_hash(_decides(plan, request)),
+    }
+    if request.circuit:
+        inputs["catalogue"] = load_catalog().hash
+    wanted: dict[StageName, Any] = {request.kind: (inputs, _names(request.kind, plan))}
+    todo = folder.decide(wanted, overwrite=request.overwrite, resume=request.resume)
+    if todo:
+        kept = None if folder.manifest is None else folder.manifest.provenance
+        folder.begin(wanted, kept or said)
+        made, figure = _make(plan, request, modelfile.title, folder.path, said, progress)
+        progress.stage("pictures")
+        for name, content in _drawn(request.kind, figure()).items():
+            folder.write(name, content)
+        made["cost"]["seconds"] = time.perf_counter() - began
+        folder.write(f"{request.kind}.json", dumps(made))
+        folder.finish(request.kind)
+    return folder.json(f"{request.kind}.json"), not todo
+
+
+# ---------------------------------------------------------------------------------------------
+
+
+def _subject(path: Path, request: Request, progress: Progress) -> tuple[ModelFile, Subject]:
+    if path.is_dir():
+        if request.circuit:
+            made = read_design(path, progress=progress)
+            return made.modelfile, BoardSubject(made.design)
+        modelfile, _ = source(path, path)
+    else:
+        modelfile = read_model_file(path)
+        if request.circuit:
+            raise InputError(
+                path, "--circuit", "a model file", "a design folder (designer synthesise)"
+            )
+    return modelfile, ModelSubject(modelfile.model)
+
+
+def _decides(plan: Plan, request: Request) -> dict[str, Any]:
+    asked = {"points": request.points} if request.kind == "sweep" else {}
+    return {"kind": request.kind, **plan.as_dict(), **asked}
+
+
+def _provenance(modelfile: ModelFile, request: Request, plan: Plan) -> dict[str, Any]:
+    settings = {"bifurcation": _decides(plan, request)}
+    seed = 0 if request.starts is not None else None
+    return provenance(modelfile, load_catalog().hash, seed=seed, settings=settings)
+
+
+def _names(kind: StageName, plan: Plan) -> list[str]:
+    """Files of a stage."""
+    if isinstance(plan, SweepPlan):
+        blocks = [
+            SweepStore.name(track, k)
+            for track in plan.tracks
+            for k in range(len(plan.blocks(track)))
+        ]
+    else:
+        blocks = [GridStore.name(kind, row) for row in range(len(plan.ys))]
+    return [*blocks, f"{kind}.json", f"{kind}.png", f"{kind}.svg"]
+
+
+def _make(
+    plan: Plan,
+    request: Request,
+    name: str,
+    root: Path | None,
+    said: Mapping[str, Any],
+    progress: Progress,
+) -> tuple[dict[str, Any], Callable[[], Any]]:
+    """The JSON object, and what draws the picture."""
+    from designer.report import bifurcation_plots
+
+    jobs = cores() if request.jobs is None else request.jobs
+    work = work_hash(_decides(plan, request))
+    head = {"format": FORMAT, "kind": request.kind}
+    tail = {"provenance": said}
+    if isinstance(plan, SweepPlan):
+        store = None if root is None else SweepStore(root, plan.parameter, work, said)
+        blocks = sum(len(plan.blocks(t)) for t in plan.tracks)
+        made = sweep.run(plan, jobs, store, progress.stage(f"sweep over {plan.parameter}", blocks))
+        points = []
+        if request.points:
+            count = len(window_ends.windows(made))
+            step = progress.stage("bifurcation points", count)
+            points = window_ends.locate(made, jobs, step)
+        body = {
+            "parameter": plan.parameter,
+            "unit": plan.subject.units.get(plan.parameter, ""),
+            "tracks": list(plan.tracks),
+            "steps": len(plan.values),
+            "windows": [w.as_dict() for w in made.windows],
+            "points": [
+                {
+                    **p.as_dict(),
+                    "changes": [c.as_dict() for c in captions.changes(made, p)],
+                }
+                for p in points
+            ],
+        }
+        cost = {"periods": made.periods}
+        marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
+        return plain({**head, **body, **tail, "cost": cost}), lambda: bifurcation_plots.diagram(
+            made, marks, name
+        )
+    grid = None
+    if root is not None:
+        grid = GridStore(root, request.kind, plan.x, plan.xs, plan.y, plan.ys, work, said)
+    step = progress.stage(f"{request.kind} over {plan.x} and {plan.y}", len(plan.ys))
+    body = {
+        "x": {"name": plan.x, "from": plan.xs[0], "to": plan.xs[-1], "steps": len(plan.xs)},
+        "y": {"name": plan.y, "from": plan.ys[0], "to": plan.ys[-1], "steps": len(plan.ys)},
+    }
+    if isinstance(plan, MapPlan):
+        mapped = parameter_map.run(plan, jobs, grid, step)
+        body["counts"] = mapped.counts
+        return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.parameter_map(
+            mapped, name
+        )
+    found = basins.run(plan, jobs, grid, step)
+    body |= {
+        "at": plan.changes,
+        "attractors": [dict(a.__dict__) for a in found.attractors],
+        "cells": [c.attractor for c in found.cells],
+    }
+    return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.basins(
+        found, name
+    )
+
+
+def _drawn(kind: StageName, figure: Any) -> dict[str, str | bytes]:
+    from designer.base.figure_style import to_png, to_svg
+
+    png = BytesIO()
+    to_png(figure, png, 200.0)
+    return {f"{kind}.png": png.getvalue(), f"{kind}.svg": to_svg(figure)}

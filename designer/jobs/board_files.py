@@ -1,0 +1,49 @@
+"""The files of a design folder that are about its board: bills of materials, notes, drawing."""
+
+from __future__ import annotations
+
+from designer.board import board_notes
+from designer.board.board_parts import board_circuit
+from designer.board.bom import bill, bill_csv
+from designer.board.bom_layouts import file_of, layouts
+from designer.board.component import components, pin_numbers, to_buy
+from designer.check.synthesis_result import Synthesis
+from designer.model.model_file import ModelFile
+
+BILL, NOTES, DRAWING, PICTURE = "bom.csv", "board.md", "schematic.svg", "schematic.png"
+
+
+def names(modelfile: ModelFile) -> list[str]:
+    """The names of these files for a model."""
+    return [BILL, NOTES, DRAWING, PICTURE, *(file_of(name) for name in modelfile.board.bom)]
+
+
+def texts(made: Synthesis) -> dict[str, str]:
+    """The content of all but the picture, by name.
+
+    Raises
+    ------
+    InputError : a case, a part or a layout that the catalogue does not have.
+    Unreachable : a value that cannot be bought.
+    """
+    from designer.board import schematic_drawing  # with matplotlib, which nothing before this needs
+
+    circuit, choice = board_circuit(made)
+    found = components(circuit, made.catalog, choice)
+    bought = bill(to_buy(found, choice))
+    others = layouts(made.modelfile.board.bom, made.catalog.folders)
+    return {
+        BILL: bill_csv(bought),
+        NOTES: board_notes.markdown(made, circuit, choice, found),
+        DRAWING: schematic_drawing.svg(circuit, made.modelfile.title, pin_numbers(found)),
+        **{layout.file: layout.csv(bought) for layout in others},
+    }
+
+
+def picture(made: Synthesis) -> bytes:
+    """The drawing once more, as points."""
+    from designer.board import schematic_drawing
+
+    circuit, choice = board_circuit(made)
+    numbers = pin_numbers(components(circuit, made.catalog, choice))
+    return schematic_drawing.png(circuit, made.modelfile.title, numbers=numbers)

@@ -1,0 +1,146 @@
+"""The files of the design stage: what is written of a design, and how it is read again."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from designer.base.checks import cores
+from designer.base.design_folder import DESIGN, MODEL, Folder
+from designer.base.errors import InputError
+from designer.base.plain_json import dumps
+from designer.catalog.catalog import Catalog
+from designer.check.checked_design import Checked
+from designer.check.first_responses import first_run
+from designer.check.synthesis_result import Synthesis
+from designer.circuit import build, terms
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.design import Certificate, Check, Design
+from designer.circuit.netlist import nominal_board
+from designer.jobs import board_files
+from designer.jobs.bench_tables import scales_csv, setup_csv, start_recipes
+from designer.jobs.json_answers import synthesis_json
+from designer.jobs.origin import provenance
+from designer.model.find_responses import find, peaks
+from designer.model.measured_values import MEASURED
+from designer.model.model_file import ModelFile, naming
+from designer.spice import deck
+from designer.synthesis.tie_break import SOLVER
+
+SETUP = "setup.csv"
+
+
+def texts(made: Synthesis) -> dict[str, str]:
+    """Everything of the design stage but ``design.json``; made before the folder is touched."""
+    modelfile, design = made.modelfile, made.design
+    return {
+        MODEL: modelfile.text,
+        "circuit.cir": circuit_deck(made),
+        SETUP: setup_csv(design, made.found, start_recipes(made, cores())),
+        "scales.csv": scales_csv(modelfile, design, made.found),
+        **board_files.texts(made),
+    }
+
+
+def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str, Any]:
+    for name, text in files.items():
+        folder.write(name, text)
+    folder.write(board_files.PICTURE, board_files.picture(made))
+    if made.modelfile.measured is not None:
+        folder.write(MEASURED, made.modelfile.measured.content)
+    folder.write(
+        DESIGN,
+        dumps(
+            synthesis_json(
+                made.modelfile, made.design, made.found, design_provenance(made), made.seconds
+            )
+        ),
+    )
+    return folder.json(DESIGN)
+
+
+def design_provenance(made: Synthesis) -> dict[str, Any]:
+    return provenance(made.modelfile, made.catalog.hash, settings={"highs": SOLVER})
+
+
+def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
+    """The design of a folder, rebuilt from its model and the values of its parts.
+
+    Nothing is chosen again; the errors are computed afresh and must be those that were written.
+    """
+    said, file = folder.json(DESIGN), folder / DESIGN
+    model, spec = modelfile.model, modelfile.circuit
+    found = find(model, modelfile.responses)
+    catalog = catalog.mounted(modelfile.board.mounting)
+    with naming(modelfile):
+        opamp = catalog.opamp(spec.opamp)
+    system = model.second_order()
+    try:
+        values = {str(name): float(value) for name, value in said["parts"].items()}
+        circuit = build.build(
+            terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
+            values,
+            opamp,
+            supply=float(said["circuit"]["supply"]),
+            saturation=float(said["circuit"]["saturation"]),
+            clearance="A" if model.k0 > 0.0 else None,
+            zone=build.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+            composites=said.get("composites", {}),
+        )
+        gain, bias = (float(said["circuit"][k]) for k in ("gain", "bias"))
+        circuit = replace(circuit, gain=gain, bias=bias)
+        held = peaks(model, found).states
+        volts = np.array(list(said["scales"]["volts"].values()), dtype=float)
+        swing = (float((volts * held).max()), held)
+        errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
+        if abs(errors.max_error - float(said["max_error"])) > 1e-9:
+            raise ValueError("parts and max_error do not belong together")
+        kept = said["conditions"]
+        told = {key: kept.get(key, ()) for key in ("checked", "at_limit", "binding")}
+        design = Design(
+            model=model,
+            circuit=circuit,
+            errors=errors,
+            certificate=Certificate(**said["certificate"]),
+            conditions={k: float(v) for k, v in kept.items() if k not in told},
+            solver=dict(said["solver"]),
+            seconds=float(said["cost"]["synthesis_seconds"]),
+            checks=tuple(Check(**check) for check in told["checked"]),
+            binding=dict(told["binding"]),
+        )
+    except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        raise InputError(
+            file, "parts", f"{type(error).__name__}: {error}", "the design of this folder's model"
+        ) from None
+    return Synthesis(modelfile, catalog, found, design)
+
+
+def starts(folder: Folder) -> tuple[str, ...]:
+    """How to start each response, by the folder's ``setup.csv``."""
+    with (folder / SETUP).open(encoding="utf-8", newline="") as stream:
+        return tuple(row.get("start") or "" for row in csv.DictReader(stream))
+
+
+def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:
+    """``circuit.cir``: the first response (ω = 1 where there is none), from its own orbit.
+
+    checked : of the first response; its gate's settings are used.
+    """
+    design, run = made.design, first_run(made, checked)
+    text = deck.write(
+        design.circuit,
+        nominal_board(design.circuit),
+        run.excitation,
+        run.settings,
+        title=made.modelfile.title,
+        stop_time=run.stop_time,
+        initial=run.initial,
+    )
+    nets = [*design.circuit.state_nets, *(["fv"] if design.circuit.stops else [])]
+    shown = " ".join(f"v({net})" for net in [*nets, design.circuit.generator.net])
+    # Without such a line the plain program runs nothing.
+    return text.replace("\n.end\n", f"\n.print tran {shown}\n.end\n")

@@ -1,0 +1,185 @@
+"""Results as JSON objects, by the keys of docs/contract.md.
+
+JSON has no NaN and no infinity: both become null.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from designer.base.plain_json import FORMAT
+
+if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.check.simulation import Simulated
+    from designer.circuit.design import Design
+    from designer.dynamics.orbit import Orbit
+    from designer.model.find_responses import ModelResponse
+    from designer.model.model_file import ModelFile
+
+STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "maps")
+"""What ``run`` prints of a study beside its responses."""
+
+
+def synthesis_json(
+    modelfile: ModelFile,
+    design: Design,
+    found: Sequence[ModelResponse],
+    provenance: Mapping[str, Any],
+    seconds: float,
+) -> dict[str, Any]:
+    """What ``synthesise`` prints and ``design.json`` holds."""
+    from designer.circuit.design import settings
+    from designer.model.model import STATES
+
+    errors, circuit = design.errors, design.circuit
+    return {
+        "format": FORMAT,
+        "title": modelfile.title,
+        "model": dict(design.model.__dict__),
+        "circuit": {
+            "opamp": circuit.opamp,
+            "gain": circuit.gain,
+            "bias": circuit.bias,
+            "supply": circuit.supply,
+            "saturation": circuit.saturation,
+        },
+        "parts": circuit.values,
+        "composites": design.composites,
+        "errors": errors.errors,
+        "max_error": errors.max_error,
+        "certificate": dict(design.certificate.__dict__),
+        "scales": {
+            "seconds": errors.scales.seconds,
+            "volts": dict(zip(STATES, errors.scales.volts, strict=True)),
+            "threshold": errors.scales.threshold,
+        },
+        "knobs": [
+            {
+                "omega": s.omega,
+                "frequency_hz": s.frequency_hz,
+                "amplitude_v_peak": s.amplitude_v_peak,
+                "offset_v": s.offset_v,
+                "expected": r.expected,
+                "found": r.found,
+            }
+            for s, r in zip(settings(design, found), found, strict=True)
+        ],
+        "dead_zone": _dead_zone(modelfile, design),
+        "distinct_values": design.distinct_values,
+        "conditions": _conditions(design),
+        "solver": design.solver,
+        "provenance": provenance,
+        "cost": {"seconds": seconds, "synthesis_seconds": design.seconds},
+    }
+
+
+def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
+    """The object ``cost`` of a file; empty where somebody took it out: its hash leaves it out."""
+    cost = file.get("cost")
+    return dict(cost) if isinstance(cost, Mapping) else {}
+
+
+def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``run`` prints, from the objects of the two files."""
+    cost = {"design": cost_of(design), "study": cost_of(study)}
+    return {
+        **design,
+        **{key: study[key] for key in STUDY_KEYS if key in study},
+        "equation_check": study.get("equation_check"),
+        "responses": study["responses"],
+        "provenance": study["provenance"],
+        "cost": cost,
+    }
+
+
+def simulate_json(
+    simulated: Sequence[Simulated], engine: str, provenance: Mapping[str, Any], seconds: float
+) -> dict[str, Any]:
+    """What ``simulate`` prints."""
+    return {
+        "format": FORMAT,
+        "engine": engine,
+        "responses": [
+            {
+                "omega": s.omega,
+                "expected": s.expected,
+                "found": s.found,
+                **orbit_json(s.orbit),
+                "twin": _twin_json(s.twin),
+                "others": [
+                    {**orbit_json(o), "twin": _twin_json(s.twins[i] if s.twins else None)}
+                    for i, o in enumerate(s.others, start=1)
+                ],
+                "engine": s.settings,
+                "trust": s.trust.as_dict(),
+                "cost": {"periods": s.orbit.periods, "seconds": s.seconds},
+            }
+            for s in simulated
+        ],
+        "provenance": provenance,
+        "cost": {"seconds": seconds},
+    }
+
+
+def orbit_json(orbit: Orbit) -> dict[str, Any]:
+    """An orbit in model units."""
+    from designer.model.model import STATES
+
+    known = len(orbit.extremes) > 0
+    times = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
+    return {
+        "response": orbit.response,
+        "status": str(orbit.status),
+        "n": orbit.n,
+        "p": orbit.p,
+        "q": orbit.q,
+        "start": orbit.start,
+        "symmetric": orbit.symmetric,
+        "asymmetry": orbit.asymmetry,
+        "x1_max": orbit.extremes[0, 1] if known else None,
+        "x1_min": orbit.extremes[0, 0] if known else None,
+        "extremes": dict(zip(STATES, orbit.extremes, strict=True)) if known else None,
+        "impact_velocities": orbit.impact_velocities,
+        "impacts": [
+            {"time": t, "side": "upper" if side > 0 else "lower", "velocity": v}
+            for t, side, v in times
+        ],
+        "multipliers": list(orbit.multipliers.astype(complex)),
+        "lyapunov": orbit.lyapunov,
+        "penetration": orbit.penetration,
+        "miss": orbit.miss,
+        "reason": orbit.reason,
+    }
+
+
+def _twin_json(twin: Orbit | None) -> dict[str, Any] | None:
+    """A mirror twin: what it is called and where it starts; the rest follows by the mirror."""
+    return None if twin is None else {"response": twin.response, "start": twin.start}
+
+
+def _conditions(design: Design) -> dict[str, Any]:
+    """Limits by name; what the finished circuit has; which conditions are near, which cost."""
+    return {
+        **design.conditions,
+        "checked": [dict(check.__dict__) for check in design.checks],
+        "at_limit": sorted({check.name for check in design.checks if check.at_limit}),
+        "binding": dict(design.binding),
+    }
+
+
+def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
+    if not design.circuit.stops:
+        return None
+    errors = design.errors
+    slopes = [error for name, error in errors.errors.items() if name.endswith("stop slope")]
+    return {
+        "kind": modelfile.circuit.dead_zone,
+        "saturation": design.circuit.saturation,
+        "threshold": errors.scales.threshold,
+        "threshold_lower": errors.scales.threshold_lower,
+        "offcentre": errors.scales.offcentre,
+        "slope_error": max(slopes, key=abs),
+        "null_error": errors.errors.get("dead-zone null"),
+        "bias_error": errors.errors.get("dead-zone bias"),
+    }

@@ -1,0 +1,94 @@
+"""The KiCad project of a design folder: a stage of its own, so that a board may be edited.
+
+Other verbs do not look at its files; ``export`` and a design made anew write them, and what
+somebody has changed is replaced only with ``--overwrite``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from designer.base.design_folder import Folder, StageName
+from designer.base.errors import InputError
+from designer.base.manifest import file_hash
+from designer.base.progress import Progress
+from designer.board.board_parts import board_circuit
+from designer.board.component import components
+from designer.board.kicad_project import Project, files
+from designer.board.kicad_rules import board_rules, rules_text
+from designer.check.checked_design import Checked
+from designer.check.first_responses import first_run
+from designer.check.synthesis_result import Synthesis
+from designer.jobs.design_files import design_provenance
+from designer.model.model_file import naming
+
+STAGE: StageName = "kicad"
+FOLDER = "kicad"
+
+
+def texts(made: Synthesis, checked: Checked | None = None) -> dict[str, str]:
+    """Every file of the project by its name inside the design folder.
+
+    checked : of the first response; the sheet then runs at its gate's settings.
+
+    Raises
+    ------
+    InputError : a footprint that is not known here, or a part of the board that is not sold.
+    """
+    with naming(made.modelfile):
+        circuit, choice = board_circuit(made)
+        found = components(circuit, made.catalog, choice)
+        rules = rules_text(board_rules(circuit, made.modelfile.rules))
+        run = first_run(made, checked)
+        project = Project(made.modelfile.title, circuit, found, run, rules)
+        return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
+
+
+def beside(
+    folder: Folder, made: Synthesis, inputs: Mapping[str, Any], overwrite: bool, progress: Progress
+) -> dict[str, str]:
+    """The same for a verb that does more than this: none where there can be no project.
+
+    Raises
+    ------
+    InputError : files that the manifest does not list are in the way.
+    """
+    try:
+        found = texts(made)
+    except InputError as error:
+        progress.note(f"no KiCad project: {error}")
+        return {}
+    folder.decide(wanted(inputs, found), overwrite=overwrite, resume=True)
+    return found
+
+
+def wanted(
+    inputs: Mapping[str, Any], made: Mapping[str, str]
+) -> dict[StageName, tuple[dict[str, Any], list[str]]]:
+    """The stage as the folder is asked for it. inputs : the design's."""
+    return {STAGE: (dict(inputs), list(made))}
+
+
+def write(
+    folder: Folder, made: Synthesis, inputs: Mapping[str, Any], files: Mapping[str, str]
+) -> None:
+    """Write the stage."""
+    if not files:
+        return
+    folder.begin(wanted(inputs, files), design_provenance(made))
+    for name, text in files.items():
+        folder.write(name, text)
+    folder.finish(STAGE)
+
+
+def settle(folder: Folder, made: Synthesis, checked: Checked) -> None:
+    """Let the sheet run at the settings of the gate, if nobody has changed it."""
+    listed = {} if folder.manifest is None else folder.manifest.files
+    sheet = next((n for n in listed if n.startswith(FOLDER) and n.endswith(".kicad_sch")), None)
+    if sheet is None:
+        return
+    _, digest = listed[sheet]
+    path = folder / sheet
+    if path.is_file() and file_hash(sheet, path.read_bytes()) == digest:
+        folder.rewrite(sheet, texts(made, checked)[sheet])

@@ -1,0 +1,76 @@
+"""What the command line says about any verb that writes."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+from designer.base.checks import at_least
+from designer.base.errors import InputError
+from designer.yields.study import SAMPLES, SEED, RungName
+from designer.yields.yield_maps import Over
+
+MOST_SAMPLES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of the verbs that write.
+
+    until, rung, tuned, reached, maps : as ``study.tolerance``. trimmed : whether the model file has
+    a trimmer fitted, whose layer every study has. cluster : address of a Dask
+    scheduler, or None.
+    """
+
+    seed: int = SEED
+    jobs: int | None = None
+    samples: int = SAMPLES
+    overwrite: bool = False
+    resume: bool = False
+    until: float | None = None
+    rung: RungName = "auto"
+    tuned: bool = False
+    reached: bool = False
+    trimmed: bool = False
+    maps: tuple[Over, ...] = ()
+    cluster: str | None = None
+
+    def check(self) -> None:
+        """InputError for a number that cannot be."""
+        at_least("--samples", self.samples, 1)
+        if self.samples > MOST_SAMPLES:
+            raise InputError(None, "--samples", self.samples, f"at most {MOST_SAMPLES}")
+        if self.until is not None and not 0.0 < self.until <= 1.0:
+            raise InputError(None, "--until", self.until, "a width above 0, at most 1")
+        if self.cluster is not None and not self.cluster.startswith(("tcp://", "tls://")):
+            raise InputError(None, "--cluster", self.cluster, "a scheduler's address, tcp://…")
+        at_least("--seed", self.seed, 0)
+        if self.jobs is not None:
+            at_least("--jobs", self.jobs, 1)
+
+    def command(self, verb: str, model: Path, out: Path | None) -> str:
+        """The command line that makes the same results again.
+
+        Files by their last names, so that no path of this machine stands in it; without options
+        that change no result.
+        """
+        said = ["designer", verb, _base(model)]
+        said += [] if out is None else ["--out", _base(out)]
+        said += ["--samples", str(self.samples), "--seed", str(self.seed)]
+        if verb in ("tolerance", "search"):
+            said += [] if self.rung == "auto" else ["--rung", self.rung]
+        if verb == "tolerance":
+            said += [] if self.until is None else ["--until", f"{self.until:g}"]
+            said += ["--tuned"] if self.tuned else []
+            said += ["--reached"] if self.reached else []
+            said += [word for over in self.maps for word in ("--map", over)]
+        return shlex.join(said)
+
+
+def _base(path: Path) -> str:
+    """The last name of a path, never an option; ``.`` and ``..`` by the names they stand for."""
+    name = os.path.basename(os.path.abspath(path)) or "."
+    name = name.encode("utf-8", "replace").decode("utf-8")  # a name that is no text
+    return f"./{name}" if name.startswith("-") else name

@@ -1,0 +1,142 @@
+"""The verb ``rules``: what is looked at, what is written.
+
+Nothing here prints; ``cli.rules`` does.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from designer.base import atomic_write
+from designer.base.design_folder import Folder, StageName, is_design_folder
+from designer.base.errors import InputError
+from designer.base.hashing import sha256
+from designer.base.plain_json import dumps, plain
+from designer.base.progress import Progress
+from designer.base.version import __version__
+from designer.board.board_parts import board_circuit
+from designer.board.component import components
+from designer.board.kicad_reader import BoardFile, check_belongs, read_board
+from designer.board.kicad_rules import board_rules
+from designer.catalog.catalog import load_catalog
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Outcome
+from designer.check.synthesis_result import Synthesis
+from designer.design_rules import junit, run_rules
+from designer.design_rules import on_board as rule_board
+from designer.design_rules.kicad_drc import kicad_version
+from designer.design_rules.subject import Subject
+from designer.jobs.origin import provenance
+from designer.jobs.synthesise_job import read_design
+from designer.model.model_file import naming
+
+FORMAT = 1
+NAME = "rules.json"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What the rules say of a design. kicad : version of the program that checked the board."""
+
+    outcomes: tuple[Outcome, ...]
+    kicad: str | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether no rule fails; what was not run does not fail."""
+        return all(o.status != FAIL for o in self.outcomes)
+
+
+def into_folder(
+    path: Path, board: Path | None, report: Path | None, progress: Progress
+) -> tuple[dict[str, Any], bool]:
+    """Look at a design folder and write ``rules.json``, and the JUnit report if one is asked for.
+
+    What the folder has of an earlier look is replaced, for a board changes while it is drawn.
+
+    Returns
+    -------
+    The JSON object, and whether no rule fails.
+
+    Raises
+    ------
+    InputError : no design folder, or a board that is not of this design; nothing is written then.
+    """
+    began = time.perf_counter()
+    if not is_design_folder(path):
+        raise InputError(
+            path, "DIR", "no manifest.json", "a design folder, as synthesise and run make it"
+        )
+    if report is not None and (report.is_dir() or not report.parent.is_dir()):
+        found_there = "a folder" if report.is_dir() else "no such folder"
+        raise InputError(report, "--junit", found_there, "a file in a folder that exists")
+    catalog = load_catalog()
+    made = read_design(path, catalog, progress)
+    given = None if board is None else read_board(board)
+    progress.stage("rules")
+    found = checked(made, given)
+    inputs = {
+        "model": made.modelfile.sha256,
+        "catalogue": catalog.hash,
+        "version": __version__,
+        "board": None if given is None else sha256(given.text.encode("utf-8")),
+        "kicad": found.kicad,
+    }
+    settings = {"board_sha256": inputs["board"], "kicad": found.kicad}
+    said = provenance(made.modelfile, catalog.hash, settings=settings)
+    answer = plain(_json(made, given, found.outcomes, said, time.perf_counter() - began))
+    folder = Folder(path)
+    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {"rules": (inputs, [NAME])}
+    folder.decide(wanted, overwrite=True, resume=False)  # refuses what is not ours
+    kept = {} if folder.manifest is None else folder.manifest.provenance
+    folder.begin(wanted, kept)
+    folder.write(NAME, dumps(answer))
+    folder.finish("rules")
+    if report is not None:
+        text = junit.report(made.modelfile.title, found.outcomes)
+        with atomic_write.appearing(report, "--junit") as partial:
+            partial.write_text(text, encoding="utf-8")
+    return answer, found.passed
+
+
+def checked(made: Synthesis, board: BoardFile | None = None) -> Checked:
+    """Every rule on a design, and on its board if there is one.
+
+    Raises
+    ------
+    InputError : the board is not of this design, or a part is not in the catalogue.
+    """
+    limits = made.modelfile.rules
+    with naming(made.modelfile):
+        circuit, choice = board_circuit(made)
+        listed = components(circuit, made.catalog, choice)
+        custom = board_rules(circuit, limits)
+    if board is not None:
+        check_belongs(board, listed)
+    on_circuit = run_rules.on_circuit(Subject(made, circuit, listed), limits)
+    if board is None:
+        return Checked((*on_circuit, *rule_board.without_board(custom, limits)), None)
+    on_board = rule_board.checked(board, listed, custom, limits)
+    return Checked((*on_circuit, *on_board), kicad_version())
+
+
+def _json(
+    made: Synthesis,
+    board: BoardFile | None,
+    outcomes: Sequence[Outcome],
+    said: dict[str, Any],
+    seconds: float,
+) -> dict[str, Any]:
+    count = {status: sum(o.status == status for o in outcomes) for status in (PASS, FAIL, NOT_RUN)}
+    return {
+        "format": FORMAT,
+        "title": made.modelfile.title,
+        "board": None if board is None else board.path.name,
+        "counts": count,
+        "rules": [o.as_dict() for o in outcomes],
+        "provenance": said,
+        "cost": {"seconds": seconds},
+    }

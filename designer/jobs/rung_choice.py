@@ -1,0 +1,164 @@
+"""Which rung decides: by what ``designer trade`` measured of this design, else the usual one.
+
+A study decides on the exact circuit and asks ngspice about some boards of each response, `LEAST` at
+least (``auto``). Where a trade has shown that the exact circuit's yield is further from ngspice's
+than its bound, every board goes to ngspice. What a user asks for with ``--rung`` stands.
+
+A trade goes with the design it was made of. A search that replaces a design keeps the word of its
+trade, if that was of the same model file, until there is a trade of the design that was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from designer.base.design_folder import Folder
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.fidelity.rung_errors import BOARD
+from designer.fidelity.rungs import CIRCUIT
+from designer.fidelity.trade_study import SHARE
+from designer.jobs.options import Options
+from designer.yields.ngspice_sampling import NOMINAL_SAMPLES, OWN_SAMPLES
+from designer.yields.study import RUNGS, RungName
+
+TRADE = "trade.json"
+"""What ``jobs.trade_job`` writes."""
+SEARCH = "search.json"
+"""What ``jobs.search_job`` writes."""
+EARLIER = " (of the design that stood here before the search)"
+LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
+"""Boards of each response that ngspice is asked about, whatever a trade says."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """rung : of a study. reason : one line for people; "" where nothing was measured."""
+
+    rung: RungName
+    reason: str
+
+
+def choose(folder: Folder) -> Choice:
+    """By the folder's ``trade.json``, if its stage is complete, else by what its search has kept of
+    an earlier one; else ``auto``.
+
+    Raises
+    ------
+    InputError : the file is not what ``trade``, or ``search``, wrote.
+    """
+    stages = folder.manifest.stages if folder.manifest else {}
+    if "trade" in stages and stages["trade"].complete:
+        return _read(folder, TRADE, "cheapest", _choice)
+    if "search" in stages and stages["search"].complete and "design" in stages:
+        return _read(folder, SEARCH, "trade", partial(_kept, stages["design"].inputs.get("model")))
+    return Choice("auto", "")
+
+
+def before_search(folder: Folder, model: str) -> Choice | None:
+    """What a trade says here, if it is of the model file with this hash; None without one.
+
+    To be asked before a search touches the folder.
+    """
+    stages = folder.manifest.stages if folder.manifest else {}
+    of = [stages[name].inputs.get("model") for name in ("design", "search") if name in stages]
+    if "search" in stages and not stages["search"].complete:
+        return None  # whose the design is cannot be told
+    choice = choose(folder) if model in of else Choice("auto", "")
+    return choice if choice.reason else None
+
+
+def for_search(folder: Folder, options: Options, progress: Progress) -> RungName:
+    """The rung of the study at the end of a search, which is said. ``exact`` stands for "as usual":
+    the search's confirmation asks ngspice about `LEAST` boards of each response."""
+    if options.rung != "auto":
+        return options.rung
+    choice = choose(folder)
+    progress.note(
+        choice.reason
+        or "rung: no trade of this design, so the exact circuit decides the final study, and "
+        f"ngspice's word on {LEAST} boards of each response decides whether it is confirmed"
+    )
+    return "ngspice" if choice.rung == "ngspice" else "exact"
+
+
+def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
+    """The options with the rung that was chosen, which is said; one that was asked for stands."""
+    if options.rung != "auto":
+        return options
+    choice = choose(folder)
+    if choice.reason:
+        progress.note(choice.reason)
+    return replace(options, rung=choice.rung)
+
+
+def _read(
+    folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], Choice]
+) -> Choice:
+    said = folder.json(name)
+    try:
+        return choice(said)
+    except (KeyError, TypeError, ValueError) as error:
+        found = f"{type(error).__name__}: {error}"
+        wrote = f"what {name.removesuffix('.json')} wrote"
+        raise InputError(folder / name, key, found, wrote) from None
+
+
+def _kept(model: object, said: Mapping[str, Any]) -> Choice:
+    """model : hash of the design's model file, which is another where somebody replaced it."""
+    kept = said.get("trade")
+    if kept is None or kept["model"] != model:
+        return Choice("auto", "")
+    if kept["rung"] not in RUNGS:
+        raise ValueError(kept["rung"])
+    reason = str(kept["reason"]).removesuffix(EARLIER)
+    return Choice(kept["rung"], f"{reason}{EARLIER}")
+
+
+def _choice(said: Mapping[str, Any]) -> Choice:
+    found = [c for c in said["cheapest"] if c["question"] == SHARE]
+    if not found:
+        reasons = dict.fromkeys(f"{_place(r)}: {r['reason']}" for r in said["left_out"])
+        why = f" ({'; '.join(reasons)})" if reasons else ""
+        said_ = f"rung by trade.json: it asked no boards{why}, so as usual"
+        return Choice("auto", said_ + _warning(said, CIRCUIT))
+    overall = found[-1]  # of all responses, or of the only one
+    if overall["rung"] == CIRCUIT:
+        note = f"; {overall['note']}" if overall.get("note") else ""
+        kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %{note})"
+        return Choice(
+            "auto",
+            f"rung by trade.json: the exact circuit decides, {kept}; ngspice is asked about "
+            f"{LEAST} boards of each response at least{_warning(said, CIRCUIT)}",
+        )
+    return Choice(
+        "ngspice",
+        "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
+        f"than {100.0 * overall['bound']:g} %{_warning(said, 'ideal')}",
+    )
+
+
+def _warning(said: Mapping[str, Any], decides: str) -> str:
+    """Where the rung that decides is not shown to have the nominal board's n-p-q."""
+    wrong = []
+    for truth in said["truths"]:
+        rows = [
+            row
+            for row in said["rungs"]
+            if row["number"] == truth["number"] and row["rung"] == decides
+        ]
+        right = any(row["right"][BOARD] and row["gate"] is not False for row in rows)
+        if not (truth["sure"] and right):
+            wrong.append(_place(truth))
+    if not wrong:
+        return ""
+    name = "the exact circuit" if decides == CIRCUIT else "ngspice with ideal op-amps"
+    return f"; at {'; '.join(wrong)} {name} is not shown to have the nominal board's n-p-q"
+
+
+def _place(said: Mapping[str, Any]) -> str:
+    b = f", b = {said['b']:g}" if "b" in said else ""  # trades before they said b
+    return f"ω = {said['omega']:g}{b}"

@@ -1,0 +1,152 @@
+"""The study stage of a design folder: its layers, their inputs, their folders of blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from designer.base.design_folder import REPORTS, TOLERANCE, Folder
+from designer.model.tuning_bands import Bands
+from designer.yields.blame_analysis import Blame
+from designer.yields.layers import CHUNK, SEARCH
+from designer.yields.ngspice_sampling import Hearing
+from designer.yields.power_up_yield import Reached
+from designer.yields.row_store import BlockStore
+from designer.yields.start_recipe import Recipe
+from designer.yields.study import Stores, Study
+from designer.yields.study_cache import KEPT, Kept
+from designer.yields.study_identity import blame_hash, study_hash
+from designer.yields.trimmed_yield import DcTrim, Trimmed
+from designer.yields.tuned_yield import MOST_TRIES, Tuned
+from designer.yields.verdict import BLOCK, Answer, StudyPlan
+from designer.yields.yield_maps import OVERS
+
+if TYPE_CHECKING:
+    from designer.jobs.options import Options
+
+SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
+TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
+MAPS, MAP = "maps.json", "map:"
+ALL_IN_NGSPICE = "ngspice of every board"
+
+
+def layers_of(options: Options) -> list[str]:
+    """Names of the layers that are asked for, sorted."""
+    names = {"samples"}
+    if options.rung != "exact":
+        names.add("ngspice")
+    if options.rung == "ngspice":
+        names.add(ALL_IN_NGSPICE)
+    names |= {f"{MAP}{over}" for over in options.maps}
+    names |= {"tuned"} if options.tuned else set()
+    names |= {"trimmed"} if options.trimmed else set()
+    names |= {"reached"} if options.reached else set()
+    return sorted(names)
+
+
+def merged(folder: Folder, inputs: Mapping[str, Any], options: Options) -> Options:
+    """The options with every layer that the folder's study has already, if it is one of the same
+    inputs otherwise: a study gets more layers, it loses none."""
+    stage = folder.manifest.stages.get("study") if folder.manifest else None
+    known = {} if stage is None else stage.inputs
+    if {k: v for k, v in known.items() if k != "layers"} != dict(inputs):
+        return options
+    names = {*known.get("layers", ()), *layers_of(options)}
+    rung = options.rung
+    if "ngspice" in names:
+        rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
+    maps = tuple(over for over in OVERS if f"{MAP}{over}" in names)
+    tuned, reached = "tuned" in names, "reached" in names
+    return replace(options, rung=rung, tuned=tuned, reached=reached, maps=maps)
+
+
+def study_files(options: Options, responses: int) -> list[str]:
+    """What the stage writes; a name that ends in "/" is a folder of blocks."""
+    maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
+    maps += [MAPS] if maps else []
+    names = layers_of(options)
+    folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "trimmed": TRIMMED}
+    folders["reached"] = REACHED
+    places = [f"{place}/" for name, place in folders.items() if name in names]
+    return [TOLERANCE, *REPORTS, KEPT, *maps, *places]
+
+
+class FolderStores(Stores):
+    """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
+    is told of blocks that are of another study. kept : where the blame is."""
+
+    def __init__(
+        self,
+        root: Path,
+        guard: Callable[[], None],
+        note: Callable[[str], None] = lambda _: None,
+        kept: Kept | None = None,
+    ) -> None:
+        self._root, self._guard, self._note, self._kept = root, guard, note, kept
+        self._stores: dict[str, BlockStore[Any]] = {}
+
+    def samples(self, plan: StudyPlan) -> BlockStore[Answer]:
+        return self._store(plan, SAMPLES, Answer, "samples", BLOCK)
+
+    def ngspice(self, plan: StudyPlan) -> BlockStore[Hearing]:
+        return self._store(plan, NGSPICE, Hearing, "ngspice", CHUNK)
+
+    def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned]:
+        more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
+        return self._store(plan, TUNED, Tuned, "tuned", SEARCH, more)
+
+    def trimmed(self, plan: StudyPlan, trim: DcTrim) -> BlockStore[Trimmed]:
+        return self._store(plan, TRIMMED, Trimmed, "trimmed", BLOCK, trim.as_dict())
+
+    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached]:
+        more = {"recipes": [r.as_dict() for r in recipes]}
+        return self._store(plan, REACHED, Reached, "reached", SEARCH, more)
+
+    def blame(self, plan: StudyPlan) -> Blame | None:
+        return None if self._kept is None else self._kept.get("blame", blame_hash(plan))
+
+    def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
+        if self._kept is not None:
+            self._guard()
+            self._kept.put("blame", blame_hash(plan), replace(found, seconds=0.0))
+
+    @property
+    def names(self) -> Iterable[str]:
+        """Every file of a block, relative to the folder."""
+        return sorted({name for store in self._stores.values() for name in store.names})
+
+    def _store(
+        self,
+        plan: StudyPlan,
+        folder: str,
+        row: type[Any],
+        layer: str,
+        size: int,
+        more: Mapping[str, Any] | None = None,
+    ) -> BlockStore[Any]:
+        if folder not in self._stores:
+            self._stores[folder] = BlockStore(
+                self._root,
+                folder,
+                row,
+                study_hash(plan, layer, more),
+                omegas=[q.spec.omega for q in plan.questions],
+                size=size,
+                guard=self._guard,
+                note=self._note,
+            )
+        return self._stores[folder]
+
+
+def write_maps(folder: Folder, study: Study, provenance: Mapping[str, Any]) -> None:
+    """``maps.json`` and a picture of each map; times are in ``tolerance.json``."""
+    from designer.report.map_writer import files  # Matplotlib takes a while to import
+
+    labels = [
+        f"ω = {q.spec.omega:g} {q.spec.expect or q.start.response}" for q in study.plan.questions
+    ]
+    timeless = [replace(found, seconds=0.0) for found in study.maps]
+    for name, content in files(timeless, labels, {"provenance": provenance}).items():
+        folder.write(name, content)

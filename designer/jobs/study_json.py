@@ -1,0 +1,254 @@
+"""A tolerance study as a JSON object, by the keys of docs/contract.md."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from designer.base.plain_json import FORMAT
+from designer.check.checked_design import Checked
+from designer.spice.equation_check import EquationCheck
+from designer.yields.ngspice_sampling import Hearing, Outcome
+from designer.yields.power_up_yield import Reached
+from designer.yields.study import Study
+from designer.yields.study_plan import of_yield
+from designer.yields.trimmed_yield import Trimmed
+from designer.yields.tuned_yield import Tuned
+from designer.yields.two_engine_yield import Combined
+from designer.yields.verdict import Answer, Verdict, Yield, count
+from designer.yields.yield_maps import YieldMap
+
+MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")
+ORDER = (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED)
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+
+
+def study_json(
+    study: Study,
+    provenance: Mapping[str, Any],
+    cost: Mapping[str, float],
+    equations: EquationCheck | None = None,
+) -> dict[str, Any]:
+    """What ``tolerance`` prints and ``tolerance.json`` holds."""
+    return {
+        "format": FORMAT,
+        "samples": study.plan.samples,
+        "until": study.until,
+        "narrow": study.narrow,
+        "all_on_one_board": {
+            "built": _yield(study.all_on_one_board),
+            "tuned": _yield(study.all_tuned),
+            "trimmed": _yield(study.all_trimmed),
+            "reached": _yield(study.all_reached),
+        },
+        "equation_check": None if equations is None else equations.as_dict(),
+        "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
+        "maps": [_map(found) for found in study.maps],
+        "provenance": provenance,
+        "cost": dict(cost),
+    }
+
+
+def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
+    model, ngspice = checked.model, checked.ngspice
+    answers = study.answers_to(index)
+    counted = study.yields[index]
+    row: dict[str, Any] = {
+        "omega": model.omega,
+        "expected": model.expected,
+        "found": model.found,
+        "model": model.orbit.response,
+        "circuit": checked.circuit.response,
+        "ngspice": None if ngspice is None else ngspice.response,
+        "ngspice_reason": "" if ngspice is None else ngspice.reason,
+        "engines_agree": checked.agrees,
+        "symmetric": model.orbit.symmetric,
+        "others": [o.response for o in model.others],
+        "yield": _yield(counted),
+        "rate": None if counted is None else counted.rate,
+        "reasons": _reasons(answers),
+        "margins": margins(answers),
+        "agreement": _agreement(answers, study.heard_of(index)),
+        "combined": _combined(study.combined[index]),
+        "tuned": tuned_json(study.tuned_of(index)),
+        "trimmed": trimmed_json(study.trimmed_of(index)),
+        "reached": _reached(study, index),
+        "blame": _blame(study, index),
+        "trust": {
+            **{engine: said.verdict() for engine, said in checked.trust.items()},
+            "yield": None
+            if counted is None
+            else of_yield(counted, checked.circuit_trust).verdict(),
+        },
+    }
+    if counted is None:
+        row["left_out"] = study.left_out[index]
+    return row
+
+
+def _yield(counted: Yield | None) -> dict[str, Any] | None:
+    if counted is None:
+        return None
+    low, high = counted.interval
+    return {
+        "ok": counted.ok,
+        "lost": counted.lost,
+        "grazing": counted.grazing,
+        "failed": counted.failed,
+        "samples": counted.samples,
+        "low": low,
+        "high": high,
+    }
+
+
+def tuned_json(rows: Sequence[Tuned]) -> dict[str, Any] | None:
+    """What exists within the bands, and under ``bench`` what the bench procedure finds."""
+    if not rows:
+        return None
+    bench = Counter(r.bench_verdict for r in rows)
+    found = Yield(*(bench[verdict] for verdict in ORDER))
+    return {
+        **_counted(count(rows)),
+        "tries": sum(r.tries for r in rows),
+        "unanswered": sum(r.unanswered for r in rows),
+        "followed": sum(r.followed for r in rows),
+        "reasons": _reasons(rows),
+        "bench": {
+            **_counted(found),
+            "reasons": _counted_reasons((r.bench_verdict, r.bench_reason) for r in rows),
+            "steps": sum(r.bench_steps for r in rows),
+            "seen_where_it_is_not": sum(r.bench_seen and r.bench_verdict != "ok" for r in rows),
+        },
+    }
+
+
+def trimmed_json(rows: Sequence[Trimmed]) -> dict[str, Any] | None:
+    """What the boards show with their trimmers set; at_end : boards that would turn further."""
+    if not rows:
+        return None
+    return {
+        **_counted(count(rows)),
+        "reasons": _reasons(rows),
+        "at_end": sum(r.at_end for r in rows),
+    }
+
+
+def _reached(study: Study, index: int) -> dict[str, Any] | None:
+    """From power-up by the recipe."""
+    rows = study.reached_of(index)
+    if not rows or study.recipes is None:
+        return None
+    return {
+        **_counted(count(rows)),
+        "reasons": _reasons(rows),
+        "clipped_at_start": sum(r.clipped for r in rows),
+        "recipe": study.recipes[study.asked.index(index)].as_dict(),
+    }
+
+
+def _blame(study: Study, index: int) -> dict[str, Any] | None:
+    if study.blame is None or index not in study.asked:
+        return None
+    found: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
+    return found
+
+
+def _map(found: YieldMap) -> dict[str, Any]:
+    """Without what it cost, which stands with the other costs."""
+    return {key: value for key, value in found.as_dict().items() if key != "cost"}
+
+
+def _counted(counted: Yield) -> dict[str, Any]:
+    return {**(_yield(counted) or {}), "rate": counted.rate}
+
+
+def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str, Any]:
+    """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
+    known = {a.sample: a for a in answers}
+
+    def of(kind: str) -> dict[str, Any]:
+        asked = [h.outcome(known[h.sample]) for h in heard if h.kind == kind and h.response]
+        counted = (Outcome.AGREED, Outcome.FAILED, Outcome.UNDECIDED)
+        return {"asked": len(asked), **{str(one): asked.count(one) for one in counted}}
+
+    too_long = [h for h in heard if not h.response]
+    return {
+        **of("own"),
+        "nominal_start": {
+            **of("nominal"),
+            "too_long": len(too_long),
+            "left_out": [{"sample": h.sample, "reason": h.reason} for h in too_long],
+        },
+    }
+
+
+def _combined(both: Combined | None) -> dict[str, Any] | None:
+    if both is None:
+        return None
+    low, high = both.disagreement.interval
+    return {
+        "estimate": both.estimate,
+        "low": both.low,
+        "high": both.high,
+        "disagreement": {
+            "count": both.disagreement.count,
+            "asked": both.disagreement.of,
+            "low": low,
+            "high": high,
+        },
+        "undecided": both.undecided,
+        "if_undecided_lost": both.if_lost,
+        "if_undecided_ok": both.if_ok,
+        "strata": [
+            {
+                "name": s.name,
+                "samples": s.samples,
+                "asked": s.asked,
+                "only_ngspice_ok": s.gained,
+                "only_exact_ok": s.lost,
+            }
+            for s in both.strata
+        ],
+        "differences": [dict(d.__dict__) for d in both.differences],
+    }
+
+
+def _reasons(answers: Sequence[Answer | Tuned | Trimmed | Reached]) -> dict[str, int]:
+    """Why boards do not show the response, most frequent first."""
+    return _counted_reasons((a.verdict, a.reason) for a in answers)
+
+
+def _counted_reasons(judged: Iterable[tuple[Verdict, str]]) -> dict[str, int]:
+    met = Counter(
+        f"{verdict}: {_kind(reason)}" if reason else str(verdict)
+        for verdict, reason in judged
+        if verdict != "ok"
+    )
+    return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _kind(reason: str) -> str:
+    """The reason without its figures, so that like ones are counted together."""
+    for kind in ("asymmetric", "not found", "not seen"):
+        if reason.startswith(f"{kind} "):
+            return kind
+    return "most settings gave no answer" if reason.endswith("settings gave no answer") else reason
+
+
+def margins(answers: Sequence[Answer]) -> dict[str, Any]:
+    """Quantiles of each margin over the boards that are ok and have it; null where none has it.
+
+    boards : that are ok, and ``counted`` by margin: not every board has every margin, such as the
+    nearest miss without one. penetration, miss : V of the moving state; the others are ratios.
+    """
+    ok = [a for a in answers if a.verdict is Verdict.OK]
+    out: dict[str, Any] = {"quantiles": list(QUANTILES), "boards": len(ok), "counted": {}}
+    for name in MARGINS:
+        values = [v for a in ok if math.isfinite(v := float(getattr(a, name)))]
+        out[name] = list(np.quantile(values, QUANTILES)) if values else None
+        out["counted"][name] = len(values)
+    return out

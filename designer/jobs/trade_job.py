@@ -1,0 +1,199 @@
+"""The verb ``trade``: a design's rungs measured, and the stage ``trade`` of its folder.
+
+Nothing here prints; ``cli.trade`` does.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from designer.base.checks import cores
+from designer.base.design_folder import Folder
+from designer.base.plain_json import dumps
+from designer.base.progress import Progress
+from designer.catalog.catalog import load_catalog
+from designer.check import synthesis_result
+from designer.check.synthesis_result import Synthesis
+from designer.fidelity import pieces as trade_pieces
+from designer.fidelity import rungs as trade_rungs
+from designer.fidelity import yields
+from designer.fidelity.cpu_clock import SpiceClock
+from designer.fidelity.label import Label
+from designer.fidelity.pieces import CHUNK, PIECES, Pieces, read_pieces
+from designer.fidelity.rung_errors import compare
+from designer.fidelity.rungs import LEVELS, ROUNDS
+from designer.fidelity.trade_study import Response, Trade, trade
+from designer.fidelity.yields import BOARDS, BoardTrade, LeftOut, Tally
+from designer.jobs import design_files
+from designer.jobs.origin import provenance
+from designer.jobs.rung_choice import TRADE
+from designer.jobs.synthesise_job import Options, standing_inputs
+from designer.model.find_responses import ModelResponse
+from designer.model.model_file import ModelFile, naming, need_responses
+from designer.spice.pool import SpicePool, require_ngspice
+from designer.yields.verdict import StudyPlan
+
+SHEET = "trade.md"
+PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")
+NAMES = (TRADE, SHEET, *PICTURES)
+TIMEOUT = 900.0
+"""The longest that one run of ngspice may take, s."""
+RULES = 3
+"""Raised whenever the same inputs are to give another answer."""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is measured. boards : of each response, none where 0. levels : of ngspice's steps.
+    rounds : of timing."""
+
+    boards: int = BOARDS
+    levels: tuple[tuple[float, float], ...] = LEVELS
+    rounds: int = ROUNDS
+
+
+def measure(
+    made: Synthesis, extent: Extent, pieces: Pieces, *, seed: int, jobs: int, progress: Progress
+) -> Trade:
+    """Every rung on every response of a design, and the boards.
+
+    pieces : what is there already of this very design, extent and seed.
+
+    Raises
+    ------
+    EnvironmentMissing : ngspice is missing.
+    """
+    count = len(made.found)
+    with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
+        require_ngspice(pool)
+        clock = SpiceClock(timed)
+        rungs = []
+        for number, r in enumerate(made.found, start=1):
+
+            def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
+                progress.stage(f"response {number} of {count}, every rung")
+                found = trade_rungs.measured(
+                    made, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
+                )
+                rows, truth = compare(Label.of(number, r), found.answers)
+                return trade_pieces.rungs_json(rows, truth, found.settings, found.seconds)
+
+            rungs.append(trade_pieces.rungs(pieces.piece(f"rungs {number}", rung)))
+        responses = []
+        for number, (rows, truth, settings, seconds) in enumerate(rungs, start=1):
+            boards: BoardTrade | LeftOut | None = None
+            if extent.boards:
+                plan = yields.question(made, number, settings, samples=extent.boards, seed=seed)
+                label = truth.label
+                if isinstance(plan, str):
+                    boards = LeftOut(label, plan)
+                else:
+                    tallied = _tally(plan, label, count, pieces, pool, jobs, progress)
+                    boards = BoardTrade.of(label, tallied, seconds)
+            responses.append(Response(rows, truth, boards))
+    return trade(responses)
+
+
+def _tally(
+    plan: StudyPlan,
+    label: Label,
+    count: int,
+    pieces: Pieces,
+    pool: SpicePool,
+    jobs: int,
+    progress: Progress,
+) -> Tally:
+    """The boards of one response, of ``count``, piece by piece."""
+    total = Tally()
+    for first in range(0, plan.samples, CHUNK):
+        samples = range(first, min(first + CHUNK, plan.samples))
+
+        def some(samples: range = samples) -> dict[str, Any]:
+            said = f"boards {samples.start + 1} to {samples.stop} of {plan.samples}"
+            step = progress.stage(f"response {label.number} of {count}, {said}", len(samples))
+            return asdict(yields.tally(plan, samples, pool, jobs, step))
+
+        name = f"boards {label.number}, {samples.start} to {samples.stop - 1}"
+        total += trade_pieces.tally(pieces.piece(name, some))
+    return total
+
+
+def answer(
+    modelfile: ModelFile,
+    out: Path | None,
+    options: Options,
+    extent: Extent,
+    progress: Progress,
+) -> tuple[dict[str, Any], bool]:
+    """The JSON object, and whether the folder held it already; ``out`` None writes nothing."""
+    options.check()
+    need_responses(modelfile)
+    catalog = load_catalog()
+    if out is None:
+        progress.stage("responses of the model, parts")
+        made = synthesis_result.synthesise(modelfile, catalog)
+        return _document(made, extent, Pieces(), options, progress), False
+    folder = Folder(out)
+    wanted = standing_inputs(folder, modelfile, catalog, progress)
+    levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
+    inputs = {**wanted["design"][0], **asdict(extent), "levels": levels, "seed": options.seed}
+    inputs["rules"] = RULES
+    wanted["trade"] = (inputs, [*NAMES, PIECES])
+    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
+    if not todo:
+        return folder.json(TRADE), True
+    goes_on = "design" not in todo and folder.state("trade", inputs) == "unfinished"
+    known = read_pieces(folder / PIECES) if goes_on and options.resume else {}
+    progress.stage("responses of the model, parts")
+    if "design" in todo:
+        made = synthesis_result.synthesise(modelfile, catalog)
+        with naming(modelfile):
+            files = design_files.texts(made)
+        folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+        design_files.write(folder, made, files)
+        folder.finish("design")
+    else:
+        made = design_files.load(folder, modelfile, catalog)
+        folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+    guard = folder.watch()
+
+    def save(text: str) -> None:
+        guard()
+        folder.write(PIECES, text)
+
+    document = _document(made, extent, Pieces(known, save), options, progress)
+    guard()
+    _write(folder, document)
+    (folder / PIECES).unlink(missing_ok=True)
+    folder.finish("trade")
+    return folder.json(TRADE), False
+
+
+def _document(
+    made: Synthesis, extent: Extent, pieces: Pieces, options: Options, progress: Progress
+) -> dict[str, Any]:
+    from designer.fidelity.trade_files import trade_json  # Matplotlib takes a while to import
+
+    jobs = cores() if options.jobs is None else options.jobs
+    found = measure(made, extent, pieces, seed=options.seed, jobs=jobs, progress=progress)
+    said = provenance(
+        made.modelfile, made.catalog.hash, seed=options.seed, settings={"trade": asdict(extent)}
+    )
+    return trade_json(found, said, pieces.seconds, made.modelfile.title)
+
+
+def _write(folder: Folder, document: dict[str, Any]) -> None:
+    from designer.base import figure_style
+    from designer.fidelity import trade_files
+
+    folder.write(TRADE, dumps(document))
+    folder.write(SHEET, trade_files.sheet(document))
+    for name, key in trade_files.KEYS.items():
+        figure = trade_files.front(document, key)
+        folder.write(f"{name}.svg", figure_style.to_svg(figure))
+        stream = io.BytesIO()
+        figure_style.to_png(figure, stream)
+        folder.write(f"{name}.png", stream.getvalue())

@@ -1,0 +1,96 @@
+"""How one quantity varies from board to board: distributions by their inverse, u in [0, 1) → value.
+
+Every draw goes through an inverse, so that a larger uniform number is a larger value whatever the
+distribution, and studies that differ in a grade or a shape compare the same boards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from designer.base.arrays import Array
+
+
+class Law(Protocol):
+    """A distribution on a bounded interval."""
+
+    def ppf(self, u: Array) -> Array:
+        """(N,) values with probabilities u (N,) below them: non-decreasing."""
+        ...
+
+    def as_dict(self) -> dict[str, Any]:
+        """Name and parameters."""
+        ...
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Every value between ``low`` and ``high`` alike."""
+
+    low: float
+    high: float
+
+    def ppf(self, u: Array) -> Array:
+        return self.low + (self.high - self.low) * u
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"law": "uniform", "low": self.low, "high": self.high}
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal about 0 with this ``sigma``, cut at ± ``limit``: what lies beyond was sorted out."""
+
+    sigma: float
+    limit: float = 1.0
+
+    def ppf(self, u: Array) -> Array:
+        if self.sigma == 0.0:
+            return np.zeros_like(u)
+        cut = self.limit / self.sigma
+        below = float(ndtr(-cut))
+        # From the nearer end: the probabilities of the upper tail have no digits to spare.
+        lower = np.minimum(u, 1.0 - u)
+        z = ndtri(below + lower * (1.0 - 2.0 * below))
+        z = np.clip(z, -cut, 0.0)
+        return np.asarray(self.sigma * np.where(u < 0.5, z, -z))
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"law": "normal", "sigma": self.sigma, "limit": self.limit}
+
+
+@dataclass(frozen=True)
+class Binned:
+    """Uniform within ± ``outer`` but never within ± ``inner``: the better grade was picked out."""
+
+    inner: float
+    outer: float = 1.0
+
+    def ppf(self, u: Array) -> Array:
+        away = (self.outer - self.inner) * np.abs(2.0 * u - 1.0) + self.inner
+        return np.asarray(np.where(u < 0.5, -away, away))
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"law": "binned", "inner": self.inner, "outer": self.outer}
+
+
+@dataclass(frozen=True)
+class Split:
+    """Half of the values uniform between ``low`` and ``middle``, half between it and ``high``: all
+    that the minimum, typical and maximum of a data sheet say."""
+
+    low: float
+    middle: float
+    high: float
+
+    def ppf(self, u: Array) -> Array:
+        below = self.low + (self.middle - self.low) * 2.0 * u
+        above = self.middle + (self.high - self.middle) * (2.0 * u - 1.0)
+        return np.asarray(np.where(u < 0.5, below, above))
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"law": "split", "low": self.low, "middle": self.middle, "high": self.high}

@@ -1,0 +1,225 @@
+"""A bench's list of measured values: CSV, ``part,value[,tolerance][,board]`` (docs/spread.md).
+
+    part,value,tolerance
+    R203,10.02k,0.1%
+    C1,"99.1 nF"
+    U1A.offset,-1.3mV,50µV
+
+Whatever is wrong with the file ends in an ``InputError`` that names its line.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+
+from designer.base.errors import InputError
+from designer.base.schema import did_you_mean, one_of
+from designer.base.units import format_quantity, parse_quantity
+from designer.circuit.netlist import Circuit
+
+MEASURED = "measured.csv"
+"""A design folder's own copy."""
+_MOST_BYTES = 4_000_000
+_COLUMNS = ("part", "value", "tolerance", "board")
+_FACTOR = 2.0
+"""A part is no further from the value it is sold for: a slip of a prefix is a factor of 1000."""
+_UNITS = (
+    (re.compile(r"R[1-9]\d{0,3}[AB]?", re.ASCII), "Ω"),
+    (re.compile(r"C[1-9]\d{0,3}[AB]?", re.ASCII), "F"),
+    (re.compile(r"VR[1-9]\d{0,3}|VCC|VEE", re.ASCII), "V"),
+    (re.compile(r"U[1-9]\d{0,3}[A-Z]\.(offset|low|high)", re.ASCII), "V"),
+    (re.compile(r"U[1-9]\d{0,3}[A-Z]\.bias", re.ASCII), "A"),
+    (re.compile(r"U[1-9]\d{0,3}[A-Z]\.gbw", re.ASCII), "Hz"),
+)
+_PARTS = "a part such as R203, C1, VR1, VCC, U1A.offset, U1A.high, U1A.low, U1A.bias or U1A.gbw"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured values of one board or several.
+
+    boards : their names in the file's order; one without a name where there is no column for it.
+    values : (boards,) by quantity, in SI units; nan where a board's was not measured. tolerances :
+    (boards,) half-widths in the same units. lines : where each quantity first stands.
+    """
+
+    boards: tuple[str, ...]
+    values: Mapping[str, tuple[float, ...]]
+    tolerances: Mapping[str, tuple[float, ...]]
+    content: bytes = field(repr=False)
+    source: Path | None = None
+    lines: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the file."""
+        return hashlib.sha256(self.content).hexdigest()
+
+    def as_dict(self) -> dict[str, Any]:
+        """What decides the boards; the values by the hash of their file."""
+        return {"sha256": self.sha256, "boards": list(self.boards), "parts": sorted(self.values)}
+
+    def check(self, circuit: Circuit) -> None:
+        """Refuse what cannot be of this circuit.
+
+        Raises
+        ------
+        InputError : a part that it lacks, or a value far from the one that the part is sold for.
+        """
+        self.check_names(circuit)
+        nominal = _nominal(circuit)
+        for name, values in self.values.items():
+            where = f"line {self.lines.get(name, 0)}"
+            low, high, unit = nominal[name]
+            for value in values:
+                if not math.isnan(value) and not low <= value <= high:
+                    ends = " to ".join(format_quantity(end, unit) for end in (low, high))
+                    found = f"{name}, {format_quantity(value, unit)}"
+                    raise InputError(self.source, where, found, f"a value within {ends}")
+
+    def check_names(self, circuit: Circuit, more: Collection[str] = ()) -> None:
+        """Refuse parts that are neither of this circuit nor among ``more``.
+
+        Raises
+        ------
+        InputError : names the first of them.
+        """
+        known = [*_nominal(circuit), *more]
+        for name in self.values:
+            if name not in known:
+                hint = did_you_mean(name, known)
+                expected = "a part of this design" + (f"; {hint}" if hint else "")
+                where = f"line {self.lines.get(name, 0)}"
+                raise InputError(self.source, where, name, expected)
+
+
+def read_measured(path: Path) -> Measured:
+    """Read a list of measured values.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or anything in it is wrong.
+    """
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(_MOST_BYTES + 1)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(path, "the file", reason, "a list of measured values (CSV)") from None
+    if len(content) > _MOST_BYTES:
+        raise InputError(path, "the file", f"more than {_MOST_BYTES} bytes", "a list of parts")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = content[: error.start].count(b"\n") + 1
+        found = f"byte 0x{content[error.start]:02x}"
+        raise InputError(path, f"line {row}", found, "text in UTF-8") from None
+    return _Reader(path, content).read(text)
+
+
+class _Reader:
+    def __init__(self, path: Path, content: bytes) -> None:
+        self.path, self.content = path, content
+        self.row = 1
+
+    def refuse(self, found: object, expected: str) -> NoReturn:
+        raise InputError(self.path, f"line {self.row}", found, expected) from None
+
+    def read(self, text: str) -> Measured:
+        entries: dict[tuple[str, str], tuple[float, float]] = {}
+        lines: dict[str, int] = {}
+        for cells in self.rows(text):
+            name, board = cells["part"], cells.get("board", "")
+            if not board and "board" in cells:
+                self.refuse("no board", "the name of the board in each line")
+            if (name, board) in entries:
+                self.refuse(f"{name} a second time", "each part once" + " a board" * bool(board))
+            unit = next((unit for form, unit in _UNITS if form.fullmatch(name)), None)
+            if unit is None:
+                self.refuse(name, _PARTS)
+            value = self.number(cells["value"], unit)
+            entries[name, board] = (value, self.tolerance(cells.get("tolerance", ""), unit, value))
+            lines.setdefault(name, self.row)
+        if not entries:
+            self.refuse("no measured value", "a line for each part that was measured")
+        boards = tuple(dict.fromkeys(board for _, board in entries))
+        missing = (math.nan, 0.0)
+
+        def column(which: int) -> dict[str, tuple[float, ...]]:
+            return {n: tuple(entries.get((n, b), missing)[which] for b in boards) for n in lines}
+
+        return Measured(boards, column(0), column(1), self.content, self.path, lines)
+
+    def rows(self, text: str) -> Iterator[dict[str, str]]:
+        """Cells by column; ``row`` is the line of each while it is looked at."""
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        try:
+            header = [cell.strip() for cell in next(reader, [])]
+            for name in header:
+                if name not in _COLUMNS:
+                    self.refuse(f"column {name!r}", one_of(name, _COLUMNS))
+            if len(set(header)) < len(header) or not {"part", "value"} <= set(header):
+                self.refuse(",".join(header), "columns part, value, and tolerance, board at will")
+            for row in reader:
+                self.row = reader.line_num
+                if not any(cell.strip() for cell in row):
+                    continue
+                if len(row) != len(header):
+                    self.refuse(f"{len(row)} cells", f"{len(header)}, as the header")
+                yield dict(zip(header, (cell.strip() for cell in row), strict=True))
+        except csv.Error as error:
+            self.row = reader.line_num
+            self.refuse(str(error), "a CSV file")
+
+    def number(self, text: str, unit: str) -> float:
+        try:
+            return parse_quantity(text, unit)
+        except ValueError as error:
+            self.refuse(text, f"a value in {unit} ({error})")
+
+    def tolerance(self, text: str, unit: str, value: float) -> float:
+        """Half-width in the unit of the value, of a fraction, a percentage or a quantity."""
+        expected = f'a fraction, "0.1%", or a quantity in {unit}'
+        if not text:
+            return 0.0
+        try:
+            if text.endswith("%"):
+                width = abs(value) * float(text[:-1]) / 100.0
+            elif text.endswith(unit):
+                width = parse_quantity(text, unit)
+            else:
+                width = abs(value) * float(text)
+        except ValueError:
+            self.refuse(text, expected)
+        if not 0.0 <= width < math.inf:
+            self.refuse(text, f"{expected}, not below 0")
+        return width
+
+
+def _nominal(circuit: Circuit) -> dict[str, tuple[float, float, str]]:
+    """Lowest and highest value, and unit, of everything that can be measured on a board."""
+
+    def about(value: float, unit: str) -> tuple[float, float, str]:
+        ends = sorted((value / _FACTOR, value * _FACTOR))
+        return ends[0], ends[1], unit
+
+    found = {r.name: about(r.value, "Ω") for r in circuit.resistors}
+    found |= {c.name: about(c.value, "F") for c in circuit.capacitors}
+    found |= {r.name: about(r.volts, "V") for r in circuit.references}
+    found |= {rail.name: about(rail.volts, "V") for rail in circuit.rails}
+    supply = circuit.supply
+    for s in circuit.sections:
+        found[f"{s.name}.offset"] = (-supply, supply, "V")
+        found[f"{s.name}.low"] = (-_FACTOR * supply, 0.0, "V")
+        found[f"{s.name}.high"] = (0.0, _FACTOR * supply, "V")
+        found[f"{s.name}.bias"] = (-1e-3, 1e-3, "A")
+        found[f"{s.name}.gbw"] = (1.0, 1e12, "Hz")
+    return found

@@ -1,0 +1,191 @@
+"""The mechanical model, in SI units and dimensionless, and the way between them.
+
+Eq. (1)-(5) of Shi and He, "Global bifurcation and circuit simulation of a soft-impacting system",
+as corrected in docs/errata.md. Mass M1 carries the clearance; K1, C1 join the masses; K2, C2 join
+M2 to ground; stops of stiffness K0 stand at distance B on one or both sides of M1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+
+from designer.base.errors import InputError
+from designer.model.mechanics import Clearance, SecondOrderSystem
+
+Sides = Literal["both", "upper", "lower"]
+
+
+@dataclass(frozen=True)
+class Dimensionless:
+    """Dimensionless parameters, Eq. (3).
+
+    m, k in (0, 1); k0, c in [0, 1); zeta > 0; f20 in [0, 1]; b > 0.
+
+    Raises
+    ------
+    InputError : a parameter lies outside its domain.
+    """
+
+    m: float
+    k: float
+    k0: float
+    c: float
+    zeta: float
+    f20: float
+    b: float
+    sides: Sides = "both"
+
+    def __post_init__(self) -> None:
+        domains = {
+            "m": (0.0 < self.m < 1.0, "a number in (0, 1)"),
+            "k": (
+                0.0 < self.k < 1.0,
+                "a number in (0, 1); k = 0 leaves a mode of motion without stiffness, "
+                "which no circuit can hold",
+            ),
+            "k0": (0.0 <= self.k0 < 1.0, "a number in [0, 1)"),
+            "c": (0.0 <= self.c < 1.0, "a number in [0, 1)"),
+            "zeta": (0.0 < self.zeta < math.inf, "a finite number > 0"),
+            "f20": (0.0 <= self.f20 <= 1.0, "a number in [0, 1]"),
+            "b": (0.0 < self.b < math.inf, "a finite number > 0"),
+            "sides": (self.sides in ("both", "upper", "lower"), '"both", "upper" or "lower"'),
+        }
+        for name, (fine, expected) in domains.items():
+            if not fine:
+                raise InputError(None, f"model.{name}", getattr(self, name), expected)
+
+    @property
+    def mu(self) -> float:
+        """Stop stiffness over K1: k0/(1 - k0), Eq. (5)."""
+        return self.k0 / (1.0 - self.k0)
+
+    def second_order(self) -> SecondOrderSystem:
+        """Eq. (4) as corrected, in dimensionless time and displacement."""
+        z2 = 2.0 * self.zeta
+        clearances: tuple[Clearance, ...] = ()
+        if self.k0 > 0.0:
+            clearances = (Clearance(0, self.mu, self.b, self.sides),)
+        return SecondOrderSystem(
+            mass=np.array([1.0, self.m / (1.0 - self.m)]),
+            damping=np.array([[z2, -z2], [-z2, z2 / (1.0 - self.c)]]),
+            stiffness=np.array([[1.0, -1.0], [-1.0, 1.0 / (1.0 - self.k)]]),
+            force=np.array([1.0 - self.f20, self.f20]),
+            clearances=clearances,
+        )
+
+
+@dataclass(frozen=True)
+class Mechanical:
+    """Parameters of Eq. (1)-(2) in SI units.
+
+    M1, M2 [kg]; C1, C2 [N s/m]; K0, K1, K2 [N/m]; B [m]; P1, P2 [N].
+    """
+
+    M1: float
+    M2: float
+    C1: float
+    C2: float
+    K0: float
+    K1: float
+    K2: float
+    B: float
+    P1: float
+    P2: float
+    sides: Sides = "both"
+
+    def __post_init__(self) -> None:
+        strictly = {"M1", "M2", "C1", "K1", "K2", "B"}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name == "sides":
+                if value not in ("both", "upper", "lower"):
+                    raise InputError(None, "mechanical.sides", value, '"both", "upper" or "lower"')
+                continue
+            fine = math.isfinite(value) and (value > 0.0 if f.name in strictly else value >= 0.0)
+            if not fine:
+                bound = "> 0" if f.name in strictly else ">= 0"
+                raise InputError(None, f"mechanical.{f.name}", value, f"a finite number {bound}")
+        if self.P1 + self.P2 <= 0.0:
+            raise InputError(
+                None, "mechanical.P1", self.P1, "P1 + P2 > 0: without a force nothing moves"
+            )
+
+    @property
+    def time_scale(self) -> float:
+        """Seconds per unit of dimensionless time, sqrt(M1/K1), Eq. (3)."""
+        return math.sqrt(self.M1 / self.K1)
+
+    @property
+    def length_scale(self) -> float:
+        """Metres per unit of dimensionless displacement, (P1 + P2)/K1, Eq. (3)."""
+        return (self.P1 + self.P2) / self.K1
+
+    @property
+    def force_scale(self) -> float:
+        """Newtons per unit of dimensionless force, P1 + P2."""
+        return self.P1 + self.P2
+
+    def omega(self, Omega: float) -> float:
+        """Dimensionless frequency of an excitation at ``Omega`` rad/s."""
+        return Omega * self.time_scale
+
+    def dimensionless(self) -> Dimensionless:
+        """Eq. (3)."""
+        return Dimensionless(
+            m=self.M2 / (self.M1 + self.M2),
+            k=self.K2 / (self.K1 + self.K2),
+            k0=self.K0 / (self.K0 + self.K1),
+            c=self.C2 / (self.C1 + self.C2),
+            zeta=self.C1 / (2.0 * math.sqrt(self.K1 * self.M1)),
+            f20=self.P2 / (self.P1 + self.P2),
+            b=self.B * self.K1 / (self.P1 + self.P2),
+            sides=self.sides,
+        )
+
+    @classmethod
+    def from_dimensionless(
+        cls,
+        model: Dimensionless,
+        *,
+        M1: float,
+        K1: float,
+        force: float,
+    ) -> Mechanical:
+        """The inverse of Eq. (3) for a chosen mass M1 [kg], stiffness K1 [N/m], force P1 + P2 [N].
+
+        Eq. (3) fixes only ratios, so three scales are free.
+        """
+        C1 = 2.0 * model.zeta * math.sqrt(K1 * M1)
+        return cls(
+            M1=M1,
+            M2=M1 * model.m / (1.0 - model.m),
+            C1=C1,
+            C2=C1 * model.c / (1.0 - model.c),
+            K0=K1 * model.mu,
+            K1=K1,
+            K2=K1 * model.k / (1.0 - model.k),
+            B=model.b * force / K1,
+            P1=force * (1.0 - model.f20),
+            P2=force * model.f20,
+            sides=model.sides,
+        )
+
+    def second_order(self) -> SecondOrderSystem:
+        """Eq. (1)-(2) in SI units."""
+        clearances: tuple[Clearance, ...] = ()
+        if self.K0 > 0.0:
+            clearances = (Clearance(0, self.K0, self.B, self.sides),)
+        return SecondOrderSystem(
+            mass=np.array([self.M1, self.M2]),
+            damping=np.array([[self.C1, -self.C1], [-self.C1, self.C1 + self.C2]]),
+            stiffness=np.array([[self.K1, -self.K1], [-self.K1, self.K1 + self.K2]]),
+            force=np.array([self.P1, self.P2]),
+            clearances=clearances,
+        )
+
+
+STATES = ("x1", "x1'", "x2", "x2'")

@@ -1,0 +1,328 @@
+"""Model files: TOML, ``format = 1`` (docs/contract.md).
+
+    format = 1
+    [model]                  # or [mechanical], in SI units
+    m = 0.5
+    …
+    [[response]]
+    omega = 0.85
+    expect = "1-2-2"
+    [circuit]
+    opamp = "TL074C"
+
+Whatever is wrong with a file ends in one ``InputError`` that names the file, the field, what was
+found and what was expected; nothing is read by half.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+from designer.base.errors import InputError
+from designer.base.inside_folder import inside
+from designer.base.schema import (
+    STRICT,
+    Accepts,
+    checked,
+    choice,
+    exactly,
+    line,
+    number,
+    parse_toml,
+    physical,
+)
+from designer.catalog.design_rule import Override
+from designer.model.board_table import BoardSpec, BoardTable
+from designer.model.circuit_table import CircuitSpec, CircuitTable
+from designer.model.measured_values import Measured, read_measured
+from designer.model.model import Dimensionless, Mechanical, Sides
+from designer.model.response_table import (
+    MAX_PERIODS,
+    Expect,
+    Response,
+    ResponseTable,
+    Twin,
+    response_of,
+)
+from designer.model.rules_table import overrides
+from designer.model.search_table import SearchSpec, SearchTable
+from designer.model.spread_table import BENCH_1, SpreadSpec, SpreadTable
+from designer.model.tuning_bands import Bands
+
+__all__ = [
+    "MAX_BYTES",
+    "MAX_PERIODS",
+    "CircuitSpec",
+    "Expect",
+    "ModelFile",
+    "Response",
+    "SpreadSpec",
+    "Twin",
+    "parse_model_file",
+    "read_model_file",
+]
+
+MAX_BYTES = 1_000_000
+"""A model file is a page of text; anything larger is something else."""
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model file that has passed every check.
+
+    ``model`` is always filled, from ``mechanical`` where that is what the file gives; ``text`` is
+    the file word for word. measured : the list that ``spread.measured`` names; read with the file.
+    rules : other limits of design rules, by their ids.
+    """
+
+    title: str
+    model: Dimensionless
+    mechanical: Mechanical | None
+    responses: tuple[Response, ...]
+    circuit: CircuitSpec
+    text: str = field(repr=False)
+    source: Path | None = None
+    spread: SpreadSpec = BENCH_1
+    measured: Measured | None = None
+    tuning: Bands = field(default_factory=Bands)
+    board: BoardSpec = field(default_factory=BoardSpec)
+    rules: Mapping[str, Override] = field(default_factory=dict, hash=False)
+    search: SearchSpec = field(default_factory=SearchSpec)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the text: two files with the same hash ask for the same thing."""
+        return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
+
+
+def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
+    """Read and check a model file, and the list of measured values that it names, if any.
+
+    measured : where that list lies, if not where the file says.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or anything in it is wrong.
+    """
+    path = Path(path)
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(path, "the file", "a folder", "a model file (TOML)")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(path, "the file", "no regular file", "a model file (TOML)")
+        with path.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(path, "the file", "nothing", "a model file (TOML)") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(path, "the file", reason, "a model file that can be read") from None
+    if len(content) > MAX_BYTES:
+        raise InputError(
+            path, "the file", f"more than {MAX_BYTES} bytes", "a model file: a page of TOML"
+        )
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = content[: error.start].count(b"\n") + 1
+        raise InputError(
+            path, f"line {row}", f"byte 0x{content[error.start]:02x}", "text in UTF-8"
+        ) from None
+    modelfile = parse_model_file(text, path)
+    named = modelfile.spread.measured
+    if named is None:
+        return modelfile
+    try:
+        place = measured or inside(path.parent, named, "spread.measured")
+    except InputError as error:
+        raise InputError(path, error.field, error.found, error.expected) from None
+    return replace(modelfile, measured=read_measured(place))
+
+
+def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
+    """Check the text of a model file; ``source`` is named in errors and gives the default title.
+
+    Raises
+    ------
+    InputError : anything in the text is wrong.
+    """
+    file = None if source is None else str(source)
+    tables = checked(_File, parse_toml(text, file), file)
+    model, mechanical = _models(tables, file)
+    responses = tuple(
+        response_of(table, index, mechanical, file)
+        for index, table in enumerate(tables.response, start=1)
+    )
+    circuit = CircuitSpec(**dict(tables.circuit))
+    if circuit.saturation is not None and circuit.saturation > circuit.supply:
+        raise InputError(
+            file,
+            "circuit.saturation",
+            circuit.saturation,
+            f"a voltage within the supply of {circuit.supply:g} V",
+        )
+    spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
+    title = tables.title or (source.stem if source is not None else "untitled")
+    tuning = Bands(**dict(tables.tuning))
+    made = ModelFile(
+        title,
+        model,
+        mechanical,
+        responses,
+        circuit,
+        text,
+        source,
+        spread,
+        tuning=tuning,
+        board=BoardSpec(**dict(tables.board)),
+        search=SearchSpec(**dict(tables.search)),
+    )
+    return replace(made, rules=overrides(tables.rules, file))
+
+
+def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
+    if tables.model is not None and tables.mechanical is not None:
+        raise InputError(file, "mechanical", "[model] and [mechanical]", "one of the two")
+    try:
+        if tables.model is not None:
+            return Dimensionless(**dict(tables.model)), None
+        if tables.mechanical is not None:
+            mechanical = Mechanical(**dict(tables.mechanical))
+            return _dimensionless(mechanical, file), mechanical
+    except InputError as error:
+        if error.file is not None:
+            raise
+        raise InputError(file, error.field, error.found, error.expected) from None
+    raise InputError(file, "model", "nothing", "a table [model] or a table [mechanical]")
+
+
+# Which quantity of Eq. (1)-(2) to look at when a dimensionless one leaves its domain.
+_CAUSES = {
+    "m": ("M2", "M2/(M1 + M2)"),
+    "k": ("K2", "K2/(K1 + K2)"),
+    "k0": ("K0", "K0/(K0 + K1)"),
+    "c": ("C2", "C2/(C1 + C2)"),
+    "zeta": ("C1", "C1/(2 sqrt(K1 M1))"),
+    "f20": ("P2", "P2/(P1 + P2)"),
+    "b": ("B", "B K1/(P1 + P2)"),
+}
+
+
+def _dimensionless(mechanical: Mechanical, file: str | None) -> Dimensionless:
+    try:
+        return mechanical.dimensionless()
+    except (ZeroDivisionError, OverflowError):
+        raise InputError(
+            file, "mechanical", "values too far apart", "SI values of one mechanism"
+        ) from None
+    except InputError as error:
+        name = error.field.removeprefix("model.")
+        if name not in _CAUSES:
+            raise
+        cause, formula = _CAUSES[name]
+        raise InputError(
+            file,
+            f"mechanical.{cause}",
+            getattr(mechanical, cause),
+            f"a value that makes {name} = {formula} {error.expected}",
+        ) from None
+
+
+# What the fields of a file accept.
+
+
+def _plain(domain: str) -> Accepts:
+    """A number; ``Dimensionless`` holds it to the domain, which is only told here."""
+    return number("", f"a number {domain}")
+
+
+def _band() -> Accepts:
+    return number("", "a number in [0, 1)", lambda value: 0.0 <= value < 1.0)
+
+
+# The tables of a file, key by key.
+
+
+class _ModelTable(BaseModel):
+    model_config = STRICT
+    m: Annotated[float, _plain("in (0, 1)")]
+    k: Annotated[float, _plain("in (0, 1)")]
+    k0: Annotated[float, _plain("in [0, 1)")]
+    c: Annotated[float, _plain("in [0, 1)")]
+    zeta: Annotated[float, _plain("> 0")]
+    f20: Annotated[float, _plain("in [0, 1]")]
+    b: Annotated[float, _plain("> 0")]
+    sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
+
+
+class _MechanicalTable(BaseModel):
+    model_config = STRICT
+    M1: Annotated[float, physical("kg")]
+    M2: Annotated[float, physical("kg")]
+    C1: Annotated[float, physical("N s/m")]
+    C2: Annotated[float, physical("N s/m", zero=True)]
+    K0: Annotated[float, physical("N/m", zero=True)]
+    K1: Annotated[float, physical("N/m")]
+    K2: Annotated[float, physical("N/m", zero=True)]
+    B: Annotated[float, physical("m")]
+    P1: Annotated[float, physical("N", zero=True)]
+    P2: Annotated[float, physical("N", zero=True)]
+    sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
+
+
+class _TuningTable(BaseModel):
+    model_config = STRICT
+    frequency: Annotated[float, _band()] = Bands.frequency
+    amplitude: Annotated[float, _band()] = Bands.amplitude
+    offset: Annotated[float, number("", "a number >= 0", lambda value: value >= 0.0)] = Bands.offset
+
+
+class _File(BaseModel):
+    model_config = STRICT
+    format: Annotated[int, exactly(1, "1, the format that this version reads")]
+    title: Annotated[str | None, line("text of one line")] = None
+    model: _ModelTable | None = Field(None, description="a table [model]")
+    mechanical: _MechanicalTable | None = Field(None, description="a table [mechanical]")
+    response: tuple[ResponseTable, ...] = Field(
+        (), strict=False, description="one table [[response]] for each response"
+    )
+    circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
+    tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
+    board: BoardTable = Field(BoardTable(), description="a table [board]")
+    rules: dict[str, object] = Field({}, description="tables [rules.<id>]")
+    search: SearchTable = Field(SearchTable(), description="a table [search]")
+    spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")
+
+
+def need_responses(modelfile: ModelFile, more: str = "") -> None:
+    """InputError unless the file wants a response."""
+    if not modelfile.responses:
+        raise InputError(
+            str(modelfile.source) if modelfile.source else None,
+            "response",
+            "nothing",
+            f"at least one table [[response]]{more}",
+        )
+
+
+class naming:  # noqa: N801 - reads as a word in a with statement
+    """Names the model file in an InputError that names none."""
+
+    def __init__(self, modelfile: ModelFile) -> None:
+        self._source = modelfile.source
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if not isinstance(error, InputError) or error.file is not None or self._source is None:
+            return
+        raise type(error)(self._source, error.field, error.found, error.expected) from None

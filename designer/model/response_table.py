@@ -1,0 +1,145 @@
+"""The tables ``[[response]]`` of a model file: what a board shall show."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Literal, NoReturn
+
+from pydantic import BaseModel
+
+from designer.base.errors import InputError
+from designer.base.schema import STRICT, Accepts, choice, flag, number, physical, shown, span
+from designer.model.model import Mechanical
+
+Twin = Literal["either", "exact"]
+
+MAX_PERIODS = 16
+"""Largest n of an n-p-q response (docs/definitions.md)."""
+
+_EXPECT = re.compile(r"([1-9]\d?)-(0|[1-9]\d{0,3})-(0|[1-9]\d{0,3})", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Expect:
+    """An n-p-q response: n forcing periods, p impacts at +b and q at -b in that time."""
+
+    n: int
+    p: int
+    q: int
+
+    def __str__(self) -> str:
+        return f"{self.n}-{self.p}-{self.q}"
+
+    @classmethod
+    def parse(cls, text: str) -> Expect:
+        """Read "1-2-2"; ValueError unless n is 1 to 16 and p and q are integers >= 0."""
+        match = _EXPECT.fullmatch(text)
+        if not match or int(match[1]) > MAX_PERIODS:
+            raise ValueError(f"not n-p-q with n from 1 to {MAX_PERIODS}")
+        return cls(int(match[1]), int(match[2]), int(match[3]))
+
+    def accepts(self, n: int, p: int, q: int, twin_exact: bool = False) -> bool:
+        """Whether n-p-q is this response, or its mirror twin n-q-p unless ``twin_exact``."""
+        if (n, p, q) == (self.n, self.p, self.q):
+            return True
+        return not twin_exact and (n, p, q) == (self.n, self.q, self.p)
+
+
+@dataclass(frozen=True)
+class Response:
+    """A response that the board shall show.
+
+    omega : dimensionless frequency; None for "best": the tool chooses it.
+    expect : the wanted n-p-q, or None where any is of interest.
+    twin : "either" accepts the mirror twin of ``expect`` as well; "exact" does not.
+    symmetric : whether the orbit has to be symmetric (True), asymmetric (False) or either (None).
+    b : clearance at which this response is wanted: a value, a range to choose from, or None for
+        the model's own.
+    """
+
+    omega: float | None
+    expect: Expect | None = None
+    twin: Twin = "either"
+    symmetric: bool | None = None
+    b: float | tuple[float, float] | None = None
+
+    def accepts(self, n: int, p: int, q: int) -> bool:
+        """Whether n-p-q is what is expected here; without an expectation, anything is."""
+        return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
+
+
+def response_of(
+    table: ResponseTable, index: int, mechanical: Mechanical | None, file: str | None
+) -> Response:
+    place = f"response[{index}]"
+
+    def refuse(key: str, found: object, expected: str) -> NoReturn:
+        raise InputError(file, f"{place}.{key}", found, expected)
+
+    if table.omega is not None and table.Omega is not None:
+        refuse("Omega", "omega and Omega", "one of the two")
+    omega = None if table.omega == "best" else table.omega
+    if table.Omega is not None:
+        if mechanical is None:
+            refuse("Omega", table.Omega, "omega: Omega in rad/s needs a table [mechanical]")
+        omega = mechanical.omega(table.Omega)
+        if not 0.0 < omega < math.inf:
+            refuse("Omega", table.Omega, "a frequency within the range of numbers")
+    elif table.omega is None:
+        refuse("omega", "nothing", _OMEGA + ("" if mechanical is None else ", or Omega in rad/s"))
+    if table.twin == "exact" and table.expect is None:
+        refuse("twin", shown(table.twin), "an expect that it can apply to")
+    assert not isinstance(omega, str)
+    return Response(omega, table.expect, table.twin, table.symmetric, table.b)
+
+
+_OMEGA = 'a number > 0, or "best"'
+
+
+def _positive(value: float) -> bool:
+    return value > 0.0
+
+
+def _omega() -> Accepts:
+    frequency = number("", _OMEGA, _positive)
+
+    def check(value: object) -> object:
+        return value if value == "best" else frequency.check(value)
+
+    return Accepts(_OMEGA, check)
+
+
+def _expect() -> Accepts:
+    def check(value: object) -> Expect:
+        if not isinstance(value, str):
+            raise ValueError
+        try:
+            return Expect.parse(value)
+        except ValueError:
+            raise ValueError from None
+
+    return Accepts(f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIODS} and p, q >= 0', check)
+
+
+def _clearance() -> Accepts:
+    expected = "a number > 0, or a range [low, high] of numbers > 0"
+    value_of, span_of = number("", expected, _positive), span("", expected, _positive)
+
+    def check(value: object) -> object:
+        return (span_of if isinstance(value, list) else value_of).check(value)
+
+    return Accepts(expected, check)
+
+
+class ResponseTable(BaseModel):
+    """What a table may hold."""
+
+    model_config = STRICT
+    omega: Annotated[float | Literal["best"] | None, _omega()] = None
+    Omega: Annotated[float | None, physical("rad/s")] = None
+    expect: Annotated[Expect | None, _expect()] = None
+    twin: Annotated[Twin, choice("either", "exact")] = "either"
+    symmetric: Annotated[bool | None, flag()] = None
+    b: Annotated[float | tuple[float, float] | None, _clearance()] = None

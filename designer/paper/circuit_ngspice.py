@@ -1,0 +1,130 @@
+"""The paper's Fig. 7 and Fig. 8 in ngspice: the nonlinear stage alone, and the whole circuit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section, nominal_board
+from designer.dynamics.kernel_four_state import POINTS
+from designer.paper.circuits import Built, Followed
+from designer.spice import deck, numerics_gate
+from designer.spice.deck import SolverSettings
+from designer.spice.job import SpiceJob
+from designer.spice.numerics_gate import GateResult, Subject
+from designer.spice.pool import SpicePool
+from designer.spice.simulator import SimulationFailed, Sweep
+
+FINE = 8 * POINTS
+"""Points of a drive period of a portrait: a contact of p = 8 still is a curve."""
+DISPLACEMENT = "v1"
+"""Net that the stage is fed from."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """One response in ngspice, with the settings that passed the gate.
+
+    trace : (n · FINE + 1, 4) states in model units from a strobe on; empty where there is none.
+    """
+
+    response: str
+    passed: bool
+    reason: str
+    steps: int
+    trace: Array
+
+    @property
+    def displacement(self) -> Array:
+        """(n · POINTS,) of the first mass."""
+        return self.trace[: -1 : FINE // POINTS, 0] if len(self.trace) else np.zeros(0)
+
+
+def stage_curve(pool: SpicePool, circuit: Circuit, reach: float, points: int) -> Array:
+    """(k, 2) v1 and the nonlinear stage's output [V], by ``.dc`` over ± reach.
+
+    The stage is cut out of the circuit and fed by a source; op-amps of the rung ``ideal``.
+
+    Raises
+    ------
+    SimulationFailed : ngspice gives no such curve.
+    """
+    step = 2.0 * reach / points
+    board = nominal_board(circuit)
+    stage = replace(
+        circuit,
+        parts=tuple(p for p in circuit.parts if p.name in _stage(circuit)),
+        generator=Generator("VM1", DISPLACEMENT),
+        states=(),
+        state_nets=(),
+    )
+    settings = SolverSettings("trap", 1.0, reltol=1e-6, abstol=1e-14, vntol=1e-9)
+    text = deck.write(
+        stage, board, Excitation(1.0, 1.0), settings, title="nonlinear stage", stop_time=1.0
+    )
+    lines = []
+    for line in text.splitlines():
+        word = line.split(maxsplit=1)[0]
+        if word == "VM1":
+            line = f"VM1 {DISPLACEMENT} 0 DC 0"
+        elif word == ".tran":
+            line = f".dc VM1 {-reach!r} {reach + 0.5 * step!r} {step!r}"
+        lines.append(line)
+    job = SpiceJob("\n".join(lines) + "\n", (OUTPUT,), reach - 0.01 * step, _whole, "dc")
+    for _, answer in pool.map([job]):
+        if isinstance(answer, SimulationFailed):
+            raise answer
+        return np.column_stack([answer.axis, answer.signals[OUTPUT].real])
+    raise SimulationFailed("ngspice gave no answer")
+
+
+def listen(pool: SpicePool, one: Built, followed: Sequence[Followed]) -> tuple[Heard, ...]:
+    """Every response that the exact circuit shows periodically, behind the numerics gate."""
+    reduction = one.reduction()
+    subjects = [Subject(reduction, one.excitation(f.omega), f.orbit) for f in followed if f.orbit.n]
+    results = iter(numerics_gate.check(pool, subjects))
+    return tuple(
+        _heard(next(results), one, f) if f.orbit.n else Heard("", False, "", 0, np.zeros((0, 4)))
+        for f in followed
+    )
+
+
+def _heard(result: GateResult, one: Built, followed: Followed) -> Heard:
+    steps = result.tried[-1]
+    if isinstance(result.read, SimulationFailed):
+        return Heard("failed", False, result.read.reason, steps, np.zeros((0, 4)))
+    orbit = result.read.orbit
+    trace = np.zeros((0, 4))
+    if orbit.n and result.read.trace is not None:
+        time, states = result.read.trace
+        grid = np.linspace(0.0, time[-1], orbit.n * FINE + 1)
+        trace = np.stack([np.interp(grid, time, column) for column in states.T], axis=1) / one.volts
+    reason = "" if result.passed else "the numerics gate did not pass"
+    return Heard(orbit.response, result.passed, reason, steps, trace)
+
+
+def _stage(circuit: Circuit) -> set[str]:
+    """Names of the parts that make the stage's output of v1: what is met going back from the
+    output, but for integrators and what feeds them. A section is met at its output alone."""
+    summing = {c.minus for c in circuit.capacitors}
+    ends = {GROUND, DISPLACEMENT} | {rail.net for rail in circuit.rails}
+    left = [p for p in circuit.parts if not summing & set(p.nets)]
+    nets, kept = {OUTPUT}, set[str]()
+    while True:
+        met = [
+            p
+            for p in left
+            if p.name not in kept and nets & {*([p.output] if isinstance(p, Section) else p.nets)}
+        ]
+        if not met:
+            return kept
+        kept |= {p.name for p in met}
+        nets |= {net for p in met for net in p.nets} - ends
+
+
+def _whole(sweep: Sweep) -> Sweep:
+    return sweep

@@ -1,0 +1,168 @@
+"""The circuits of the paper's Section 5 on its responses 1-p-p, and how well they follow them.
+
+A circuit is started on the model's own orbit; what it settles on is held against that orbit in
+model units, drive period by drive period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.catalog.catalog import Catalog
+from designer.check import checked_design
+from designer.circuit import paper_values
+from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
+from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.ensemble import displacement
+from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.paper_values import Candidate
+from designer.circuit.reduction import FloatingCircuit, Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit, OrbitStatus, failed
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.circuit_table import DeadZone
+from designer.model.find_responses import ModelResponse
+from designer.model.model_file import ModelFile
+from designer.paper.tolerance_cases import model_file
+from designer.yields.exact_rung import images, waveform_error
+
+PRINTED, CORRECTED, OURS, RECTIFIER = "printed", "corrected", "match", "rectifier"
+CIRCUITS = (PRINTED, CORRECTED, OURS, RECTIFIER)
+TITLES = {
+    PRINTED: "paper, as printed",
+    CORRECTED: "paper, corrected",
+    OURS: "this tool, same stage",
+    RECTIFIER: "this tool, rectifier stage",
+}
+
+
+@dataclass(frozen=True)
+class Built:
+    """A circuit with its generator and the scales that carry it over to the model.
+
+    errors : None where a coefficient has the wrong sign, ``reason`` says which; volts (states,)
+    are then those that were given instead.
+    """
+
+    candidate: Candidate
+    errors: CoefficientErrors | None
+    reason: str
+    volts: Array
+
+    @property
+    def circuit(self) -> Circuit:
+        return self.candidate.circuit
+
+    def reduction(self) -> Reduction:
+        """Of the nominal board, with the op-amps' finite gain and bias current."""
+        return Reduction(self.circuit, nominal_board(self.circuit))
+
+    def excitation(self, omega: float) -> Excitation:
+        """The generator's setting for a response."""
+        return Excitation(self.candidate.frequency * omega, self.candidate.amplitude)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a circuit settles on, from the model's orbit of one response.
+
+    kept : whether that is the wanted n-p-q. error : RMS difference of x1 from the model's, over its
+    peak, nan where the periods differ.
+    """
+
+    omega: float
+    expected: str
+    orbit: Orbit
+    kept: bool
+    error: float
+
+
+def model_with(zone: DeadZone) -> ModelFile:
+    """The paper's model and its eight responses, with this dead zone for the tool's own design."""
+    made = model_file()
+    text = made.text.replace('dead_zone = "rectifier"', f'dead_zone = "{zone}"')
+    return replace(made, circuit=replace(made.circuit, dead_zone=zone), text=text)
+
+
+def build(name: str, catalog: Catalog) -> Built:
+    """One of ``CIRCUITS``."""
+    model, opamp = paper_values.MODEL, catalog.opamp(paper_values.OPAMP)
+    if name == PRINTED:
+        values = paper_values.PRINTED
+        setting = paper_values.PRINTED_FREQUENCY, paper_values.PRINTED_AMPLITUDE
+        circuit = paper_values.circuit(model, values, opamp)
+    elif name == CORRECTED:
+        values = paper_values.corrected()
+        setting = paper_values.generator(model, values)
+        circuit = paper_values.circuit(model, values, opamp)
+    else:
+        zone: DeadZone = "rectifier" if name == RECTIFIER else "saturation"
+        _, design = checked_design.design_for(model_with(zone), catalog)
+        circuit = design.circuit
+        setting = design.errors.scales.frequency(1.0), design.amplitude()
+    return built(Candidate(TITLES[name], "", circuit, *setting))
+
+
+def built(candidate: Candidate, instead: Array | None = None) -> Built:
+    """With its scales. instead : (states,) volts per unit where the circuit has none of its own.
+
+    Raises
+    ------
+    ArithmeticError : it has none, and none were given.
+    """
+    try:
+        errors = coefficient_errors(candidate.circuit, paper_values.MODEL.second_order())
+    except (ArithmeticError, FloatingCircuit) as error:
+        if instead is None:
+            raise
+        return Built(candidate, None, str(error), instead)
+    return Built(candidate, errors, "", errors.scales.volts)
+
+
+def model_flow(omega: float) -> Flow:
+    """The paper's model under its drive."""
+    return Flow(paper_values.MODEL.second_order().piecewise_linear(), Drive(omega))
+
+
+def follow(one: Built, found: Sequence[ModelResponse]) -> tuple[Followed, ...]:
+    """Every response on the exact circuit."""
+    system = one.reduction().system()
+    out = []
+    for r in found:
+        flow = Flow(system, one.excitation(r.omega).drive)
+        try:
+            orbit = settle(flow, r.orbit.start * one.volts)
+        except ArithmeticError as error:
+            orbit = failed(str(error))
+        shown = np.zeros(0)
+        if orbit.status is OrbitStatus.PERIODIC:
+            shown = displacement(flow, orbit) / one.volts[0]
+        kept = orbit.status is OrbitStatus.PERIODIC and r.spec.accepts(orbit.n, orbit.p, orbit.q)
+        assert r.expected is not None
+        out.append(Followed(r.omega, r.expected, orbit, kept, error_of(r, shown)))
+    return tuple(out)
+
+
+def error_of(response: ModelResponse, shown: Array) -> float:
+    """RMS difference of a displacement (n · POINTS,) in model units from the model's, over its
+    peak; the nearest of the model's n periods and mirror images counts."""
+    flow = model_flow(response.omega)
+    wanted = images(displacement(flow, response.orbit), mirror=True)
+    return waveform_error(shown, wanted)
+
+
+def dc_curve(one: Built, v1: Array) -> Array:
+    """(k,) output [V] of the nonlinear stage at constant v1 (k,) [V]: the paper's Fig. 7."""
+    reduction = one.reduction()
+    system = reduction.system()
+    out = np.zeros(len(v1))
+    x = np.zeros(system.size)
+    for i, v in enumerate(v1):
+        x[0] = v
+        out[i] = reduction.output(system.mode_at(x, 0.0), OUTPUT, x[None, :], np.zeros(1))[0]
+    return out

@@ -1,0 +1,132 @@
+"""Pictures of the branches of periodic orbits, and of the 1-p-p responses with their twins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from designer.base.arrays import Array
+from designer.base.figure_style import CONTACT, GRID, MUTED, new_figure, style
+from designer.bifurcations.branch_survey import Survey
+from designer.bifurcations.continuation import Branch
+from designer.bifurcations.points import Bifurcation
+from designer.bifurcations.titles import NAMES
+from designer.report.bifurcation_plots import BLACK, MARKS, RED
+
+COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")
+"""Of the branches, by how many times they left another."""
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """An orbit in the plane (x1, x1'), and its mirror twin where it has one of its own.
+
+    title : above the panel. b : clearance. orbit, twin : (points, 2) closed curves.
+    """
+
+    title: str
+    b: float
+    orbit: Array
+    twin: Array | None
+
+
+def branches(found: Survey, low: float, high: float) -> Figure:
+    """Least first displacement of each orbit over the parameter: solid where stable."""
+    with style():
+        figure = new_figure(9.6, 5.4)
+        axes = figure.subplots()
+        deepest = 0
+        for number, branch in enumerate(found.branches):
+            depth, above = 0, found.parents[number]
+            while above >= 0:
+                depth, above = depth + 1, found.parents[above]
+            deepest = max(deepest, depth)
+            _line(axes, branch, found.on(number), COLOURS[min(depth, len(COLOURS) - 1)])
+        kinds: dict[str, list[tuple[float, float]]] = {}
+        for p in found.points:
+            if p.stable[0] or p.stable[1]:
+                least = float(p.point.orbit.extremes[0, 0])
+                kinds.setdefault(str(p.kind), []).append((p.value, least))
+        handles = [
+            Line2D([], [], color=MUTED, lw=1.6, label="stable"),
+            Line2D([], [], color=MUTED, lw=0.6, ls=(0, (3, 2)), label="unstable"),
+        ]
+        for depth in range(deepest + 1):
+            name = ("symmetric", "asymmetric twins", "their doubled orbits")
+            label = name[depth] if depth < len(name) else f"left another {depth} times"
+            colour = COLOURS[min(depth, len(COLOURS) - 1)]
+            handles.append(Line2D([], [], color=colour, lw=1.6, label=label))
+        for kind, at in kinds.items():
+            marker, colour = MARKS[kind]
+            look: dict[str, Any] = {
+                "marker": marker,
+                "color": colour,
+                "mfc": "white",
+                "ms": 4.5,
+                "ls": "",
+            }
+            axes.plot(*np.transpose(at), **look, zorder=4)
+            handles.append(Line2D([], [], **look, label=kind))
+        axes.grid(True, color=GRID, lw=0.5)
+        axes.set_xlim(low, high)
+        axes.set_xlabel(NAMES.get(found.parameter, found.parameter))
+        axes.set_ylabel("least x₁ of the orbit")
+        figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    return figure
+
+
+def _line(axes: Axes, branch: Branch, points: Sequence[Bifurcation], colour: str) -> None:
+    """A branch with its bifurcation points as nodes, so that both kinds of line reach to them."""
+    nodes = [(float(i), p.value, p.orbit, p.stable) for i, p in enumerate(branch.points)]
+    nodes += [(p.position, p.value, p.point.orbit, p.stable[1]) for p in points]
+    nodes.sort(key=lambda node: node[0])
+    here = np.array([[value, orbit.extremes[0, 0]] for _, value, orbit, _ in nodes])
+    axes.plot(here[:, 0], here[:, 1], color=colour, lw=0.6, ls=(0, (3, 2)), zorder=2)
+    for a, b, start, end in zip(here, here[1:], nodes, nodes[1:], strict=False):
+        at_bifurcation = end[0] != int(end[0])
+        if start[3] and (end[3] or at_bifurcation):
+            both = np.stack([a, b])
+            axes.plot(both[:, 0], both[:, 1], color=colour, lw=1.6, zorder=3)
+
+
+def portraits(panels: Mapping[int, Sequence[Portrait]]) -> Figure:
+    """The paper's Fig. 3: for each p a row of panels, twins in black and red."""
+    with style():
+        columns = max(len(row) for row in panels.values())
+        across = 2 if len(panels) > 4 else 1
+        rows = -(-len(panels) // across)
+        figure = new_figure(2.45 * columns * across, 2.35 * rows)
+        grid = figure.subplots(rows, columns * across, squeeze=False)
+        for axes in grid.ravel():
+            axes.set_visible(False)
+        for place, row in enumerate(panels.values()):
+            for column, panel in enumerate(row):
+                axes = grid[place % rows, columns * (place // rows) + column]
+                axes.set_visible(True)
+                _panel(axes, panel)
+        handles = [
+            Line2D([], [], color=BLACK, lw=1.2, label="orbit"),
+            Line2D([], [], color=RED, lw=1.2, label="its mirror twin"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _panel(axes: Axes, panel: Portrait) -> None:
+    curves = [panel.orbit] if panel.twin is None else [panel.orbit, panel.twin]
+    reach = 1.12 * max(float(np.abs(c[:, 0]).max()) for c in curves)
+    for side in (-1, 1):
+        axes.axvspan(side * panel.b, side * reach, color=CONTACT, lw=0, zorder=0)
+        axes.axvline(side * panel.b, color=MUTED, lw=0.6, zorder=1)
+    for curve, colour in zip(curves, (BLACK, RED), strict=False):
+        axes.plot(curve[:, 0], curve[:, 1], color=colour, lw=0.9, zorder=3 - (colour == RED))
+    axes.set_xlim(-reach, reach)
+    axes.set_title(panel.title, loc="left")
+    axes.set_xlabel("x₁")
+    axes.set_ylabel("x₁′")

@@ -1,0 +1,101 @@
+"""What the op-amps' input offsets do to each response: every section at ± one size.
+
+All offsets of a board have the same size, the typical or the largest of the data sheet, and only
+their signs differ. Each of these boards is asked from the nominal circuit's own orbit, as a board
+of a tolerance study is; the other parts are exact.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import nominal_board
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.model.find_responses import ModelResponse
+from designer.paper.circuits import Built
+from designer.yields.verdict import Verdict, Yield, judge
+
+PATTERNS = 512
+"""Sign patterns, at most; twelve sections have 4096."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """One response with offsets of one size [V]: verdicts over the sign patterns.
+
+    there : whether the nominal circuit shows the response; where not, nothing is counted.
+    to : what the boards that lose it show, and on how many patterns, most frequent first.
+    """
+
+    omega: float
+    expected: str
+    size: float
+    there: bool
+    counted: Yield
+    to: tuple[tuple[str, int], ...]
+
+
+def signs(sections: int, most: int = PATTERNS) -> Array:
+    """(k, sections) of ±1: every pattern, or ``most`` of them drawn without replacement.
+
+    The first is all plus. A pattern and its negative give mirror images of the same board, but
+    for bias currents; both are kept, for they cost little and need no argument.
+    """
+    total = 2**sections
+    numbers = np.arange(total)
+    if total > most:
+        drawn = np.random.default_rng(0).choice(total - 1, most - 1, replace=False) + 1
+        numbers = np.concatenate([[0], np.sort(drawn)])
+    bits = (numbers[:, None] >> np.arange(sections)) & 1
+    return np.asarray(1.0 - 2.0 * bits)
+
+
+def shifts(
+    one: Built,
+    found: Sequence[ModelResponse],
+    size: float,
+    *,
+    jobs: int = 1,
+    most: int = PATTERNS,
+) -> tuple[Shift, ...]:
+    """Each response on every board with offsets of ± size [V]."""
+    circuit = one.circuit
+    patterns = signs(len(circuit.sections), most)
+    nominal = Boards.of(circuit, [nominal_board(circuit)])
+    many = nominal.take(np.zeros(len(patterns), dtype=np.intp))
+    offset = {s.name: size * patterns[:, i] for i, s in enumerate(circuit.sections)}
+    ensemble = Ensemble(replace(many, offset=offset), jobs=jobs)
+    system = one.reduction().system()
+    out = []
+    for r in found:
+        assert r.expected is not None
+        drive = one.excitation(r.omega).drive
+        own = settle(Flow(system, drive), r.orbit.start * one.volts)
+        if judge(own, r.spec, own)[0] is not Verdict.OK:
+            out.append(Shift(r.omega, r.expected, size, False, Yield(0, 0, 0, 0), ()))
+            continue
+        met = ensemble.settle(
+            range(len(patterns)),
+            [drive] * len(patterns),
+            np.tile(own.start, (len(patterns), 1)),
+            jobs=jobs,
+        )
+        judged = [judge(orbit, r.spec, own)[0] for orbit in met]
+        tally = Counter(judged)
+        lost = Counter(
+            orbit.response for orbit, v in zip(met, judged, strict=True) if v is not Verdict.OK
+        )
+        counted = Yield(
+            tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
+        )
+        to = tuple(sorted(lost.items(), key=lambda item: (-item[1], item[0])))
+        out.append(Shift(r.omega, r.expected, size, True, counted, to))
+    return tuple(out)

@@ -1,0 +1,267 @@
+"""The report on the design that a search finds, beside the paper's circuits.
+
+    python -m designer.paper.robust_design reports/robust-design
+
+A search of ``examples/robust.toml`` (every place free) and one at the model's own clearance (ω
+free), the paper's circuit as printed and as corrected, and the rectifier stage by the match alone:
+yields as built on fresh boards, tuned and reached for what was searched, blame, what limits each
+response, price and parts, and what every lever is worth. Each case is on disk when it is done.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from designer.base.atomic_write import write
+from designer.base.checks import cores
+from designer.base.design_folder import Folder
+from designer.base.errors import DesignerError
+from designer.base.plain_json import dumps, plain
+from designer.base.progress import Progress, progress_for
+from designer.base.report_pieces import CaseStore
+from designer.base.toml_writer import toml_text
+from designer.base.version import __version__
+from designer.catalog.catalog import Catalog, load_catalog
+from designer.check import checked_design
+from designer.check.synthesis_result import Synthesis
+from designer.jobs import search_job
+from designer.jobs.design_files import load
+from designer.jobs.options import Options
+from designer.jobs.origin import provenance
+from designer.jobs.search_job import search_into
+from designer.jobs.study_folder import FolderStores
+from designer.model.circuit_table import CircuitSpec
+from designer.model.model_file import ModelFile, parse_model_file, read_model_file
+from designer.paper.tolerance_cases import TITLES, cases, model_file
+from designer.report import comparison
+from designer.yields import exact_rung, study_identity, study_plan
+from designer.yields.blame_analysis import blame
+from designer.yields.joint_yield import all_on_one
+from designer.yields.limiting_parts import limitings
+from designer.yields.study import Study
+from designer.yields.tolerance_study import tolerance
+from designer.yields.verdict import StudyPlan, Yield, count
+
+FORMAT = 1
+MODEL = Path("examples/robust.toml")
+SAMPLES, SHORT, SEED = 4000, 500, 71
+"""Boards as built; boards that are tuned and powered up, at first; of the boards that count."""
+TARGET, MORE = 0.99, 4
+"""Yield that tuned and reached boards are to have; where the interval of a response has this
+inside, so many times the boards are asked, once."""
+OTHERS, BLAMED = 500, 250
+"""Boards at most of the paper's circuits, where most settle slowly; boards behind a blame."""
+FREE, NOMINAL = "searched", "searched, nominal b"
+FILES = ("robust-design.json", "yields.png", "yields.svg", "levers.png", "levers.svg", "README.md")
+
+
+def report(
+    out: Path,
+    *,
+    model: Path = MODEL,
+    samples: int = SAMPLES,
+    short: int = SHORT,
+    seed: int = SEED,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Make the report in the folder ``out``; finished cases that are there are not made again.
+
+    Raises
+    ------
+    InputError, Unreachable, EnvironmentMissing : as of a search.
+    """
+    said = Progress() if progress is None else progress
+    jobs = cores() if jobs is None else jobs
+    catalog, file = load_catalog(), read_model_file(model)
+    options = Options(seed, jobs, samples, resume=True)
+    rules = [__version__, search_job.RULES, study_identity.RULES]
+    settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
+    store = CaseStore(out, FILES, resume=True, place="out")
+    store.expect(dumps(settings, indent=None))
+
+    def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        slug = name.replace(", ", "-").replace(" ", "-")
+        return store.piece(slug, lambda: plain({"name": name, **make()}))
+
+    def searched(name: str, asked: ModelFile, *, tuned: bool) -> dict[str, Any]:
+        place = out / name
+        outcome = search_into(
+            asked, place, options, said, lambda o: o.command("search", model, place)
+        )
+        row = _searched(_made(place, catalog), place, options, short, said, tuned=tuned)
+        return {**row, "confirmation": outcome.answer["confirmation"]}
+
+    def nominal() -> dict[str, Any]:
+        fixed = parse_model_file(at_model_clearance(file), out / "nominal.toml")
+        return searched("nominal", fixed, tuned=True)
+
+    found = []
+    for other in cases(catalog, samples=min(samples, OTHERS), seed=seed):
+        if other.reference:
+            spec = model_file().circuit
+            title = TITLES[other.circuit]
+            make = partial(_as_built, other.plan, spec, catalog, jobs, said)
+            found.append(case(title, make))
+    free = partial(searched, "free", file, tuned=False)
+    found += [case(FREE, free), case(NOMINAL, nominal)]
+    numbers = {"samples": samples, "short": short}
+    source = provenance(file, catalog.hash, seed=seed, settings=numbers)
+    document = {"format": FORMAT, "cases": found, "provenance": source}
+    for name, content in _files(document, model, samples, short, seed).items():
+        write(out / name, content)
+    return document
+
+
+def at_model_clearance(file: ModelFile) -> str:
+    """The text of the model file with every response at the model's own clearance."""
+    data = tomllib.loads(file.text)
+    for response in data["response"]:
+        response.pop("b", None)
+    data["title"] = f"{file.title}, nominal b"
+    return toml_text(data)
+
+
+def _made(folder: Path, catalog: Catalog) -> Synthesis:
+    return load(Folder(folder), read_model_file(folder / "model.toml"), catalog)
+
+
+def _searched(
+    made: Synthesis, place: Path, options: Options, short: int, said: Progress, *, tuned: bool
+) -> dict[str, Any]:
+    """A searched design: as built on all boards, reached (and tuned) on some."""
+    checked = checked_design.check(made.design, made.found, None)
+    jobs = cores() if options.jobs is None else options.jobs
+    asked = [c for c in checked if c.model.found]
+    plan = study_plan.plan_study(
+        made.modelfile, made.design, asked, made.catalog, samples=options.samples, seed=options.seed
+    )
+    row = _as_built(plan, made.modelfile.circuit, made.catalog, jobs, said)
+    powered = place / "powered-up"
+    powered.mkdir(exist_ok=True)
+    for boards in (short, MORE * short):
+        study = tolerance(
+            made,
+            samples=boards,
+            rung="exact",
+            tuned=tuned,
+            reached=True,
+            blamed=False,
+            seed=options.seed,
+            jobs=jobs,
+            checked=checked,
+            stores=FolderStores(powered, lambda: None),
+            progress=said,
+        )
+        if _decided(study, len(checked), tuned=tuned):
+            break
+    for i in range(len(checked)):
+        layers = {"reached": study.reached_of(i)} | ({"tuned": study.tuned_of(i)} if tuned else {})
+        row["responses"][i] |= {name: _counted(count(rows)) for name, rows in layers.items()}
+        row["responses"][i]["b"] = made.found[i].b
+    row["all_on_one"] |= {
+        name: None if one is None else _counted(one)
+        for name, one in (("tuned", study.all_tuned), ("reached", study.all_reached))
+    }
+    search = json.loads((place / "search.json").read_text(encoding="utf-8"))
+    kept = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
+    return {**row, "search": {key: search[key] for key in kept}}
+
+
+def _decided(study: Study, responses: int, *, tuned: bool) -> bool:
+    """Whether the intervals of tuned and reached yields have the target outside, all of them."""
+    counted = [count(study.reached_of(i)) for i in range(responses)]
+    counted += [study.all_reached] if study.all_reached is not None else []
+    if tuned:
+        counted += [count(study.tuned_of(i)) for i in range(responses)]
+        counted += [study.all_tuned] if study.all_tuned is not None else []
+    return not any(low <= TARGET <= high for low, high in (c.interval for c in counted))
+
+
+def _as_built(
+    plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int, said: Progress
+) -> dict[str, Any]:
+    """Yields, blame, limits, price and parts of a circuit."""
+    step = said.stage("boards as built", plan.samples * len(plan.questions))
+    answers = exact_rung.block(plan, range(plan.samples), jobs, step)
+    some = replace(plan, samples=min(plan.samples, BLAMED))
+    first = answers[: some.samples * len(plan.questions)]
+    blamed = blame(some, first, jobs=jobs, progress=said.stage("blame")).responses
+    limits = limitings(some, first, jobs=jobs, progress=said.stage("limits"))
+    rows = []
+    for k, question in enumerate(plan.questions):
+        counted = count([a for a in answers if a.question == k])
+        rows.append(
+            {
+                "expect": str(question.spec.expect),
+                "omega": question.spec.omega,
+                "as built": _counted(counted),
+                "blame": blamed[k].limited_by,
+                "limited_by": limits[k].line,
+            }
+        )
+    return {
+        "responses": rows,
+        "all_on_one": {"as built": _counted(all_on_one(answers))},
+        "bill": dict(comparison.bill_of(plan.circuit, spec, catalog).__dict__),
+        "parts": plan.circuit.values,
+    }
+
+
+def _counted(counted: Yield) -> dict[str, Any]:
+    low, high = counted.interval
+    return {**counted.__dict__, "rate": counted.rate, "low": low, "high": high}
+
+
+def _files(
+    document: Mapping[str, Any], model: Path, samples: int, short: int, seed: int
+) -> dict[str, bytes]:
+    from designer.base.figure_style import to_png, to_svg  # Matplotlib takes a while to import
+    from designer.paper.robust_design_page import lever_chart, readme, yield_chart
+
+    contents = {"robust-design.json": _json(document)}
+    found: Sequence[Mapping[str, Any]] = document["cases"]
+    for name, figure in (("yields", yield_chart(found)), ("levers", lever_chart(found))):
+        picture = io.BytesIO()
+        to_png(figure, picture)
+        contents |= {f"{name}.png": picture.getvalue(), f"{name}.svg": to_svg(figure).encode()}
+    numbers = f"--samples {samples} --short {short} --seed {seed}"
+    command = f"python -m designer.paper.robust_design reports/robust-design {numbers}"
+    contents["README.md"] = readme(found, command, model.name).encode()
+    return contents
+
+
+def _json(value: Mapping[str, Any]) -> bytes:
+    text = json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
+    return f"{text}\n".encode()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m designer.paper.robust_design")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--model", type=Path, default=MODEL)
+    parser.add_argument("--samples", type=int, default=SAMPLES)
+    parser.add_argument("--short", type=int, default=SHORT)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--jobs", type=int)
+    asked = parser.parse_args(arguments)
+    try:
+        with progress_for(False) as progress:
+            report(progress=progress, **vars(asked))
+    except DesignerError as error:
+        print(f"search_report: {error}", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,123 @@
+"""Figures of the blame: losses avoided by part and response, and the margins' indices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from designer.base.figure_style import GRID, INK, MUTED, new_figure, say, styled
+from designer.yields.blame_analysis import ResponseBlame, Subject
+
+PARTS_SHOWN = 16
+INDICES_SHOWN = 8
+COLOURS = "cividis"
+"""Even in lightness and told apart with every common form of colour blindness."""
+_FIRST, _TOTAL = "#0072b2", "#9fcbe6"
+
+
+@styled
+def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -> Figure:
+    """Share of the losses avoided if one part, or one group, were exact: a row for each, a column
+    for each response that lost boards. Groups stand above the line, then the parts that help
+    most."""
+    shown = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.subjects]
+    if not shown:
+        figure = new_figure(7.4, 1.2)
+        say(figure.subplots(), "no board was lost")
+        return figure
+    groups, parts = _rows([b for _, b in shown])
+    rows = groups + parts
+    figure = new_figure(7.4, 0.2 * len(rows) + 1.3)
+    axes = figure.subplots()
+    values = np.full((len(rows), len(shown)), np.nan)
+    for j, (_, b) in enumerate(shown):
+        known = {s.name: s for s in b.subjects}
+        for i, name in enumerate(rows):
+            if name in known:
+                values[i, j] = 100.0 * known[name].share
+    image = axes.imshow(values, cmap=COLOURS, vmin=0.0, vmax=100.0, aspect="auto")
+    axes.set_yticks(range(len(rows)), rows, color=INK)
+    ticks = [f"{_short(t)}\n{b.lost} lost" for t, b in shown]
+    axes.set_xticks(range(len(shown)), ticks, color=INK, size=7)
+    axes.tick_params(length=0)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    if groups and parts:
+        axes.axhline(len(groups) - 0.5, color="white", lw=3.0)
+    for i, j in np.ndindex(*values.shape):
+        if np.isfinite(values[i, j]) and values[i, j] >= 0.5:
+            ink = "white" if values[i, j] < 55.0 else INK
+            axes.text(j, i, f"{values[i, j]:.0f}", ha="center", va="center", color=ink, size=7)
+    bar = figure.colorbar(image, ax=axes, pad=0.015, fraction=0.04)
+    bar.set_label("losses avoided if exact [%]")
+    bar.outline.set_visible(False)
+    return figure
+
+
+@styled
+def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -> Figure:
+    """Sobol indices of each response's margin: its largest coordinates, first-order and total."""
+    shown = [(t, b) for t, b in zip(labels, blames, strict=True) if b is not None and b.indices]
+    if not shown:
+        figure = new_figure(7.4, 1.2)
+        say(figure.subplots(), "nothing limits any response")
+        return figure
+    columns = min(3, len(shown))
+    lines = -(-len(shown) // columns)
+    figure = new_figure(7.4, lines * (0.19 * INDICES_SHOWN + 0.75) + 0.5)
+    grid = figure.subplots(lines, columns, squeeze=False, sharex=True)
+    for axes in grid.flat[len(shown) :]:
+        axes.set_axis_off()
+    for axes, (title, b) in zip(grid.flat, shown, strict=False):
+        _indices(axes, title, b)
+    for axes in grid[-1]:
+        axes.set_xlabel("share of the margin’s variance [%]")
+    handles = [
+        axes.barh([0], [0], color=_TOTAL, label="total index"),
+        axes.barh([0], [0], color=_FIRST, label="first-order index"),
+    ]
+    figure.legend(handles=handles, loc="outside upper right", ncols=2)
+    return figure
+
+
+def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
+    top = b.indices[:INDICES_SHOWN]
+    place = range(len(top))
+    axes.barh(place, [100.0 * max(x.total, 0.0) for x in top], color=_TOTAL, height=0.75)
+    axes.barh(place, [100.0 * max(x.first, 0.0) for x in top], color=_FIRST, height=0.36)
+    axes.set_yticks(place, [x.coordinate for x in top], color=INK, size=7)
+    axes.set_ylim(INDICES_SHOWN - 0.4, -0.6)
+    axes.set_xlim(0.0, 100.0)
+    axes.set_title(title, size=8, color=INK, loc="left")
+    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="x", labelbottom=True)
+    axes.grid(axis="x", color=GRID, lw=0.7)
+    decided = b.prediction.ok + b.prediction.lost
+    if decided:
+        said = f"sign foretells {b.prediction.right} of {decided}"
+        axes.text(
+            0.98, 0.04, said, ha="right", va="bottom", size=6.5, color=MUTED,
+            transform=axes.transAxes,
+        )  # fmt: skip
+
+
+def _rows(blames: Sequence[ResponseBlame]) -> tuple[list[str], list[str]]:
+    """Names of the groups, and of the parts that avoid most losses over all responses."""
+
+    def worth(subjects: Sequence[Subject], group: bool) -> list[str]:
+        best: dict[str, float] = {}
+        for s in subjects:
+            if (s.kind == "group") == group and np.isfinite(s.share):
+                best[s.name] = max(best.get(s.name, 0.0), s.share)
+        return sorted(best, key=lambda name: (-best[name], name))
+
+    every = [s for b in blames for s in b.subjects]
+    return worth(every, True), worth(every, False)[:PARTS_SHOWN]
+
+
+def _short(label: str) -> str:
+    """ "ω = 0.54   1-3-3" on two lines."""
+    return "\n".join(label.split("   ", 1))

@@ -1,0 +1,317 @@
+"""Designs of one model side by side: errors, peaks, offsets, parts, price, and what they show.
+
+Each column is a circuit with its generator's settings. Everything is computed from the reduction
+of that circuit, with the finite gain and the bias current of its op-amp where it moves, with ideal
+op-amps where its coefficients are asked for (docs/definitions.md). What cannot be computed says
+why and does not keep the rest from being shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.errors import Unreachable
+from designer.board.bom import bill
+from designer.board.component import components
+from designer.catalog.catalog import PRICE_CLASSES, Catalog, Kind, OpAmp
+from designer.check.synthesis_result import Synthesis
+from designer.circuit import paper_values
+from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
+from designer.circuit.netlist import Board, Capacitor, Circuit, Resistor, Section, nominal_board
+from designer.circuit.paper_values import Candidate
+from designer.circuit.reduction import FloatingCircuit, Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit, failed
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.board_table import BoardChoice
+from designer.model.find_responses import ModelResponse, matches
+from designer.model.model import Dimensionless
+from designer.model.model_file import CircuitSpec
+from designer.synthesis import output_loads as loads
+from designer.synthesis.output_loads import Load, Loads
+
+OURS = "this design"
+_PROBE = 1e-3
+"""Offset [V] that the shift is computed with; it is proportional, so the size does not matter."""
+
+
+_GAIN = 1e9
+"""Of op-amps that are ideal but for offsets; between two diodes an infinite one has no answer."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One wanted response on one circuit: what it settles on from the model's own orbit.
+
+    kept : whether that is the wanted response (where nothing is wanted, the model's).
+    """
+
+    omega: float
+    expected: str | None
+    orbit: Orbit
+    kept: bool
+
+
+@dataclass(frozen=True)
+class OffsetShare:
+    """Shift of v1's operating point against the middle of the clearance, over the threshold.
+
+    typical, maximum : root of the sum of squares over all sections, each with the offset of that
+    name in the catalogue; nan where the catalogue has none. largest : the section with the largest
+    part in it.
+    """
+
+    typical: float
+    maximum: float
+    largest: str
+
+
+@dataclass(frozen=True)
+class Bill:
+    """parts : pieces to solder. packages : of op-amps. distinct : different values of resistors
+    and capacitors. price : upper bound [€], the sum of the upper ends of the price classes of
+    everything that is sold. unsold : names of the parts whose value no catalogue family holds."""
+
+    parts: int
+    packages: int
+    distinct: int
+    price: float
+    unsold: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Column:
+    """Everything about one design.
+
+    errors : None where a coefficient has the wrong sign; ``reason`` says so. k0, f20, b : as
+    realised by the parts and the stated amplitude, by their definitions in Eq. (3); nan where they
+    do not apply. frequency_error : ln(stated/right) of the generator's frequency.
+    """
+
+    candidate: Candidate
+    errors: CoefficientErrors | None
+    reason: str
+    k0: float
+    f20: float
+    b: float
+    frequency_error: float
+    offset: OffsetShare | None
+    loads: Loads
+    shown: tuple[Shown, ...]
+    bill: Bill
+
+    @property
+    def current(self) -> Load | None:
+        """The section that gives the largest current."""
+        return max(self.loads.sections, key=lambda load: load.current, default=None)
+
+
+def compare(
+    made: Synthesis, progress: Callable[[str], None] = lambda _: None
+) -> tuple[Column, ...]:
+    """The paper's circuits for this model, as far as they can follow it, and the design."""
+    model, spec = made.design.model, made.modelfile.circuit
+    ours = Candidate(
+        OURS,
+        f"chosen for the model file: {spec.opamp}, resistors {' and '.join(spec.resistors)}, "
+        f"capacitors {' and '.join(spec.capacitors)}",
+        made.design.circuit,
+        made.design.errors.scales.frequency(1.0),
+        made.design.amplitude(),
+    )
+    out = []
+    for candidate in (*paper_values.candidates(model, spec, made.catalog), ours):
+        progress(candidate.name)
+        out.append(column(candidate, model, made.found, spec, made.catalog))
+    return tuple(out)
+
+
+def column(
+    candidate: Candidate,
+    model: Dimensionless,
+    found: Sequence[ModelResponse],
+    spec: CircuitSpec,
+    catalog: Catalog,
+) -> Column:
+    """One design's figures. Coefficients of the wrong sign and responses without an answer are
+    part of them.
+
+    Raises
+    ------
+    FloatingCircuit : the nodal equations of the circuit have no unique answer in some mode.
+    """
+    circuit = candidate.circuit
+    errors, reason = None, ""
+    try:
+        swing = None if circuit.stops else (circuit.saturation, np.ones(len(circuit.states)))
+        errors = coefficient_errors(circuit, model.second_order(), swing=swing)
+    except (ArithmeticError, FloatingCircuit) as error:
+        reason = str(error)
+    reduction = Reduction(circuit, nominal_board(circuit))
+    drives = [_drive(candidate, model, r) for r in found]
+    shown = tuple(_show(reduction, model, errors, r, d) for r, d in zip(found, drives, strict=True))
+    opamp = catalog.opamp(circuit.opamp)
+    return Column(
+        candidate=candidate,
+        errors=errors,
+        reason=reason,
+        k0=_k0(model, errors),
+        f20=float("nan")
+        if errors is None
+        else float(errors.drive_gain[1] / errors.drive_gain.sum()),
+        b=_b(candidate, model, errors),
+        frequency_error=_frequency_error(candidate, errors),
+        offset=offset_share(circuit, opamp),
+        loads=loads.over(
+            reduction, *loads.runs([r.omega for r in found], drives, [s.orbit for s in shown])
+        ),
+        shown=shown,
+        bill=bill_of(circuit, spec, catalog),
+    )
+
+
+def _drive(candidate: Candidate, model: Dimensionless, response: ModelResponse) -> Drive:
+    """The generator for this response; a clearance of its own is set by the amplitude."""
+    return Drive(
+        2.0 * np.pi * candidate.frequency * response.omega,
+        -candidate.amplitude * model.b / response.b,
+    )
+
+
+def _show(
+    reduction: Reduction,
+    model: Dimensionless,
+    errors: CoefficientErrors | None,
+    response: ModelResponse,
+    drive: Drive,
+) -> Shown:
+    """From the model's orbit, or from rest where the circuit has no scale to carry it over."""
+    start = np.zeros(len(reduction.circuit.states))
+    if errors is not None:
+        start = response.orbit.start * errors.scales.volts * (model.b / response.b)
+    try:
+        orbit = settle(Flow(reduction.system(), drive), start)
+    except ArithmeticError as error:
+        orbit = failed(str(error))
+    kept = matches(orbit, response.spec)
+    if response.expected is None:
+        own = response.orbit
+        kept = (orbit.status, orbit.n, {orbit.p, orbit.q}) == (
+            own.status,
+            own.n,
+            {own.p, own.q},
+        )
+    return Shown(response.omega, response.expected, orbit, kept)
+
+
+def _k0(model: Dimensionless, errors: CoefficientErrors | None) -> float:
+    """K0/(K0 + K1) of the parts: the ratio of two terms of one equation, so free of scales.
+
+    Where the two sides differ, of the side that is further off.
+    """
+    if errors is None:
+        return float("nan")
+    own = errors.errors["x1'' x1"]
+    off = [e - own for name, e in errors.errors.items() if name.endswith("stop slope")]
+    if not off:
+        return float("nan")
+    mu = model.mu * np.exp(max(off, key=abs))
+    return float(mu / (1.0 + mu))
+
+
+def _b(candidate: Candidate, model: Dimensionless, errors: CoefficientErrors | None) -> float:
+    """B K1/(P1 + P2) of the parts and the amplitude, from the driven mass M1 (M2 if f20 = 1)."""
+    if errors is None or not candidate.circuit.stops:
+        return float("nan")
+    if model.f20 < 1.0:
+        force = errors.drive_gain[0] * candidate.amplitude / (1.0 - model.f20)
+    else:
+        force = errors.drive_gain[1] * candidate.amplitude
+    return float(model.b * np.exp(errors.errors["x1'' x1"]) / force)
+
+
+def _frequency_error(candidate: Candidate, errors: CoefficientErrors | None) -> float:
+    """Against ω = 2π f √(M1/K1), with M1 and K1 of the parts: free of scales too."""
+    if errors is None:
+        return float("nan")
+    own = 0.5 * (errors.errors["x1' x1'"] + errors.errors["x1'' x1"])
+    return float(np.log(candidate.frequency / errors.scales.frequency(1.0)) - own)
+
+
+def offset_share(circuit: Circuit, opamp: OpAmp) -> OffsetShare | None:
+    """See ``OffsetShare``; None without a clearance, or where the circuit has no operating point.
+
+    The operating point is the equilibrium of the mode in which every stop is open, without drive,
+    all op-amps ideal but for their offsets.
+    """
+    if not circuit.stops:
+        return None
+    ideal = replace(nominal_board(circuit, ideal=True), inverse_gain=1.0 / _GAIN)
+    try:
+        nominal, width = _distances(circuit, ideal)
+        shifts = {
+            s.name: _shift(_distances(circuit, replace(ideal, offset={s.name: _PROBE}))[0], nominal)
+            for s in circuit.sections
+        }
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+    per_volt = float(np.sqrt(sum(s**2 for s in shifts.values()))) / _PROBE / width
+    typical, largest = opamp.offset.typ, opamp.offset.max
+    return OffsetShare(
+        float("nan") if typical is None else per_volt * abs(typical),
+        float("nan") if largest is None else per_volt * abs(largest),
+        max(shifts, key=lambda name: abs(shifts[name])),
+    )
+
+
+def _distances(circuit: Circuit, board: Board) -> tuple[dict[int, float], float]:
+    """Distance [V] of the operating point to the stop on each side, and the half clearance.
+
+    One-sided: the clearance is the distance itself.
+    """
+    system = Reduction(circuit, board).system()
+    mode = system.mode(system.start)
+    point = -np.linalg.solve(mode.A, mode.d)
+    out: dict[int, float] = {}
+    for guard in mode.guards:
+        if guard.clearance != 0:
+            continue
+        side = system.mode(guard.target).sides[0]
+        if side:
+            away = -float(guard.C @ point + guard.e)
+            out[side] = min(away, out.get(side, np.inf))
+    if not out:
+        raise ArithmeticError("no stop beside the open mode")
+    return out, sum(out.values()) / len(out)
+
+
+def _shift(moved: dict[int, float], nominal: dict[int, float]) -> float:
+    """How far the point went towards the upper stop, against the middle of the clearance."""
+    return sum(side * (nominal[side] - moved[side]) for side in nominal) / len(nominal)
+
+
+def bill_of(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
+    passives: tuple[tuple[Kind, float, Sequence[Resistor | Capacitor]], ...] = (
+        ("resistor", spec.resistor_grade, circuit.resistors),
+        ("capacitor", spec.capacitor_grade, circuit.capacitors),
+    )
+    unsold = []
+    for kind, grade, parts in passives:
+        for part in parts:
+            try:
+                catalog.part(kind, part.value, grade)
+            except Unreachable:
+                unsold.append(part.name)
+    sold = replace(circuit, parts=tuple(p for p in circuit.parts if p.name not in unsold))
+    lines = bill(components(sold, catalog, BoardChoice.of(spec)))
+    return Bill(
+        parts=sum(not isinstance(p, Section) for p in circuit.parts) + len(circuit.packages),
+        packages=len(circuit.packages),
+        distinct=sum(len({part.value for part in parts}) for _, _, parts in passives),
+        price=float(sum(x.quantity * PRICE_CLASSES[x.price_class - 1] for x in lines)),
+        unsold=tuple(unsold),
+    )

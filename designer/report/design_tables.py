@@ -1,0 +1,201 @@
+"""Tables of a report about the design itself: model, parts, errors, scales, conditions."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from designer.base.figure_style import EXACT
+from designer.circuit.design import Design
+from designer.circuit.netlist import Capacitor, Diode, Reference, Resistor, Section
+from designer.report import words
+from designer.report.data import ReportData
+from designer.report.tables import Table
+
+_PARAMETERS = {
+    "m": "mass ratio M2/(M1 + M2)",
+    "k": "stiffness ratio K2/(K1 + K2)",
+    "k0": "stop stiffness K0/(K0 + K1)",
+    "c": "damping ratio C2/(C1 + C2)",
+    "zeta": "damping ζ = C1/(2 √(K1 M1))",
+    "f20": "share of the force on M2, P2/(P1 + P2)",
+    "b": "clearance B K1/(P1 + P2)",
+    "sides": "sides of M1 with a stop",
+}
+
+_UNITS = {
+    "M1": "kg", "M2": "kg", "C1": "N s/m", "C2": "N s/m", "K0": "N/m", "K1": "N/m", "K2": "N/m",
+    "B": "m", "P1": "N", "P2": "N",
+}  # fmt: skip
+
+_MEANINGS = {
+    "M": "mass", "C": "damper", "K": "spring", "K0": "stop's spring", "B": "clearance",
+    "P": "force amplitude on mass",
+}  # fmt: skip
+
+_CONDITIONS = {
+    "frequency_low_hz": ("frequency at ω = 1, at least", "Hz"),
+    "frequency_high_hz": ("frequency at ω = 1, at most", "Hz"),
+    "swing_v": ("peak of any state, at most", "V"),
+    "rectifier_fv_v": ("rectifier's output, so that the idle half stays off, at most", "V"),
+    "generator_peak_v": ("generator amplitude (peak), at most", "V"),
+    "signal_level_ratio": ("ratio of the states' peaks that belong together, at most", ""),
+    "signal_share_ratio": ("another state's peak over that of x₁, at most", ""),
+    "signal_offset_ratio": ("peak of x₁ over the op-amps' largest offset, at least", ""),
+    "noise_gain": ("noise gain of a stage, at most", ""),
+    "noise_gain_bandwidth_hz": ("noise gain times the fastest harmonic, at most", "Hz"),
+    "output_current_a": ("current of an output (peak), at most", "A"),
+    "load_ohm": ("load of an output, at least", "Ω"),
+    "signal_resistor_low_ohm": ("signal resistors, at least", "Ω"),
+    "signal_resistor_high_ohm": ("signal resistors, at most", "Ω"),
+    "stop_resistor_r4_low_ohm": (
+        "R4, so that the stop's resistor is no heavier load, at least",
+        "Ω",
+    ),
+}
+
+_QUANTITY = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)([fpnµmkM]?[ΩFVW])(?!\w)")
+
+
+def model_table(data: ReportData) -> Table:
+    model = data.design.model
+    rows = [
+        ("ζ" if k == "zeta" else k, words.number(getattr(model, k)), t)
+        for k, t in _PARAMETERS.items()
+    ]
+    return Table(("parameter", "value", "what it is"), tuple(rows), (1,))
+
+
+def mechanical_table(data: ReportData) -> Table | None:
+    given = data.modelfile.mechanical
+    if given is None:
+        return None
+    rows = []
+    for name, unit in _UNITS.items():
+        kind = _MEANINGS.get(name) or f"{_MEANINGS[name[0]]} {name[1:]}"
+        rows.append((name, words.quantity(getattr(given, name), unit), kind))
+    return Table(("parameter", "value", "what it is"), tuple(rows), (1,))
+
+
+def bom_table(data: ReportData) -> Table | None:
+    if not data.bom:
+        return None
+    shown = {
+        "quantity": "qty", "designators": "designators", "value": "value",
+        "part_number": "part number", "manufacturer": "manufacturer", "footprint": "footprint",
+        "rating": "rating", "grade": "grade", "price_class": "price class",
+    }  # fmt: skip
+    keys = [k for k in shown if any(k in row for row in data.bom)]
+    rows = tuple(tuple(_bom_cell(k, str(row.get(k, ""))) for k in keys) for row in data.bom)
+    return Table(
+        tuple(shown[k] for k in keys), rows, (0, keys.index("value")) if "value" in keys else (0,)
+    )
+
+
+def part_table(data: ReportData) -> Table:
+    """Everything but the op-amps, by what it does."""
+    roles: dict[str, list[str]] = {}
+    for part in data.design.circuit.parts:
+        if not isinstance(part, Section):
+            roles.setdefault(part.role, []).append(f"{part.name}\u00a0=\u00a0{_value(part)}")
+    return Table(("role", "parts"), tuple((r, ", ".join(p)) for r, p in roles.items()))
+
+
+def _value(part: Resistor | Capacitor | Diode | Reference) -> str:
+    match part:
+        case Diode():
+            return part.model.name
+        case Reference():
+            return f"{part.model} ({words.quantity(part.volts, 'V')})"
+        case Resistor():
+            return words.quantity(part.value, "Ω")
+        case Capacitor():
+            return words.quantity(part.value, "F")
+
+
+def opamp_table(data: ReportData) -> Table:
+    sections = data.design.circuit.sections
+    return Table(
+        ("section", "package", "role"), tuple((s.name, s.package, s.role) for s in sections)
+    )
+
+
+def error_table(design: Design) -> Table:
+    wanted = design.model.second_order().state_matrix()
+    rows = []
+    for name, error in design.errors.errors.items():
+        term = words.TERM.fullmatch(name)
+        want = "0" if name in ("dead-zone null", "dead-zone bias") else words.NONE
+        if term is not None:
+            row, column = (2 * (int(term[i]) - 1) + len(term[i + 1]) for i in (1, 3))
+            want = words.number(float(wanted[row - 1, column]))
+        elif name.endswith("stop slope"):
+            want = words.number(design.model.mu)
+        rows.append((words.coefficient(name), want, words.error(error)))
+    return Table(("coefficient", "wanted", "ln(realised/wanted)"), tuple(rows), (1, 2))
+
+
+def scale_table(data: ReportData) -> Table:
+    design, scales = data.design, data.design.errors.scales
+    mechanical = data.modelfile.mechanical
+    rows = [
+        ("one unit of model time", words.quantity(scales.seconds, "s")),
+        ("generator frequency at ω = 1", words.quantity(scales.frequency(1.0), "Hz")),
+    ]
+    if mechanical is not None:
+        slow = mechanical.time_scale / scales.seconds
+        rows.append(("mechanism's time per circuit time", f"{words.number(slow)} s/s"))
+    if design.circuit.stops:
+        rows.append(("contact begins at (v1)", _thresholds(design)))
+    for state, volts in zip(("x₁", "x₁′", "x₂", "x₂′"), scales.volts, strict=False):
+        rows.append((f"one unit of {state}", words.quantity(float(volts), "V")))
+        if mechanical is not None:
+            speed = state.endswith("′")
+            scale = mechanical.length_scale / (mechanical.time_scale if speed else 1.0)
+            unit = "m/s" if speed else "m"
+            rows.append((f"one volt of {state}", words.quantity(scale / float(volts), unit)))
+    gain = float(np.sum(design.errors.drive_gain))
+    if gain > 0.0:
+        rows.append(
+            ("generator for the model's force of 1", f"{words.quantity(1.0 / gain, 'V')} peak")
+        )
+        if mechanical is not None:
+            rows.append(("one generator volt", words.quantity(gain * mechanical.force_scale, "N")))
+    return Table(("scale", "value"), tuple(rows), (1,))
+
+
+def _thresholds(design: Design) -> str:
+    """v1 where contact begins, with its sign; ± where both stops stand alike."""
+    scales = design.errors.scales
+    upper = words.quantity(scales.threshold, "V")
+    lower = f"−{words.quantity(scales.threshold_lower, 'V')}"
+    if not math.isfinite(scales.threshold_lower):
+        return upper
+    if design.circuit.stops[0].upper is None:
+        return lower
+    return f"± {upper}" if abs(scales.offcentre) < EXACT else f"{upper} and {lower}"
+
+
+def condition_table(design: Design) -> Table:
+    rows = tuple(_condition(k, v) for k, v in design.conditions.items())
+    return Table(("condition", "value"), rows, (1,))
+
+
+def _bom_cell(key: str, text: str) -> str:
+    if key == "grade" and text:
+        try:
+            return f"{100 * float(text):g} %"
+        except ValueError:
+            return text
+    if key == "footprint":
+        return text.rpartition(":")[2]  # the library's name says what the value says already
+    if key in ("value", "rating"):
+        return _QUANTITY.sub("\\1\u00a0\\2", text.replace(" ", "\u00a0"))
+    return text
+
+
+def _condition(name: str, value: float) -> tuple[str, str]:
+    text, unit = _CONDITIONS.get(name, (name.replace("_", " "), ""))
+    return text, words.quantity(value, unit) if unit else words.number(value)

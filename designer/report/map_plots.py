@@ -1,0 +1,123 @@
+"""Figures of the yield maps: a curve with its interval, a heat map over ω and grade."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.yields.yield_maps import YieldMap
+
+_LINE, _BAND, _BEST = "#0072b2", "#c6dff0", "#d55e00"
+_AXES = {
+    "omega": "drive frequency ω",
+    "b": "clearance b (the generator’s amplitude goes as 1/b)",
+    "grade": "grade of resistors and capacitors [%]",
+}
+
+
+@styled
+def map_chart(label: str, found: YieldMap) -> Figure:
+    """A yield map of the response ``label``, readable alone."""
+    if len(found.axes) == 2:
+        return _heat(label, found)
+    figure = new_figure(6.2, 3.1)
+    axes = figure.subplots()
+    name = found.axes[0].name
+    scale = 100.0 if name == "grade" else 1.0
+    x = scale * np.array(found.axes[0].values)
+    axes.fill_between(x, 100.0 * found.low, 100.0 * found.high, color=_BAND, lw=0.0)
+    axes.plot(x, 100.0 * found.rate, "-o", color=_LINE, ms=3.6, lw=1.2)
+    gone = ~found.there
+    if gone.any():
+        axes.plot(x[gone], np.zeros(gone.sum()), "x", color=MUTED, ms=6, clip_on=False)
+    if name == "grade":
+        axes.set_xscale("log")
+        axes.set_xticks(x, [f"{v:g}" for v in x])
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    _marks(axes, found, scale)
+    axes.set_ylim(0.0, 103.0)
+    axes.set_ylabel("yield with its 95 % interval [%]")
+    axes.set_xlabel(_AXES[name])
+    _hertz(axes, found)
+    axes.grid(color=GRID, lw=0.7)
+    axes.set_title(f"{label}; {found.samples} boards a point", loc="left", color=INK, size=9)
+    handles, names = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, names, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def _marks(axes: Axes, found: YieldMap, scale: float) -> None:
+    word = "coarsest of the best" if found.over == "grade" else "recommended"
+    best = None if found.recommended is None else scale * found.recommended[0]
+    if best is None:
+        axes.plot([], [], color=_BEST, lw=1.2, label=f"{word}: nowhere")
+    elif best == found.used and found.over != "grade":
+        axes.axvline(best, color=_BEST, lw=1.2, label=f"recommended, in use: {best:.4g}")
+    else:
+        axes.axvline(best, color=_BEST, lw=1.2, label=f"{word}: {best:.4g}")
+    if found.over == "grade":
+        return
+    if best != found.used:
+        axes.axvline(found.used, color=INK, lw=0.9, ls="--", label=f"in use: {found.used:.4g}")
+    if found.window is not None:
+        for edge, open_ in zip(found.window, found.open, strict=True):
+            if not open_:
+                axes.axvline(edge, color=MUTED, lw=0.9, ls=":")
+        axes.plot([], [], color=MUTED, lw=0.9, ls=":", label="edge of the nominal window")
+    if (~found.there).any():
+        axes.plot([], [], "x", color=MUTED, label="not there nominally")
+
+
+def _hertz(axes: Axes, found: YieldMap) -> None:
+    """The generator's frequency above ω."""
+    if found.axes[0].name != "omega" or found.frequency is None:
+        return
+    scale = found.frequency / found.used
+    top = axes.secondary_xaxis(
+        "top", functions=(partial(np.multiply, scale), partial(np.multiply, 1.0 / scale))
+    )
+    top.set_xlabel("drive frequency [Hz]")
+
+
+def _heat(label: str, found: YieldMap) -> Figure:
+    figure = new_figure(6.6, 3.3)
+    axes = figure.subplots()
+    omega, grade = (np.array(a.values) for a in found.axes)
+    values = np.where(found.there, 100.0 * found.rate, np.nan)
+    edges = _edges(omega)
+    image = axes.pcolormesh(
+        edges, np.arange(len(grade) + 1) - 0.5, values.T, cmap="cividis", vmin=0.0, vmax=100.0
+    )
+    axes.set_yticks(range(len(grade)), [f"{100 * g:g}" for g in grade])
+    axes.set_xlabel(_AXES["omega"])
+    _hertz(axes, found)
+    axes.set_ylabel(_AXES["grade"])
+    axes.axvline(found.used, color="white", lw=1.0, ls="--")
+    best = found.recommended
+    where = ([], []) if best is None else ([best[0]], [found.axes[1].values.index(best[1])])
+    said = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
+    axes.plot(
+        *where, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {said}"
+    )  # fmt: skip
+    axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {found.used:.4g}")
+    axes.set_facecolor("#d9d9d9")
+    bar = figure.colorbar(image, ax=axes, pad=0.015, format=FuncFormatter(lambda v, _: f"{v:g}"))
+    bar.set_label("yield [%]")
+    axes.set_title(f"{label}; {found.samples} boards a point", loc="left", color=INK, size=9)
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def _edges(centres: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list[float]:
+    """Cell edges around these centres."""
+    if len(centres) == 1:
+        return [float(centres[0]) * 0.995, float(centres[0]) * 1.005]
+    middle = 0.5 * (centres[1:] + centres[:-1])
+    first, last = 2.0 * centres[0] - middle[0], 2.0 * centres[-1] - middle[-1]
+    return [float(first), *map(float, middle), float(last)]

@@ -1,0 +1,277 @@
+"""Figures of one response: phase portraits and time traces, all engines over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from designer.base.arrays import Array, Index
+from designer.base.figure_style import (
+    CIRCUIT,
+    CONTACT,
+    IMPACT,
+    INK,
+    MODEL,
+    MUTED,
+    NGSPICE,
+    axis_limits,
+    new_figure,
+    say,
+    styled,
+)
+from designer.check.checked_design import Checked
+from designer.circuit.nominal import Trace
+from designer.dynamics.orbit import Orbit, OrbitStatus
+
+ENGINES = {"model": "model", "circuit": "exact circuit", "ngspice": "ngspice"}
+"""Names of the engines, by their keys in ``checked_design.traces``."""
+
+BOTH = (1, -1)
+"""Sides with a stop: 1 upper, -1 lower; () for a model without a clearance."""
+
+APERIODIC_PERIODS = 8
+"""Drive periods of a response without a period that a time trace shows."""
+
+MOST_DOTS = 130
+"""Dots of ngspice in one picture: enough to see, few enough not to hide what lies below."""
+
+WIDEST_TITLE = 48
+"""Characters of a panel's second line; statuses are longer than n-p-q and take a line each."""
+
+
+@styled
+def phase_portrait(
+    checked: Checked,
+    traces: Mapping[str, Trace],
+    *,
+    sides: Sequence[int] = BOTH,
+    legend: bool = True,
+) -> Figure:
+    """One response in the plane (x1, x1'), all engines over each other, in model units.
+
+    The model is a broad light line, the exact circuit a dashed one on it, ngspice dots; triangles
+    mark where an impact begins; beyond ±b the mass is in contact. sides : the stops there are.
+    """
+    figure = new_figure(3.5, 3.5 if legend else 3.2)
+    axes = figure.subplots()
+    _portrait(axes, checked, traces, sides)
+    if legend:
+        _engine_legend(figure, [traces], [checked], sides, columns=2)
+    return figure
+
+
+@styled
+def portrait_sheet(
+    shown: Sequence[tuple[Checked, Mapping[str, Trace]]], *, sides: Sequence[int] = BOTH
+) -> Figure:
+    """Phase portraits of all responses as small multiples, each with limits of its own."""
+    columns = max(1, min(3, len(shown)))
+    rows = max(1, -(-len(shown) // columns))
+    figure = new_figure(max(3.2 * columns, 3.5), 2.85 * rows + 0.35)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for i, (axes, (checked, traces)) in enumerate(zip(grid, shown, strict=False)):
+        _portrait(axes, checked, traces, sides)
+        axes.set_xlabel("x₁" if i + columns >= len(shown) else "")
+        axes.set_ylabel("x₁′" if i % columns == 0 else "")
+    for axes in grid[len(shown) :]:
+        axes.set_axis_off()
+    if shown:
+        _engine_legend(figure, [t for _, t in shown], [c for c, _ in shown], sides, columns=5)
+    else:
+        say(grid[0], "no responses")
+    return figure
+
+
+@styled
+def time_traces(
+    checked: Checked,
+    traces: Mapping[str, Trace],
+    *,
+    sides: Sequence[int] = BOTH,
+    legend: bool = True,
+) -> Figure:
+    """x1(t) over the n periods of the response, with the stops shaded."""
+    figure = new_figure(3.5, 2.15 if legend else 1.75)
+    axes = figure.subplots()
+    model, period = checked.model, 2.0 * np.pi / checked.model.omega
+    orbits = _orbits(checked)
+    n = max((o.n for o in orbits.values() if o.status is OrbitStatus.PERIODIC), default=0)
+    span = n or APERIODIC_PERIODS
+    reference = traces.get("model")
+    shown: list[Array] = []
+    for name, trace in _drawn(traces, orbits).items():
+        cycles, x = trace.time / period, trace.states[:, 0]
+        if reference is not None and name != "model" and n > 1:
+            x = _shifted(cycles, x, reference.time / period, reference.states[:, 0], n)
+        keep = (cycles <= span * (1.0 + 1e-9)) & np.isfinite(x)
+        cycles, x = cycles[keep], x[keep]
+        if not len(x):
+            continue
+        shown.append(x)
+        if name == "ngspice":
+            at = _spaced(cycles / span, x / max(float(np.ptp(x)), 1e-300) * 0.5, 0.035)
+            axes.plot(cycles[at], x[at], **_look(name, orbits[name]))
+        else:
+            axes.plot(cycles, x, **_look(name, orbits[name]))
+    low, high = axis_limits(np.concatenate([*shown, [0.0]]), _gaps(checked, sides))
+    axes.set_ylim(low, high)
+    axes.set_xlim(0.0, span)
+    for gap in _gaps(checked, sides):
+        axes.axhspan(gap, high if gap > 0 else low, color=CONTACT, lw=0, zorder=0)
+        axes.axhline(gap, color=MUTED, lw=0.8, zorder=1)
+    axes.xaxis.set_major_locator(MaxNLocator(6, integer=span > 2))
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+    length = f"{1e3 / checked.excitation.frequency:.3g} ms"
+    axes.set_xlabel(f"drive periods ({length} each on the bench)", size=8)
+    axes.set_ylabel("x₁")
+    if legend:
+        axes.set_title(f"ω = {model.omega:.4g}", loc="left", weight="bold", color=INK)
+    return figure
+
+
+@styled
+def legend(*, ngspice: bool = True, sides: Sequence[int] = BOTH) -> Figure:
+    """The key to portraits and traces, for a page that shows many without one."""
+    names = [name for name in ENGINES if ngspice or name != "ngspice"]
+    figure = new_figure(3.9, 0.48)
+    figure.legend(handles=_keys(names, sides), loc="center left", ncols=3, borderpad=0.0)
+    return figure
+
+
+def _orbits(checked: Checked) -> dict[str, Orbit]:
+    found = {"model": checked.model.orbit, "circuit": checked.circuit}
+    if checked.ngspice is not None:
+        found["ngspice"] = checked.ngspice
+    return found
+
+
+def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str, Trace]:
+    """What there is to draw; a failed run of ngspice is no response and is not drawn."""
+    return {
+        name: traces[name]
+        for name in ENGINES
+        if name in traces and name in orbits and orbits[name].status is not OrbitStatus.FAILED
+    }
+
+
+def _gaps(checked: Checked, sides: Sequence[int]) -> tuple[float, ...]:
+    """Where the stops stand, in model units."""
+    return tuple(side * checked.model.b for side in sides)
+
+
+def _portrait(
+    axes: Axes, checked: Checked, traces: Mapping[str, Trace], sides: Sequence[int]
+) -> None:
+    orbits, gaps = _orbits(checked), _gaps(checked, sides)
+    drawn = {
+        name: states[np.isfinite(states).all(axis=1)]
+        for name, trace in _drawn(traces, orbits).items()
+        for states in [trace.states[:, :2]]
+    }
+    every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
+    xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
+    for gap in gaps:
+        axes.axvspan(gap, xlim[1] if gap > 0 else xlim[0], color=CONTACT, lw=0, zorder=0)
+        axes.axvline(gap, color=MUTED, lw=0.8, zorder=1)
+    for name, states in drawn.items():
+        if name == "ngspice":
+            scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
+            states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
+        axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
+    model = checked.model.orbit
+    for gap, marker in zip(gaps, [">" if gap > 0 else "<" for gap in gaps], strict=True):
+        entry = model.impact_velocities[model.impact_sides * gap > 0]
+        axes.plot(
+            np.full(len(entry), gap),
+            entry,
+            ls="",
+            marker=marker,
+            **_IMPACT,
+            zorder=5,
+            clip_on=False,
+        )
+    axes.set_xlim(*xlim)
+    axes.set_ylim(*ylim)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+    axes.set_xlabel("x₁")
+    axes.set_ylabel("x₁′")
+    short = {"model": "model", "circuit": "circuit", "ngspice": "ngspice"}
+    said = "   ".join(f"{short[name]} {orbit.response}" for name, orbit in orbits.items())
+    if len(said) > WIDEST_TITLE:
+        said = "\n".join(f"{short[name]} {orbit.response}" for name, orbit in orbits.items())
+    wanted = f", wanted {checked.model.expected}" if checked.model.expected else ""
+    pad = 17.0 + 11.0 * said.count("\n")
+    axes.set_title(
+        f"ω = {checked.model.omega:.4g}{wanted}", loc="left", weight="bold", color=INK, pad=pad
+    )
+    axes.annotate(
+        said, (0.0, 1.0), (0, 6), xycoords="axes fraction", textcoords="offset points",
+        color=MUTED, size=8,
+    )  # fmt: skip
+
+
+_IMPACT: dict[str, Any] = {"mfc": IMPACT, "mec": "white", "mew": 0.5, "ms": 6.0}
+
+
+def _look(name: str, orbit: Orbit) -> dict[str, Any]:
+    """How an engine is drawn; a response without a period in thin lines, or it is a blot."""
+    periodic = orbit.status is OrbitStatus.PERIODIC
+    if name == "ngspice":
+        return {"ls": "", "marker": "o", "ms": 3.0, "mew": 0, "color": NGSPICE, "zorder": 4}
+    dense = orbit.p + orbit.q > 6 * max(orbit.n, 1) or orbit.n > 2
+    broad = 2.6 if dense else 4.0
+    width = {"model": broad, "circuit": 0.9} if periodic else {"model": 1.0, "circuit": 0.4}
+    style: dict[str, Any] = {"lw": width[name], "solid_capstyle": "round"}
+    if name == "model":
+        return {**style, "color": MODEL, "zorder": 2}
+    return {**style, "color": CIRCUIT, "ls": (0, (4.0, 2.2)), "zorder": 3}
+
+
+def _engine_legend(
+    figure: Figure,
+    traces: Sequence[Mapping[str, Trace]],
+    checked: Sequence[Checked],
+    sides: Sequence[int],
+    columns: int,
+) -> None:
+    drawn = {name for t, c in zip(traces, checked, strict=True) for name in _drawn(t, _orbits(c))}
+    names = [name for name in ENGINES if name in drawn]
+    figure.legend(handles=_keys(names, sides), loc="outside lower center", ncols=columns)
+
+
+def _keys(names: Sequence[str], sides: Sequence[int]) -> list[Line2D]:
+    periodic = Orbit(OrbitStatus.PERIODIC)
+    handles = [Line2D([], [], **_look(name, periodic), label=ENGINES[name]) for name in names]
+    if sides:
+        box: dict[str, Any] = {"ms": 9, "mfc": CONTACT, "mec": MUTED, "mew": 0.6}
+        handles += [
+            Line2D([], [], ls="", marker=">", **_IMPACT, label="impact begins"),
+            Line2D([], [], ls="", marker="s", **box, label="contact"),
+        ]
+    return handles
+
+
+def _spaced(x: Array, y: Array, step: float) -> Index:
+    """Indices of points that lie ``step`` apart along the path (x, y), whatever its sampling."""
+    path = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    marks = (
+        np.arange(0.0, path[-1], step) if len(x) and path[-1] > 0.0 else np.zeros(min(len(x), 1))
+    )
+    return np.unique(np.clip(np.searchsorted(path, marks), 0, max(len(x) - 1, 0)))
+
+
+def _shifted(cycles: Array, x: Array, wanted_at: Array, wanted: Array, n: int) -> Array:
+    """x delayed by the whole number of periods that brings it closest to ``wanted``.
+
+    An orbit of n periods has n phases, and each engine begins at one of its own.
+    """
+    moved = [np.interp((cycles + k) % n, cycles, x) for k in range(n)]
+    aim = np.interp(cycles, wanted_at, wanted)
+    return moved[int(np.argmin([float(np.abs(m - aim).sum()) for m in moved]))]

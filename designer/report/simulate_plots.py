@@ -1,0 +1,241 @@
+"""Pictures of ``simulate --plots``: phase portrait and time trace of each response.
+
+Black is the orbit that was found, red its mirror twin where it is not its own; beyond ±b the mass
+is in contact with a stop. The names are fixed by the frequencies, so that what would be replaced
+is known before anything is computed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from designer.base.errors import InputError
+from designer.dynamics.orbit import Orbit, OrbitStatus
+
+if TYPE_CHECKING:  # matplotlib takes long to import; only drawing needs it
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from designer.check.simulation import Simulated
+
+KINDS = ("phase", "time")
+FORMATS = ("png", "svg")
+BLACK, RED = "#000000", "#d40000"
+LEAST_PERIODS = 2
+"""A time trace shows at least so many drive periods."""
+MOST_PERIODS = 8
+"""And of a response without a period so many."""
+CROWD = 8
+"""Impacts on a stop above which their marks are small."""
+MOST_PORTRAIT = 30
+"""Drive periods of a response without a period in its phase portrait."""
+
+
+def names(omegas: Sequence[float]) -> tuple[str, ...]:
+    """What the files of each response begin with; a frequency that comes again gets a number."""
+    out: list[str] = []
+    for omega in omegas:
+        stem = name = f"omega-{omega:.12g}"
+        count = 1
+        while name in out:
+            count += 1
+            name = f"{stem}-{count}"
+        out.append(name)
+    return tuple(out)
+
+
+def check(folder: Path, stems: Sequence[str], overwrite: bool) -> None:
+    """InputError where pictures cannot be written or would replace a file; writes nothing."""
+    above = folder
+    while not above.exists() and above != above.parent:
+        if above.is_symlink():
+            raise InputError(above, "--plots", "a link to nothing", "a directory")
+        above = above.parent
+    if not above.is_dir():
+        raise InputError(above, "--plots", "a file", "a directory that can be written")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(above, "--plots", "no right to write", "a directory that can be written")
+    for name in (_file(s, k, f) for s in stems for k in KINDS for f in FORMATS):
+        path = folder / name
+        if path.is_dir() and not path.is_symlink():
+            raise InputError(path, "--plots", "a directory", "a name that is free")
+        if (path.exists() or path.is_symlink()) and not overwrite:
+            raise InputError(path, "--plots", "a file", "a name that is free, or --overwrite")
+
+
+def write(
+    folder: Path, stems: Sequence[str], simulated: Sequence[Simulated], overwrite: bool
+) -> list[str]:
+    """Write the pictures of each response that has an orbit; their names, in order."""
+    from designer.base.figure_style import to_png, to_svg
+
+    check(folder, stems, overwrite)
+    written: list[str] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for stem, response in zip(stems, simulated, strict=True):
+            if not response.traces:
+                continue
+            for kind, draw in zip(KINDS, (portrait, time_trace), strict=True):
+                figure = draw(response)
+                for form in FORMATS:
+                    name = _file(stem, kind, form)
+                    part = folder / f".{name}.part"
+                    try:
+                        if form == "png":
+                            to_png(figure, part, 200.0)
+                        else:
+                            part.write_text(to_svg(figure), encoding="utf-8")
+                        part.replace(folder / name)
+                    finally:
+                        part.unlink(missing_ok=True)
+                    written.append(name)
+    except OSError as error:
+        raise InputError(
+            folder, "--plots", error.strerror or str(error), "a directory that can be written"
+        ) from None
+    return written
+
+
+def portrait(response: Simulated) -> Figure:
+    """The orbit and its twin in the plane (x1, x1'); triangles where an impact begins."""
+    from designer.base.figure_style import CONTACT, MUTED, axis_limits, new_figure, style
+
+    with style():
+        figure = new_figure(4.2, 4.0)
+        axes = figure.subplots()
+        gaps = _gaps(response)
+        period = 2.0 * np.pi / response.omega
+        last = MOST_PORTRAIT * period * (1.0 + 1e-9)
+        curves = [t.states[t.time <= last, :2] for t in response.traces]
+        every = np.concatenate(curves)
+        xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
+        for gap in gaps:
+            axes.axvspan(gap, xlim[1] if gap > 0 else xlim[0], color=CONTACT, lw=0, zorder=0)
+            axes.axvline(gap, color=MUTED, lw=0.8, zorder=1)
+        for orbit, curve, look in zip(_drawn(response), curves, _LOOKS, strict=False):
+            axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
+            for side in response.sides:
+                met = orbit.impact_velocities[orbit.impact_sides == side]
+                _impacts(axes, np.full(len(met), side * response.b), met, side, look)
+        axes.set_xlim(*xlim)
+        axes.set_ylim(*ylim)
+        axes.set_xlabel("x₁")
+        axes.set_ylabel("x₁′")
+        _finish(figure, axes, response)
+    return figure
+
+
+def time_trace(response: Simulated) -> Figure:
+    """x1 over drive periods, orbit and twin; triangles where an impact begins."""
+    from matplotlib.ticker import MaxNLocator
+
+    from designer.base.figure_style import CONTACT, MUTED, axis_limits, new_figure, style
+
+    with style():
+        figure = new_figure(6.4, 3.0)
+        axes = figure.subplots()
+        gaps = _gaps(response)
+        period = 2.0 * np.pi / response.omega
+        n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
+        span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
+        shown = []
+        for orbit, trace, look in zip(_drawn(response), response.traces, _LOOKS, strict=False):
+            cycles, x = trace.time / period, trace.states[:, 0]
+            times, sides = orbit.impact_times / period, orbit.impact_sides
+            if 0 < n < span:  # again, to fill what is shown
+                laps = -(-span // n)
+                cycles = np.concatenate([cycles + k * n for k in range(laps)])
+                x = np.tile(x, laps)
+                times = np.concatenate([times + k * n for k in range(laps)])
+                sides = np.tile(sides, laps)
+            keep = cycles <= span * (1.0 + 1e-9)
+            axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
+            shown.append(x[keep])
+            for side in response.sides:
+                met = times[(sides == side) & (times <= span)]
+                _impacts(axes, met, np.full(len(met), side * response.b), side, look)
+        low, high = axis_limits(np.concatenate(shown), gaps)
+        for gap in gaps:
+            axes.axhspan(gap, high if gap > 0 else low, color=CONTACT, lw=0, zorder=0)
+            axes.axhline(gap, color=MUTED, lw=0.8, zorder=1)
+        axes.set_xlim(0.0, span)
+        axes.set_ylim(low, high)
+        axes.xaxis.set_major_locator(MaxNLocator(8, integer=span > LEAST_PERIODS))
+        axes.set_xlabel("drive periods t / T")
+        axes.set_ylabel("x₁")
+        _finish(figure, axes, response)
+    return figure
+
+
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": BLACK, "zorder": 3, "ls": "-"},
+    {"color": RED, "zorder": 2, "ls": "-"},
+)
+
+
+def _file(stem: str, kind: str, form: str) -> str:
+    return f"{stem}-{kind}.{form}"
+
+
+def _drawn(response: Simulated) -> list[Orbit]:
+    """The orbits of the traces: the one that was found, then its twin."""
+    return [o for o in (response.orbit, response.twin) if o is not None]
+
+
+def _gaps(response: Simulated) -> tuple[float, ...]:
+    return tuple(side * response.b for side in response.sides)
+
+
+def _width(orbit: Orbit) -> float:
+    """A response without a period in thin lines, or it is a blot."""
+    return 1.3 if orbit.status is OrbitStatus.PERIODIC else 0.5
+
+
+def _impacts(axes: Axes, x: Any, y: Any, side: int, look: dict[str, Any]) -> None:
+    if not len(x):
+        return
+    axes.plot(
+        x,
+        y,
+        ls="",
+        marker="^" if side > 0 else "v",
+        ms=5.5 if len(x) <= CROWD else 3.5,
+        mfc="white",
+        mec=look["color"],
+        mew=1.0,
+        zorder=look["zorder"] + 3,
+        clip_on=False,
+    )
+
+
+def _finish(figure: Figure, axes: Axes, response: Simulated) -> None:
+    """Title and key."""
+    from matplotlib.lines import Line2D
+
+    from designer.base.figure_style import CONTACT, INK, MUTED
+
+    wanted = f", wanted {response.expected}" if response.expected and not response.found else ""
+    axes.set_title(
+        f"ω = {response.omega:.6g}: {response.orbit.response}{wanted}",
+        loc="left",
+        weight="bold",
+        color=INK,
+    )
+    handles = []
+    twin = response.twin
+    labels = [response.orbit.response, "" if twin is None else f"{twin.response}, its mirror twin"]
+    for orbit, look, label in zip(_drawn(response), _LOOKS, labels, strict=False):
+        handles.append(Line2D([], [], **look, lw=max(_width(orbit), 1.0), label=label))
+    if response.sides:
+        if len(response.orbit.impact_sides):
+            mark: dict[str, Any] = {"mfc": "white", "mec": MUTED, "ms": 5.5}
+            handles.append(Line2D([], [], ls="", marker="^", **mark, label="impact begins"))
+        box: dict[str, Any] = {"mfc": CONTACT, "mec": MUTED, "ms": 8, "mew": 0.6}
+        handles.append(Line2D([], [], ls="", marker="s", **box, label="contact with a stop"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2 if len(handles) > 3 else 3)

@@ -1,0 +1,89 @@
+"""A spread in words, as a report states it."""
+
+from __future__ import annotations
+
+from designer.base.natural_sort import natural
+from designer.circuit.netlist import Circuit
+from designer.model.distributions import Binned, Law, Normal, Split, Uniform
+from designer.report.words import quantity
+from designer.spread.spread import NO_BANDWIDTH, Spread
+
+
+def words_of(spread: Spread, circuit: Circuit) -> str:
+    """What varies from board to board of a circuit, by how much: part of a sentence."""
+    said = [
+        f"resistors {_grade(spread.resistor_shape, spread.resistor)}",
+        f"capacitors {_grade(spread.capacitor_shape, spread.capacitor)}",
+        f"op-amp offset normal with σ = {quantity(spread.offset_sigma, 'V')}, cut at "
+        f"{quantity(spread.offset_limit, 'V')}"
+        if spread.offset_sigma
+        else "no op-amp offset",
+        f"saturation uniform within ± {_percent(spread.saturation)}, each section and rail its own",
+    ]
+    if circuit.references:
+        grade = max(spread.grade_of(r) for r in circuit.references)
+        said.append(f"references uniform within ± {_percent(grade)}, diodes exact")
+    for what, law, unit in (
+        ("bias current", spread.bias, "A"),
+        ("gain-bandwidth", spread.gain_bandwidth, "Hz"),
+    ):
+        said += [f"{what} {_between(law, unit)}"] if law is not None else []
+    if spread.gain_bandwidth is not None:
+        said[-1] += f" (which {NO_BANDWIDTH})"
+    if spread.supply:
+        said.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")
+    if spread.temperature is not None:
+        low, high = spread.temperature
+        said.append(f"temperature uniform from {low:g} to {high:g} °C")
+    if spread.ageing:
+        said.append(f"ageing of {_ageing(spread)}")
+    own = sorted({*spread.grades, *spread.shapes}, key=natural)
+    said += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
+    networks = [g for g in spread.groups if not g.reel]
+    said += [f"{', '.join(g.parts)} share {_percent(g.share)} of a deviation" for g in networks]
+    for share in sorted({g.share for g in spread.groups if g.reel}):
+        said.append(f"parts of one value share {_percent(share)} of a deviation")
+    if spread.measured is not None:
+        boards, parts = len(spread.measured.boards), len(spread.measured.values)
+        of = f" of {boards} boards, taken in turn" if boards > 1 else ""
+        said.append(f"{parts} measured value{'s' * (parts != 1)}{of}")
+    return "; ".join(said)
+
+
+def _ageing(spread: Spread) -> str:
+    """Ranges of ageing, and the kinds of part that have each."""
+    kinds = {"R": "resistors", "C": "capacitors", "V": "references"}
+    by: dict[tuple[str, str], list[str]] = {}
+    for part, law in sorted(spread.ageing.items(), key=lambda item: natural(item[0])):
+        low, high = (f"{100 * end:.4g}" for end in _ends(law))
+        by.setdefault((kinds.get(part[0], part), f"from {low} to {high} %"), []).append(part)
+    of = [kind for kind, _ in by]
+    return ", ".join(
+        f"{kind if of.count(kind) == 1 else ' '.join(parts)} {within}"
+        for (kind, within), parts in by.items()
+    )
+
+
+def _grade(shape: Law, grade: float) -> str:
+    width = f"within ± {_percent(grade)}"
+    if isinstance(shape, Normal):
+        return f"normal with σ = {_percent(grade * shape.sigma)}, cut at ± {_percent(grade)}"
+    if isinstance(shape, Binned):
+        return f"uniform {width} without those within ± {_percent(grade * shape.inner)}"
+    return f"uniform {width}"
+
+
+def _between(law: Law, unit: str) -> str:
+    low, high = (quantity(v, unit) for v in _ends(law))
+    middle = f", half of them below {quantity(law.middle, unit)}" if isinstance(law, Split) else ""
+    return f"from {low} to {high}{middle}"
+
+
+def _ends(law: Law) -> tuple[float, float]:
+    if isinstance(law, Uniform | Split):
+        return law.low, law.high
+    raise TypeError(law)
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.4g} %"

@@ -1,0 +1,198 @@
+"""Figures of a design and its tolerance study: yields, margins, coefficient errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from designer.base.figure_style import EXACT, GRID, INK, MUTED, new_figure, styled
+from designer.yields.verdict import Answer, Verdict, Yield
+
+VERDICTS = {
+    Verdict.OK: "#0072b2",
+    Verdict.LOST: "#e69f00",
+    Verdict.GRAZING: "#cc79a7",
+    Verdict.FAILED: "#9a9a9a",
+}
+
+
+@styled
+def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure:
+    """Left the yield with its 95 % interval, right what became of all samples; a row each.
+
+    None : the response was left out of the study.
+    """
+    rows = max(len(labels), 1)
+    figure = new_figure(7.4, 0.31 * rows + 1.15)
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.0))
+    left.set_yticks(range(len(labels)), labels, color=INK)
+    left.set_ylim(rows - 0.4, -0.6)
+    for i, counted in enumerate(yields):
+        if counted is None or not counted.samples:
+            for axes in (left, right):
+                axes.text(2.0, i, "left out of the study", va="center", color=MUTED, size=8)
+            continue
+        _interval(left, i, counted)
+        _shares(right, i, counted)
+    for axes in (left, right):
+        axes.set_xlim(0.0, 100.0)
+        axes.grid(axis="x", color=GRID, lw=0.7)
+        axes.tick_params(axis="y", length=0)
+        axes.set_xticks([0, 25, 50, 75, 100])
+    left.set_xlim(-2.0, 118.0)
+    left.spines["bottom"].set_bounds(0.0, 100.0)
+    left.set_xlabel("yield with its 95 % interval [%]")
+    right.set_xlabel("share of the samples [%]; counts inside")
+    met = [v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)]
+    if met:
+        handles = [Line2D([], [], marker="s", ls="", ms=7, color=VERDICTS[v]) for v in met]
+        figure.legend(handles, [str(v) for v in met], loc="outside upper right", ncols=len(met))
+    return figure
+
+
+@styled
+def coefficient_chart(errors: Mapping[str, float]) -> Figure:
+    """|error| of each coefficient on a logarithmic axis; below ``EXACT`` it stands as "exact"."""
+    figure = new_figure(7.4, 0.24 * max(len(errors), 1) + 0.8)
+    axes = figure.subplots()
+    percent = {k: 100.0 * abs(v) for k, v in errors.items()}
+    real = [v for v in percent.values() if v >= 100.0 * EXACT and np.isfinite(v)]
+    high = 10.0 ** np.ceil(np.log10(max(real)) + 0.05) if real else 1.0
+    low = 10.0 ** (np.floor(np.log10(min(real))) - 1.0) if real else 1e-2
+    edge = low * (high / low) ** 0.05
+    axes.set_xscale("log")
+    axes.set_xlim(low, high * (high / low) ** 0.12)
+    axes.set_ylim(len(errors) - 0.4, -0.6)
+    axes.set_yticks(range(len(errors)), list(errors), color=INK)
+    for i, (name, value) in enumerate(percent.items()):
+        if not np.isfinite(value):
+            axes.text(edge, i, "not known", va="center", color=MUTED, size=8)
+        elif value < 100.0 * EXACT:
+            axes.plot([edge], [i], "o", mfc="white", mec=VERDICTS[Verdict.OK], ms=5.5)
+            axes.annotate(
+                "exact", (edge, i), (7, 0), textcoords="offset points", va="center", size=8
+            )
+        else:
+            axes.plot([low, value], [i, i], color=GRID, lw=2.5, solid_capstyle="butt")
+            axes.plot([value], [i], "o", color=VERDICTS[Verdict.OK], ms=5.5)
+            sign = "+" if errors[name] > 0 else "−"
+            axes.annotate(
+                f"{sign}{value:.2g} %",
+                (value, i),
+                (7, 0),
+                textcoords="offset points",
+                va="center",
+                size=8,
+            )
+    axes.tick_params(axis="y", length=0)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    if real:
+        axes.grid(axis="x", color=GRID, lw=0.7)
+        axes.set_xlabel("|ln(realised/wanted)| [%]; exact: below 1e-10 %")
+    else:
+        axes.set_xticks([])
+        axes.set_xticks([], minor=True)
+        axes.spines["bottom"].set_visible(False)
+        axes.set_xlabel("every coefficient exact to rounding, below 1e-10 %")
+    return figure
+
+
+@styled
+def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> Figure:
+    """How near each board is to losing its response; a row of dots each, one dot a board.
+
+    Left the largest modulus of the multipliers (1 is the end of stability), right the smaller of
+    the shallowest contact and the nearest miss in volts (0 is the end of n-p-q). A lost board
+    stands where its new response has these.
+    """
+    rows = max(len(labels), 1)
+    figure = new_figure(7.4, 0.38 * rows + 1.15)
+    left, right = figure.subplots(1, 2, sharey=True)
+    left.set_yticks(range(len(labels)), labels, color=INK)
+    left.set_ylim(rows - 0.4, -0.6)
+    met: set[Verdict] = set()
+    positive: list[float] = []
+    for i, row in enumerate(answers):
+        for verdict in Verdict:
+            here = [a for a in row if a.verdict is verdict]
+            shift = np.array([_jitter(a.sample) for a in here])
+            for axes, values in (
+                (left, np.array([a.radius for a in here])),
+                (right, np.array([min(a.penetration, a.miss) for a in here])),
+            ):
+                fine = np.isfinite(values) & (values > 0.0)
+                if not fine.any():
+                    continue
+                met.add(verdict)
+                positive += list(values[fine]) if axes is right else []
+                axes.plot(
+                    values[fine],
+                    i + shift[fine],
+                    ls="",
+                    marker="o" if verdict is Verdict.OK else "D",
+                    ms=3.2,
+                    mew=0,
+                    alpha=0.75,
+                    color=VERDICTS[verdict],
+                )
+    for axes in (left, right):
+        axes.tick_params(axis="y", length=0)
+        axes.grid(axis="x", color=GRID, lw=0.7)
+        for i in range(1, len(labels)):
+            axes.axhline(i - 0.5, color=GRID, lw=0.7)
+    left.set_xlim(0.0, 1.05)
+    left.axvline(1.0, color=MUTED, lw=0.9)
+    left.set_xlabel("largest multiplier; stable below 1")
+    if positive:
+        right.set_xscale("log")
+        right.set_xlim(min(positive) / 2.0, max(positive) * 2.0)
+        right.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
+        right.xaxis.set_minor_formatter(NullFormatter())
+    right.set_xlabel("shallowest contact or nearest miss [V]")
+    order = [v for v in Verdict if v in met]
+    if order:
+        handles = [
+            Line2D([], [], marker="o" if v is Verdict.OK else "D", ls="", ms=5, color=VERDICTS[v])
+            for v in order
+        ]
+        figure.legend(handles, [str(v) for v in order], loc="outside upper right", ncols=len(order))
+    return figure
+
+
+def _interval(axes: Axes, row: int, counted: Yield) -> None:
+    low, high = (100.0 * v for v in counted.interval)
+    axes.plot([low, high], [row, row], color=VERDICTS[Verdict.OK], lw=2.2, solid_capstyle="butt")
+    if np.isfinite(counted.rate):
+        rate = 100.0 * counted.rate
+        axes.plot([rate], [row], "o", color=VERDICTS[Verdict.OK], mec="white", mew=0.7, ms=6)
+        axes.text(118.0, row, f"{rate:.3g} %", ha="right", va="center", size=8)
+    else:
+        axes.text(118.0, row, "open", ha="right", va="center", color=MUTED, size=8)
+
+
+def _shares(axes: Axes, row: int, counted: Yield) -> None:
+    start = 0.0
+    for verdict in Verdict:
+        number = int(getattr(counted, str(verdict)))
+        width = 100.0 * number / counted.samples
+        if not number:
+            continue
+        axes.barh(row, width, left=start, height=0.66, color=VERDICTS[verdict], ec="white", lw=0.8)
+        if width >= 4.0:
+            ink = "white" if verdict is Verdict.OK else INK
+            axes.text(
+                start + width / 2.0, row, str(number), ha="center", va="center_baseline",
+                color=ink, size=7.5,
+            )  # fmt: skip
+        start += width
+
+
+def _jitter(sample: int) -> float:
+    """A displacement within ±0.3 that depends on the sample alone."""
+    return 0.6 * ((sample * 0.6180339887498949) % 1.0) - 0.3

@@ -1,0 +1,108 @@
+"""Names, numbers and short phrases of a report, the same wherever they stand."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+from designer.base.figure_style import EXACT
+from designer.base.units import format_quantity
+from designer.check.checked_design import Checked
+from designer.check.trust import WORDS
+from designer.dynamics.orbit import Orbit, OrbitStatus
+
+NONE = "–"
+
+TERM = re.compile(r"x(\d)('{1,2}) x(\d)('?)")
+
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def name(c: Checked) -> str:
+    return f"ω = {number(c.model.omega)} ({c.model.expected or c.model.orbit.response})"
+
+
+def orbit(met: Orbit) -> str:
+    return f"{met.response} ({met.reason})" if met.reason else met.response
+
+
+def problem(c: Checked) -> str:
+    """What is wrong with a response, in words; "" where it was found, all engines agree, and the
+    exact ones can be trusted."""
+    said = []
+    ngspice, without = c.ngspice, replace(c, gate=None)
+    if not c.model.found:
+        said.append(f"the model shows {orbit(c.model.orbit)} instead")
+    if not without.agrees:
+        said.append(f"model {orbit(c.model.orbit)} and exact circuit {orbit(c.circuit)} differ")
+    exact = {"model": c.model_trust, "exact circuit": c.circuit_trust}
+    for engine, trust in exact.items():
+        if trust.reasons:  # without figures: equal studies are equal reports
+            said.append(f"{engine} {WORDS}: {'; '.join(trust.reasons)}")
+    if ngspice is not None and ngspice.status is OrbitStatus.FAILED:
+        said.append(f"ngspice gave no answer: {ngspice.reason or 'no reason given'}")
+    elif ngspice is not None and without.agrees and not c.agrees:
+        said.append(f"ngspice shows {orbit(ngspice)}, the exact circuit {orbit(c.circuit)}")
+    return f"{name(c)}: {'; '.join(said)}" if said else ""
+
+
+def coefficient(name: str) -> str:
+    term = TERM.fullmatch(name)
+    if term is None:
+        return {
+            "stop slope": "stiffness of a stop, over K1",
+            "upper stop slope": "stiffness of the upper stop, over K1",
+            "lower stop slope": "stiffness of the lower stop, over K1",
+            "dead-zone null": "stiffness left inside the clearance, over K1",
+            "dead-zone bias": "force left inside the clearance, over K1 times the threshold",
+        }.get(name, name)
+    left, right = name.split()
+    return f"{_pretty(right)} in the equation of {_pretty(left)}"
+
+
+def _pretty(state: str) -> str:
+    return state.replace("''", "″").replace("'", "′").translate(_SUBSCRIPTS)
+
+
+def yes(value: bool | None) -> str:
+    return {True: "yes", False: "no", None: NONE}[value]
+
+
+def all_of(number: int) -> str:
+    return "Both" if number == 2 else f"All {number}"
+
+
+def plural(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def number(value: object, digits: int = 4) -> str:
+    if not isinstance(value, int | float):
+        return str(value)
+    return f"{value:.{digits}g}" if math.isfinite(value) else NONE
+
+
+def span(low: float, high: float) -> tuple[str, str]:
+    """The ends of an interval of shares in per cent: whole, with decimals where whole ones would
+    not tell the ends apart."""
+    for digits in range(4):
+        ends = (f"{100 * low:.{digits}f}", f"{100 * high:.{digits}f}")
+        if ends[0] != ends[1] or low == high:
+            break
+    return (ends[0], f"{100 * high:g}" if high in (0.0, 1.0) else ends[1])
+
+
+def error(value: float) -> str:
+    """A coefficient error, a logarithm, in per cent."""
+    if not math.isfinite(value):
+        return NONE
+    return "exact (< 1e-12)" if abs(value) < EXACT else f"{100 * value:.3g} %"
+
+
+def quantity(value: float, unit: str, digits: int = 4) -> str:
+    if not math.isfinite(value):
+        return NONE
+    text = format_quantity(value, unit, digits).removesuffix(unit)
+    figure = text.rstrip("fpnµmkMGT")
+    return f"{figure}\u00a0{text[len(figure) :]}{unit}"

@@ -1,0 +1,234 @@
+"""The program ``ngspice -b``, one process for each run: slower to start, nothing to go stale."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.environment import clean_environment
+from designer.base.errors import EnvironmentMissing
+from designer.base.netlist_guard import check_netlist
+from designer.spice.simulator import (
+    HOW_TO_INSTALL,
+    Analysis,
+    SimulationFailed,
+    Sweep,
+    Waveforms,
+    accept,
+    accept_sweep,
+    offending_line,
+    require_version,
+    said,
+)
+
+
+class BatchNgspice:
+    """Runs each deck in a process and a folder of its own.
+
+    Raises
+    ------
+    EnvironmentMissing : the program is missing or too old.
+    """
+
+    name = "ngspice-batch"
+    usable = True
+
+    def __init__(self) -> None:
+        self._program = _program()
+        self.version = program_version()
+
+    def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
+        """See `designer.spice.simulator.Simulator.run`."""
+        vectors, log, seconds, status = self._vectors_of(netlist, "tran")
+        waveforms = accept(vectors, signals, stop_time, log, seconds)
+        _check_status(status, log)
+        return waveforms
+
+    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+        """See `designer.spice.simulator.Simulator.sweep`."""
+        vectors, log, seconds, status = self._vectors_of(netlist, analysis)
+        found = accept_sweep(vectors, signals, stop, analysis, log, seconds)
+        _check_status(status, log)
+        return found
+
+    def _vectors_of(
+        self, netlist: str, analysis: Analysis
+    ) -> tuple[dict[str, NDArray[Any]], str, float, int]:
+        """Run a deck: vectors of its last analysis of this kind, log, wall time, exit status."""
+        started = time.perf_counter()
+        plots, log, status = self._plots(netlist)
+        wanted = [plot.phasors or plot.vectors for plot in plots if plot.name == PLOTS[analysis]]
+        return wanted[-1] if wanted else {}, log, time.perf_counter() - started, status
+
+    def analyse(self, netlist: str) -> list[RawPlot]:
+        """Every plot of a deck of any analysis: operating point, ``.dc``, ``.ac``, ``.noise``.
+
+        Raises
+        ------
+        ValueError : `check_netlist` refuses the deck.
+        SimulationFailed : the log holds an `offending_line`, or there is no plot.
+        """
+        plots, log, status = self._plots(netlist)
+        line = offending_line(log)
+        if line is not None:
+            raise SimulationFailed(said(line), log)
+        if status != 0 or not plots:
+            raise SimulationFailed(f"{len(plots)} plots, ngspice exit {status}", log)
+        return plots
+
+    def _plots(self, netlist: str) -> tuple[list[RawPlot], str, int]:
+        """Plots, log and exit status."""
+        check_netlist(netlist)
+        with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
+            Path(folder, "deck.cir").write_bytes(netlist.encode("utf-8") + b"\n")
+            done = _call([self._program, "-n", "-b", "-r", "deck.raw", "deck.cir"], folder)
+            log = done.stdout.decode("utf-8", "replace") + done.stderr.decode("utf-8", "replace")
+            raw = Path(folder, "deck.raw")
+            content = raw.read_bytes() if raw.exists() else b""
+        try:
+            return read_raw(content), log, done.returncode
+        except ValueError as error:
+            line = offending_line(log)
+            reason = f"{error} (ngspice exit {done.returncode})" if line is None else said(line)
+            raise SimulationFailed(reason, log) from error
+
+    def close(self) -> None:
+        """Nothing to do: nothing outlives a run."""
+
+
+def _check_status(status: int, log: str) -> None:
+    if status != 0:
+        raise SimulationFailed(f"ngspice exit {status}", log)
+
+
+def _program() -> str:
+    program = shutil.which("ngspice")
+    if program is None:
+        raise EnvironmentMissing(f"the program ngspice is missing; {HOW_TO_INSTALL}")
+    return program
+
+
+def program_version() -> str:
+    """Version of the ngspice program on the search path.
+
+    Raises
+    ------
+    EnvironmentMissing : it is missing or too old.
+    """
+    return require_version(_version_of(_program()))
+
+
+@functools.cache
+def _version_of(program: str) -> str:
+    with tempfile.TemporaryDirectory(prefix="ngspice-") as folder:
+        text = _call([program, "-n", "--version"], folder).stdout.decode("utf-8", "replace")
+    found = re.search(r"ngspice-(\d[\w.+-]*)", text)
+    return found[1] if found else ""
+
+
+def _call(command: list[str], folder: str) -> subprocess.CompletedProcess[bytes]:
+    environment = dict(os.environ)
+    for name, value in clean_environment(folder).items():
+        if value is None:
+            environment.pop(name, None)
+        else:
+            environment[name] = value
+    try:
+        return subprocess.run(
+            command,
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+        )
+    except OSError as error:
+        raise EnvironmentMissing(f"ngspice does not start: {error}; {HOW_TO_INSTALL}") from error
+
+
+# ---------------------------------------------------------------------------------------------
+# The raw file
+
+PLOTS: dict[Analysis, str] = {
+    "tran": "Transient Analysis",
+    "ac": "AC Analysis",
+    "dc": "DC transfer characteristic",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class RawPlot:
+    """One analysis of a raw file."""
+
+    name: str
+    """Such as ``Transient Analysis``."""
+    vectors: dict[str, NDArray[np.float64]]
+    """By the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
+    phasors: dict[str, NDArray[np.complex128]] = field(default_factory=dict)
+    """Likewise, of a plot of complex numbers (``.ac``), whose ``vectors`` are empty."""
+
+
+def read_raw(content: bytes) -> list[RawPlot]:
+    """The plots of a binary raw file.
+
+    A plot is a text header (``Key: value`` lines, then one line ``index name type`` a variable)
+    and, after the line ``Binary:``, points × variables doubles in the machine's byte order, twice
+    as many if the flag is ``complex``.
+
+    Raises
+    ------
+    ValueError : the file is cut short or is no such file.
+    """
+    plots: list[RawPlot] = []
+    position = 0
+    while position < len(content):
+        end = content.find(b"\nBinary:\n", position)
+        if end < 0:
+            raise ValueError("raw file: no binary data")
+        header = content[position:end].decode("utf-8", "replace")
+        position = end + len(b"\nBinary:\n")
+        fields, _, table = header.partition("\nVariables:")
+        value = dict(re.findall(r"^([^:\n]+):[ \t]*(.*?)[ \t]*$", fields, re.MULTILINE))
+        names = [line.split("\t")[2] for line in table.split("\n") if line.count("\t") >= 3]
+        try:
+            columns, rows = int(value["No. Variables"]), int(value["No. Points"])
+            name, flags = value["Plotname"], value["Flags"].split()
+        except (KeyError, ValueError) as error:
+            raise ValueError(f"raw file: bad header ({error})") from error
+        if len(names) != columns or columns < 0 or rows < 0:
+            raise ValueError(f"raw file: {columns} variables announced, {len(names)} named")
+        width = 2 if "complex" in flags else 1
+        size = rows * columns * width * 8
+        if position + size > len(content):
+            raise ValueError("raw file: cut short")
+        block, shape = content[position : position + size], (rows, columns)
+        keys = [_session_name(n) for n in names]
+        if width == 1:
+            real = np.frombuffer(block, np.float64).reshape(shape).T.copy()
+            plots.append(RawPlot(name, dict(zip(keys, real, strict=True))))
+        else:
+            phasors = np.frombuffer(block, np.complex128).reshape(shape).T.copy()
+            plots.append(RawPlot(name, {}, dict(zip(keys, phasors, strict=True))))
+        position += size
+    return plots
+
+
+def _session_name(name: str) -> str:
+    name = name.lower()
+    if name.startswith("v(") and name.endswith(")"):
+        return name[2:-1]
+    if name.startswith("i(") and name.endswith(")"):
+        return f"{name[2:-1]}#branch"
+    return name

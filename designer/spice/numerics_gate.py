@@ -1,0 +1,408 @@
+"""The numerics gate: which ngspice settings may decide on a response.
+
+Before ngspice's verdict counts, two step sizes and two integration methods must agree with the
+exact circuit on n-p-q, and with each other on every strobe within a stated bound; with ideal
+op-amps the wave itself must be the exact circuit's, within another. Where the exact
+circuit's response is not periodic there is no strobe and no wave to compare: the three runs must
+only call it what the exact circuit does. The largest step is min(T/200, shortest contact/N): it
+follows the contact, for T/200 miscounts the eight-impact response. Both bounds are halved together
+until the settings pass, which finds N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.arrays import Array
+from designer.base.doubt import Doubt
+from designer.circuit.netlist import Board, Circuit, Excitation
+from designer.circuit.noise_gains import stages
+from designer.circuit.reduction import Reduction
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
+from designer.spice import convergence_aids as remedies
+from designer.spice import deck, settling_periods
+from designer.spice.convergence_aids import Outcome, Remedy, Task
+from designer.spice.deck import SolverSettings
+from designer.spice.job import SpiceJob
+from designer.spice.opamp_model import Rung, limit_into
+from designer.spice.pool import SpicePool
+from designer.spice.read_orbit import Read, Reading, read
+from designer.spice.simulator import SimulationFailed
+
+STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 20
+MOST_STEPS = 40_000
+"""Of a period, at the first level: a contact shorter than T/2000 gets fewer steps than others. A
+run of more would take minutes, and such an orbit is next to grazing."""
+LEVELS = 5
+"""How often the step is halved before the gate gives up."""
+CURES: tuple[Remedy, ...] = ("tolerance", "start")
+"""Remedies inside the gate: steps and methods are what it compares, so they stay as they are."""
+BOUND = 1e-3
+"""Of the peak: half the strobe tolerance, so that boards that differ have room too."""
+WAVE_BOUND = 2e-3
+"""Of the peak: RMS over the last n periods of ngspice, with ideal op-amps, less exact circuit."""
+RELTOL = 1e-5
+"""ngspice's relative tolerance. At 1e-4, for a tenth less time, errors at the kinks are double."""
+DISCARD = 2
+"""Periods left out after a start on the exact circuit's orbit."""
+MOST_DISCARDED = 400
+"""Drive periods: no run on any rung discards more."""
+WAVE_POINTS = 20_000
+"""Points of a period of the exact wave, so many that straight lines join them."""
+SHORTEST = 8
+"""Drive periods of the shortest run: a lap of one period is then judged over six."""
+
+
+@dataclass(frozen=True)
+class GateResult:
+    """settings : what passed, or the finest that was tried. passed : whether any did.
+    difference : largest strobe difference between the runs, of the peak. read : the run at
+    ``settings``; tried : steps a period that were tried. contact_steps : N, largest steps in the
+    shortest contact at ``settings`` (nan without contact). remedies : what the run at ``settings``
+    needed besides, or its companions. discarded : drive periods before the run was judged. wave :
+    `wave_error` of the run at ``settings``, and wave_bound what it was held to: nan where it is
+    not periodic, as ``difference`` is; the bound is also nan above the rung ``ideal``."""
+
+    settings: SolverSettings
+    passed: bool
+    difference: float
+    read: Read | SimulationFailed
+    tried: tuple[int, ...]
+    contact_steps: float = float("nan")
+    remedies: tuple[Remedy, ...] = ()
+    discarded: int = DISCARD
+    wave: float = float("nan")
+    wave_bound: float = float("nan")
+
+    @property
+    def why(self) -> str:
+        """Why it did not pass, at the finest step tried; empty where it did."""
+        if isinstance(self.read, SimulationFailed):
+            return "" if self.passed else self.read.reason
+        return ", ".join(map(str, self.doubts))
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What the runs that there are were found not to do; none where they passed."""
+        if self.passed or isinstance(self.read, SimulationFailed):
+            return ()
+        said = []
+        if self.difference > BOUND:
+            differ = f"strobes differ by more than {BOUND:g} of the peak"
+            said.append(Doubt(differ, f"by {self.difference:.1g}"))
+        if self.wave > self.wave_bound:
+            off = f"by {self.wave:.1g} of the peak, bound {self.wave_bound:.1g}"
+            said.append(Doubt("the wave is off the exact circuit's by more than its bound", off))
+        other = "its runs do not all show the exact circuit's response"
+        shown = f"the coarsest shows {self.read.orbit.response}"
+        return tuple(said) or (Doubt(other, shown),)
+
+    def as_dict(self) -> dict[str, object]:
+        """For provenance: the settings, and what they passed."""
+        return {
+            **self.settings.as_dict(),
+            "passed": self.passed,
+            "difference": self.difference,
+            "bound": BOUND,
+            "rms": self.wave,
+            "rms_bound": self.wave_bound,
+            "steps_a_period": self.tried[-1],
+            "steps_a_contact": self.contact_steps,
+            "steps_tried": list(self.tried),
+            "remedies": list(self.remedies),
+            "discarded_periods": self.discarded,
+        }
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One response of one board (a reduction): what a run of ngspice needs.
+
+    orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
+    voltages at t = 0 if not the orbit's. discard : periods left out before the run is judged.
+    judged : periods that are judged at least. rung : the op-amps' model in ngspice.
+    """
+
+    reduction: Reduction
+    excitation: Excitation
+    orbit: Orbit
+    start: Array | None = None
+    discard: int = DISCARD
+    rung: Rung = "ideal"
+    judged: int = 0
+
+    @property
+    def circuit(self) -> Circuit:
+        return self.reduction.circuit
+
+    @property
+    def board(self) -> Board:
+        return self.reduction.board
+
+    @cached_property
+    def system(self) -> PiecewiseLinearSystem:
+        return self.reduction.system()
+
+    @property
+    def shift(self) -> Array:
+        """(states,) voltages of the state nets with every capacitor discharged: offsets."""
+        solved = self.reduction.solution(self.system.start)
+        return np.array([solved.voltage[net][-1] for net in self.circuit.state_nets])
+
+    @property
+    def period(self) -> float:
+        return 1.0 / self.excitation.frequency
+
+
+def job(
+    subject: Subject,
+    settings: SolverSettings,
+    nudge: float = 0.0,
+    *,
+    keep: bool = False,
+    whole: bool = False,
+) -> SpiceJob[Read]:
+    """The run of one subject: what it discards, and at least 4n periods to judge.
+
+    Where the exact circuit has no period, ngspice is given enough to find any up to the largest.
+    nudge : fraction by which every initial voltage is raised (``remedies``). whole : nothing is
+    left out of the strobes, for a look at the way itself.
+    """
+    stop = length(subject) * subject.period
+    start = subject.orbit.start if subject.start is None else subject.start
+    upper, lower = contact_rows(_as_the_rung_has_it(subject).system())
+    reading = Reading(
+        period=subject.period,
+        discard=0 if whole else subject.discard,
+        nets=subject.circuit.state_nets,
+        shift=subject.shift,
+        upper=upper,
+        lower=lower,
+        generator=subject.circuit.generator.net,
+        moving=subject.system.displacement[0] if subject.system.displacement else 0,
+        keep=keep,
+    )
+    text = deck.write(
+        subject.circuit,
+        subject.board,
+        subject.excitation,
+        settings,
+        title="one response of one board",
+        stop_time=stop,
+        initial=(1.0 + nudge) * start,
+        rung=subject.rung,
+        # A period before the first strobe, for the points around it: a long way takes no memory.
+        kept_from=0.0 if whole else max(subject.discard - 1, 0) * subject.period,
+        stage=False,
+    )
+    signals = (*subject.circuit.state_nets, subject.circuit.generator.net)
+    return SpiceJob(text, signals, stop, partial(read, reading=reading))
+
+
+def length(subject: Subject) -> int:
+    """Drive periods that the run of a subject takes."""
+    judged = max(4 * (subject.orbit.n or MAX_PERIOD), subject.judged)
+    return max(subject.discard + judged, SHORTEST)
+
+
+def task(
+    subject: Subject, settings: SolverSettings, *, keep: bool = False, whole: bool = False
+) -> Task[Read]:
+    """The run as one that remedies may change."""
+    return Task(partial(job, subject, keep=keep, whole=whole), settings)
+
+
+def _as_the_rung_has_it(subject: Subject) -> Reduction:
+    """The reduction whose thresholds the rung's are: an impact is counted by those of the board at
+    hand. On ``full`` the output limits follow the loads, and with them a saturating stage's
+    clearance. A vendor's model has limits that nobody has told: the board's stand for them."""
+    figures = subject.circuit.figures
+    if subject.rung != "full" or figures is None or figures.spice is not None:
+        return subject.reduction
+    rails = dict(subject.board.rails)
+    for stage in stages(subject.circuit):
+        low, high = rails[stage.section.name]
+        ratio = limit_into(stage.load, figures)
+        rails[stage.section.name] = (ratio * low, ratio * high)
+    return Reduction(subject.circuit, replace(subject.board, rails=rails))
+
+
+def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
+    """Rows over (states, generator, 1) of the displacement past the upper, the lower stop."""
+    rows = system.contact_rows(0)
+    return rows.get(1), rows.get(-1)
+
+
+def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Excitation) -> float:
+    """Length [s] of the orbit's shortest contact; the period where there is none.
+
+    On `WAVE_POINTS` a period, round the n periods. Where an impact of the orbit shows on no point
+    its contact is shorter than the distance of two, which is then the answer.
+    """
+    period = 1.0 / excitation.frequency
+    if orbit.n == 0 or len(orbit.impact_times) == 0:
+        return period
+    flow = Flow(system, excitation.drive)
+    apart = period / WAVE_POINTS
+    lap = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=WAVE_POINTS).strobes[:-1]
+    swing = np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
+    u = excitation.offset - excitation.amplitude * swing
+    shortest = period
+    for side, row in zip((1, -1), contact_rows(system), strict=True):
+        if row is None:
+            continue
+        touching = lap @ row[:-2] + row[-2] * u + row[-1] > 0.0
+        lengths = contact_lengths(touching)
+        entries = orbit.impact_times[orbit.impact_sides == side]
+        # One further as well: rounding may put an entry on the wrong side of a point.
+        after = (entries // apart).astype(int)[:, None] + [1, 2]
+        met = touching[after % len(touching)].any(axis=1)
+        points = [*lengths, *np.ones(int(np.sum(~met)))]
+        shortest = min([shortest, *(float(k) * apart for k in points)])
+    return shortest
+
+
+def contact_lengths(touching: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """(contacts,) points in each stretch of a lap (points,) in contact; the lap is closed."""
+    outside = np.flatnonzero(~touching)
+    if not len(outside):
+        return outside
+    # Turned to begin outside, so that no stretch goes across its ends.
+    change = np.diff(np.roll(touching, -outside[0]).astype(int), append=0)
+    return np.flatnonzero(change < 0) - np.flatnonzero(change > 0)
+
+
+def first_steps(subject: Subject, contact: float) -> int:
+    """Steps of a period that the first level takes; contact : length of the shortest [s]."""
+    wanted = int(np.ceil(STEPS_PER_CONTACT * subject.period / contact))
+    return min(max(STEPS_PER_PERIOD, wanted), MOST_STEPS)
+
+
+def check(pool: SpicePool, subjects: Sequence[Subject], levels: int = LEVELS) -> list[GateResult]:
+    """Find the coarsest settings that pass, for the nominal board of each response.
+
+    All subjects move through the levels together, so that the workers stay busy. On a rung above
+    ``ideal`` a short run first says how many periods are discarded (``warm_start``). levels : how
+    many step sizes are tried.
+    """
+    subjects = warmed(pool, subjects)
+    contacts = [shortest_contact(s.orbit, s.system, s.excitation) for s in subjects]
+    steps = [first_steps(s, contact) for s, contact in zip(subjects, contacts, strict=True)]
+    results: list[GateResult | None] = [None] * len(subjects)
+    tried: list[list[int]] = [[] for _ in subjects]
+    for level in range(levels):
+        open_ = [i for i, r in enumerate(results) if r is None or not r.passed]
+        tasks = []
+        for i in open_:
+            tried[i].append(steps[i] * 2**level)
+            trio = _trio(subjects[i].period / tried[i][-1])
+            tasks += [task(subjects[i], settings, keep=True) for settings in trio]
+        found = dict(remedies.run(pool, tasks, CURES))
+        for k, i in enumerate(open_):
+            runs = [found[3 * k + j] for j in range(3)]
+            results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])
+    return [r for r in results if r is not None]
+
+
+def warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
+    """The subjects with the periods that each has to discard on its rung, from a short run."""
+    out = list(subjects)
+    asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
+    tasks = []
+    for i in asked:
+        s = subjects[i]
+        contact = shortest_contact(s.orbit, s.system, s.excitation)
+        steps = 2 * first_steps(s, contact)
+        probe = replace(s, discard=max(settling_periods.PROBE - 4, 0) * s.orbit.n)
+        tasks.append(task(probe, SolverSettings("trap", s.period / steps, RELTOL), whole=True))
+    for k, outcome in remedies.run(pool, tasks):
+        s = subjects[asked[k]]
+        if isinstance(outcome.result, Read):
+            peak = np.abs(s.orbit.extremes).max(axis=1)
+            found, _ = settling_periods.periods(
+                outcome.result.strobes, s.orbit.n, s.orbit.radius, peak
+            )
+            out[asked[k]] = replace(s, discard=min(max(found, DISCARD), MOST_DISCARDED))
+    return out
+
+
+def wave_bound(orbit: Orbit) -> float:
+    """Tighter where the orbit is slow: errors of each period add up, to 1/(1 - ρ) of one."""
+    return WAVE_BOUND * min(1.0, 5.0 * (1.0 - orbit.radius)) if orbit.radius < 1.0 else WAVE_BOUND
+
+
+def wave_error(subject: Subject, read: Read) -> float:
+    """RMS over the last n periods of ngspice less exact circuit, of the peak of each state, worst.
+
+    ``read`` has its trace; the exact wave starts at the orbit's strobe that is nearest to
+    ngspice's. nan without a period or where n differs.
+    """
+    orbit = subject.orbit
+    if orbit.status is not OrbitStatus.PERIODIC or read.trace is None or read.orbit.n != orbit.n:
+        return float("nan")
+    flow = Flow(subject.system, subject.excitation.drive)
+    peak = np.abs(orbit.extremes).max(axis=1)
+    time, states = read.trace
+    laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
+    start = laps[int(np.argmin((np.abs(laps - states[0]) / peak).max(axis=1)))]
+    exact = flow.run(start, orbit.n, points=WAVE_POINTS).strobes
+    grid = np.arange(len(exact)) * subject.period / WAVE_POINTS
+    # At ngspice's own points, in time: what lies between them is no part of its answer.
+    there = np.stack([np.interp(time, grid, column) for column in exact.T], axis=1)
+    square = np.trapezoid((states - there) ** 2, time, axis=0) / (time[-1] - time[0])
+    return float((np.sqrt(square) / peak).max())
+
+
+def _trio(step: float) -> tuple[SolverSettings, SolverSettings, SolverSettings]:
+    """The settings under test, the same at half the step, and the other method."""
+    return (
+        SolverSettings("trap", step, RELTOL),
+        SolverSettings("trap", step / 2.0, RELTOL),
+        SolverSettings("gear", step / 2.0, RELTOL),
+    )
+
+
+def _judge(
+    subject: Subject, runs: Sequence[Outcome[Read]], tried: tuple[int, ...], contact: float
+) -> GateResult:
+    settings, read = runs[0].settings, runs[0].result
+    needed = {r for run in runs for r in run.tried}
+    good = [run.result for run in runs if isinstance(run.result, Read)]
+    wanted = subject.orbit
+    difference, wave, bound, passed = float("nan"), float("nan"), float("nan"), False
+    if wanted.status is OrbitStatus.PERIODIC and subject.rung == "ideal":
+        bound = wave_bound(wanted)
+    if len(good) == len(runs):
+        passed = all(r.orbit.response == wanted.response for r in good)
+        wave = wave_error(subject, good[0])
+        if wanted.status is OrbitStatus.PERIODIC:
+            peak = np.abs(wanted.extremes).max(axis=1)
+            last = [r.strobes[-wanted.n :] for r in good]
+            difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
+            passed = passed and difference <= BOUND
+            passed = passed and (subject.rung != "ideal" or wave <= bound)
+    return GateResult(
+        settings,
+        passed,
+        difference,
+        read,
+        tried,
+        contact / settings.max_step if len(wanted.impact_times) else float("nan"),
+        tuple(r for r in CURES if r in needed),
+        subject.discard,
+        wave,
+        bound,
+    )
+
+
+def _pairs(items: Sequence[Array]) -> Iterator[tuple[Array, Array]]:
+    for i, a in enumerate(items):
+        for b in items[i + 1 :]:
+            yield a, b

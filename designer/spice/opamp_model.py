@@ -1,0 +1,340 @@
+"""Op-amp models for ngspice, written from the catalogue's data-sheet figures.
+
+Three rungs share one subcircuit, ``opamp`` with the pins ``inp inn out vcc vee`` and, per
+instance, ``vos`` [V], ``ib`` [A], ``low`` and ``high`` (its own output limits [V] about ground),
+above ``ideal`` ``start`` [V] and, where it is drawn, ``gbw`` [Hz]:
+
+``ideal``    limits and finite gain, nothing else.
+``dynamic``  and gain-bandwidth, slew rate, output resistance, recovery from saturation.
+``full``     and a second pole, limits that depend on the load, output current limit, input
+             common-mode range (with phase reversal where the op-amp has it), supply current, noise.
+
+The models are made so that Newton's method converges at the kinks of the circuits here. Limits are
+XSPICE ``limit`` blocks with a rounded corner; sources with formulas (``B``) cost ten times as much
+and serve only the supply pins. The offset is a source in series, not the limiter's own parameter:
+with the parameter every op-amp starts beyond its limit, where the slope is zero, and no board with
+offsets ever starts. The output resistance acts before the limit (``Hout``), so that up to
+``dynamic`` the limits are those of the pin whatever the load.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from designer.base.errors import InputError
+from designer.catalog.entries import OpAmp
+from designer.catalog.vendor_model import VendorModel
+
+Rung = Literal["ideal", "dynamic", "full"]
+RUNGS: tuple[Rung, ...] = get_args(Rung)
+
+PINS = "inp inn out vcc vee"
+LIMIT_RANGE = 1e-3
+"""Width [V] over which an output limit's corner is rounded, so that Newton's method converges."""
+RATED_LOAD, HEAVY_LOAD = 10e3, 2e3
+"""Loads [ohm] that the catalogue's ``swing`` (and ``saturation``) and ``swing_2k`` belong to."""
+
+ASSUMED_RECOVERY = 1e-6
+"""Recovery [s] from a hard overdrive, for op-amps whose data sheet gives none."""
+ASSUMED_PHASE_MARGIN = 60.0
+"""Phase margin [degrees] at unity gain, likewise."""
+LARGEST_PHASE_MARGIN = 88.0
+"""Degrees; a margin of 90 would put the second pole at infinity."""
+REVERSAL = 100.0
+"""How much stronger than the signal an input below its range pulls the output up."""
+BOLTZMANN = 1.380649e-23
+NOISE_TEMPERATURE = 300.15
+"""ngspice's own, K: the noise of a resistor stands for the op-amp's."""
+NOISE_FREQUENCY = 1e3
+"""Hz, where the catalogue's noise holds."""
+
+_POLE = 1e-9
+"""Capacitor [F] of the dominant pole: a choice of units, no property of the op-amp."""
+_CORNER = 0.02
+"""Part of a current limit over which its corner is rounded."""
+_FLICKER_CURRENT = 1e-3
+"""Current [A] through the 1 ohm whose flicker noise stands for the op-amp's."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Figures of a model, typical.
+
+    gain [V/V]; gbw [Hz]; slew [V/s]; output_resistance [Ω]; recovery [s]; second_pole [Hz];
+    saturation_resistance [Ω], by which the limit falls with the load; current_limit [A];
+    headroom [V], from either rail to the input common-mode range: lower, upper (None: no limit);
+    reversal : whether the output goes high for an input below that range; supply_current [A];
+    noise [V/√Hz] above the corner, noise_corner [Hz] (0: none).
+    """
+
+    gain: float
+    gbw: float
+    slew: float
+    output_resistance: float
+    recovery: float
+    second_pole: float
+    saturation_resistance: float
+    current_limit: float
+    headroom: tuple[float, float | None]
+    reversal: bool
+    supply_current: float
+    noise: float
+    noise_corner: float
+
+    @classmethod
+    def of(cls, opamp: OpAmp, gain: float | None = None) -> Parameters:
+        """From the catalogue's entry; ``gain`` replaces its own."""
+        corner = opamp.noise_corner.nominal if opamp.noise_corner else 0.0
+        range_ = opamp.common_mode
+        lower = opamp.rated_supply + (range_.nominal if range_.min is None else range_.min)
+        upper = opamp.rated_supply - (range_.nominal if range_.max is None else range_.max)
+        return cls(
+            gain=opamp.gain.nominal if gain is None else gain,
+            gbw=opamp.gbw.nominal,
+            slew=opamp.slew.nominal,
+            output_resistance=opamp.output_resistance.nominal,
+            recovery=opamp.recovery.nominal if opamp.recovery else ASSUMED_RECOVERY,
+            second_pole=second_pole(
+                opamp.gbw.nominal,
+                opamp.phase_margin.nominal if opamp.phase_margin else ASSUMED_PHASE_MARGIN,
+            ),
+            saturation_resistance=saturation_resistance(opamp),
+            current_limit=opamp.output_current.nominal,
+            # An op-amp with reversal has its upper end at the positive rail.
+            headroom=(lower, None if opamp.phase_reversal else upper),
+            reversal=opamp.phase_reversal,
+            supply_current=opamp.supply_current.nominal,
+            noise=opamp.noise.nominal / math.sqrt(1.0 + corner / NOISE_FREQUENCY),
+            noise_corner=corner,
+        )
+
+
+def second_pole(gbw: float, phase_margin: float) -> float:
+    """Frequency [Hz] of a second pole that leaves this phase margin [degrees] at unity gain.
+
+    With one pole more, f_u sqrt(1 + (f_u/f_2)^2) = gbw and the margin is arctan(f_2/f_u).
+    """
+    margin = math.radians(min(phase_margin, LARGEST_PHASE_MARGIN))
+    return gbw * math.sin(margin) * math.tan(margin)
+
+
+def saturation_resistance(opamp: OpAmp) -> float:
+    """Resistance [Ω] by which the output limit falls from one load to the next.
+
+    From the swing into 10 kΩ and into 2 kΩ. Where the second is not given, assumed: all of the
+    distance to the rail at 10 kΩ, but no more than the output resistance.
+    """
+    light = opamp.saturation.nominal
+    if opamp.swing_2k is not None:
+        heavy = min(opamp.swing_2k.nominal, light)
+        if heavy / HEAVY_LOAD <= light / RATED_LOAD:
+            raise InputError(
+                None,
+                f"opamp {opamp.name}.swing_2k",
+                opamp.swing_2k.nominal,
+                f"a swing into 2 kΩ with more current than {light:g} V into 10 kΩ",
+            )
+        return max((light - heavy) / (heavy / HEAVY_LOAD - light / RATED_LOAD), 1e-3)
+    headroom = max(opamp.rated_supply - light, 1e-6)
+    return min(headroom * RATED_LOAD / light, opamp.output_resistance.nominal)
+
+
+def limit_into(load: float, opamp: OpAmp) -> float:
+    """How far the limits of ``full`` into a load [Ω] are from those into the rated one, a ratio.
+
+    By Ohm's law: the limits fall by `saturation_resistance` times the current.
+    """
+    resistance = saturation_resistance(opamp)
+    return (1.0 + resistance / RATED_LOAD) / (1.0 + resistance / load)
+
+
+def instance(
+    name: str,
+    nets: tuple[str, str, str],
+    *,
+    rung: Rung,
+    vos: float,
+    ib: float,
+    rails: tuple[float, float],
+    start: float = 0.0,
+    bandwidth: Mapping[str, float] | None = None,
+    supplies: tuple[str, str] = ("vcc", "vee"),
+) -> str:
+    """The element line of one op-amp.
+
+    nets : noninverting input, inverting input, output. rails : output limits [V]. start : output
+    voltage at the start of a transient [V]. bandwidth : `bandwidth` of this one; the model's own
+    where None. ``ideal`` has neither memory nor bandwidth, and takes neither.
+    """
+    given = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
+    if rung != "ideal":
+        given |= {"start": start, **(bandwidth or {})}
+    words = " ".join(f"{key}={_n(value)}" for key, value in given.items())
+    return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
+
+
+def bandwidth(rung: Rung, parameters: Parameters, gbw: float) -> dict[str, float]:
+    """Parameters of one op-amp with a gain-bandwidth [Hz] of its own.
+
+    The second pole of ``full`` moves along, so that the phase margin stays the data sheet's.
+    """
+    if rung == "ideal":
+        return {}
+    own = {"gbw": gbw}
+    if rung == "full":
+        own["pole2"] = parameters.second_pole * gbw / parameters.gbw
+    return own
+
+
+def subcircuit(rung: Rung, parameters: Parameters, vendor: VendorModel | None = None) -> list[str]:
+    """The lines of the subcircuit ``opamp`` of one rung; on ``full`` a vendor's model, if any."""
+    if rung == "ideal":
+        return ideal(parameters.gain)
+    if rung == "dynamic":
+        return _dynamic(parameters)
+    return _full(parameters) if vendor is None else vendor.wrapped()
+
+
+def ideal(gain: float) -> list[str]:
+    """The subcircuit of the rung ``ideal``, for which the gain is all."""
+    return [
+        f".subckt opamp {PINS} {_EACH}",
+        *_INPUT,
+        "Alimit %vd(inside inn) out limiter",
+        f".model limiter limit(in_offset=0 gain={_n(gain)} out_lower_limit={{low}} "
+        f"out_upper_limit={{high}} limit_range={LIMIT_RANGE!r} fraction=FALSE)",
+        ".ends opamp",
+    ]
+
+
+def _dynamic(p: Parameters) -> list[str]:
+    """One pole whose charging current is limited, then the output limit."""
+    return [
+        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(p)}",
+        *_INPUT,
+        *_pole("inside", "inn"),
+        "Hout z x Vout {-rout}",
+        *_output_limit("{low}", "{high}"),
+        "Vout y out 0",
+        ".ends opamp",
+    ]
+
+
+def _full(p: Parameters) -> list[str]:
+    """Common-mode range, pole, second pole, output limit, output current limit, supply pins."""
+    rail = 1.0 / RATED_LOAD
+    return [
+        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(p)} "
+        f"pole2={_n(p.second_pole)} rsat={_n(p.saturation_resistance)} "
+        f"isc={_n(p.current_limit)} iq={_n(p.supply_current)}",
+        *_noisy_input(p),
+        *_common_mode(p),
+        *_pole("seen", "seenn"),
+        "Gpole2 0 w x 0 1",
+        "Rpole2 w 0 1",
+        f"Cpole2 w 0 {{{_n(0.5 / math.pi)}/pole2}} IC={{start}}",
+        "Hout z w Vout {rsat-rout}",
+        # The catalogue's limits are those into the rated load.
+        *_output_limit(f"{{low*(1+rsat*{_n(rail)})}}", f"{{high*(1+rsat*{_n(rail)})}}"),
+        "Acurrent %vd(y drive) %id(y drive) short",
+        ".model short limit(in_offset=0 gain={1/rsat} out_lower_limit={-isc} "
+        f"out_upper_limit={{isc}} limit_range={{{_n(_CORNER)}*isc}} fraction=FALSE)",
+        "Vout drive out 0",
+        "Bpositive vcc 0 I={iq}+uramp(i(Vout))",
+        "Bnegative 0 vee I={iq}+uramp(-i(Vout))",
+        ".ends opamp",
+    ]
+
+
+def _pole(positive: str, negative: str) -> list[str]:
+    """The dominant pole at node x, in volts of the output, and its wind-up beyond the limit.
+
+    What the pole holds beyond the limit (z against y) leaks away through ``Gwind``. Under a hard
+    overdrive the pole's current is the slew limit; after a reversal the limit is left after
+    ``recovery``, which is ln 2 times the leak's time constant.
+    """
+    return [
+        f".param charge={{slew*{_n(_POLE)}}}",
+        f".param gm={{gbw*{_n(2.0 * math.pi * _POLE)}}}",
+        f"Aslew %vd({positive} {negative}) %id(0 x) slewing",
+        ".model slewing limit(in_offset=0 gain={gm} out_lower_limit={-charge} "
+        f"out_upper_limit={{charge}} limit_range={{{_n(_CORNER)}*charge}} fraction=FALSE)",
+        "Rpole x 0 {gain/gm}",
+        f"Cpole x 0 {_n(_POLE)} IC={{start}}",
+        f"Gwind x 0 z y {{{_n(_POLE * math.log(2.0))}/recovery}}",
+    ]
+
+
+def _output_limit(low: str, high: str) -> list[str]:
+    return [
+        "Alimit z y limiter",
+        f".model limiter limit(in_offset=0 gain=1 out_lower_limit={low} out_upper_limit={high} "
+        f"limit_range={LIMIT_RANGE!r} fraction=FALSE)",
+    ]
+
+
+def _common_mode(p: Parameters) -> list[str]:
+    """Inputs as the first stage sees them: cut at its range, at nodes ``seen`` and ``seenn``.
+
+    Two limits in a row, each about its own pin: XSPICE's controlled limiter would do with one, but
+    reports an error in Newton's first steps, while the supplies are still at zero.
+    Phase reversal: an input below the range, either of them, pulls the output up.
+    """
+    lower, upper = p.headroom
+    lines = [
+        f".model lowest limit(in_offset=0 gain=1 out_lower_limit={_n(lower)} "
+        f"out_upper_limit={_n(BEYOND)} limit_range=0.01 fraction=FALSE)"
+    ]
+    if upper is not None:
+        lines.append(
+            f".model highest limit(in_offset=0 gain=1 out_lower_limit={_n(-BEYOND)} "
+            f"out_upper_limit={_n(-upper)} limit_range=0.01 fraction=FALSE)"
+        )
+    pull = REVERSAL if p.reversal else 0.0
+    for pin, own, seen in (("inside", "p", "seen"), ("inn", "n", "seenn")):
+        cut = f"cut{own}" if upper is not None else f"kept{own}"
+        lines.append(f"Alowest{own} %vd({pin} vee) %vd({cut} vee) lowest")
+        if upper is not None:
+            lines.append(f"Ahighest{own} %vd({cut} vcc) %vd(kept{own} vcc) highest")
+        sign = f"kept{own} {pin}" if own == "p" else f"{pin} kept{own}"
+        lines.append(f"Epull{own} {seen} kept{own} {sign} {_n(pull)}")
+    return lines
+
+
+def _noisy_input(p: Parameters) -> list[str]:
+    """The offset in series with a resistor that carries no current and has the op-amp's noise."""
+    white = p.noise**2 / (4.0 * BOLTZMANN * NOISE_TEMPERATURE)
+    bias = [f"Rwhite inp noisy {_n(white)}", *_BIAS]
+    if p.noise_corner == 0.0:
+        return ["Voffset inside noisy {vos}", *bias]
+    flicker = p.noise**2 * p.noise_corner / _FLICKER_CURRENT**2
+    return [
+        f"Voffset flicker noisy {{vos-{_n(_FLICKER_CURRENT)}}}",
+        "Eflicker inside flicker nf 0 1",
+        f"Iflicker 0 nf {_n(_FLICKER_CURRENT)}",
+        "Rflicker nf 0 pink r=1",
+        f".model pink r(kf={_n(flicker)} af=2)",
+        *bias,
+    ]
+
+
+BEYOND = 1e3
+"""V beyond a rail: no limit."""
+_EACH = "vos=0 ib=0 low=-13 high=13"
+_BIAS = ("Ibiasp inp 0 {ib}", "Ibiasn inn 0 {ib}")
+_INPUT = ("Voffset inside inp {vos}", *_BIAS)
+
+
+def _dynamics(p: Parameters) -> str:
+    return (
+        f"gain={_n(p.gain)} gbw={_n(p.gbw)} slew={_n(p.slew)} "
+        f"rout={_n(p.output_resistance)} recovery={_n(p.recovery)}"
+    )
+
+
+def _n(value: float) -> str:
+    """A number that SPICE reads back as the same float: no unit letters, all digits."""
+    return repr(float(value))

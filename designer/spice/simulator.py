@@ -1,0 +1,255 @@
+"""One small interface to ngspice: what a run takes, what it returns, and when it counts.
+
+Two implementations pass the same tests: `spice.shared_backend` drives libngspice inside the
+process through PySpice, `spice.batch_backend` starts the program ``ngspice -b`` for every run.
+
+ngspice fails silently. A node that floats between capacitors gives exit status 0, a waveform that
+looks normal, and "singular matrix" somewhere in the log; "timestep too small" leaves a waveform
+that ends early. So a run counts only if `accept` says so; everything else is `SimulationFailed`.
+
+ngspice also does what a deck tells it. A comment that starts with ``*#`` is a command, text after
+``.end`` is another deck, a model card can name a file or a program. So a deck reaches ngspice only
+through `check_netlist`.
+
+This module is imported by every worker process: it imports numpy and the standard library only.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.errors import DesignerError, EnvironmentMissing
+
+Backend = Literal["shared", "batch"]
+Analysis = Literal["tran", "ac", "dc"]
+
+OLDEST_NGSPICE = 36
+HOW_TO_INSTALL = (
+    "install the system packages ngspice and libngspice0 (Debian, Ubuntu: "
+    f"apt-get install ngspice libngspice0), version {OLDEST_NGSPICE} or later"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Waveforms:
+    """What a run that counts has produced.
+
+    With ``uic`` ngspice does not keep t = 0: ``time`` starts at its first step.
+    """
+
+    time: NDArray[np.float64]
+    """(k,), s, strictly increasing, up to the stop time at least."""
+    signals: Mapping[str, NDArray[np.float64]]
+    """Name as it was asked for → (k,), V (A for a branch such as ``vm1#branch``)."""
+    log: str
+    """What ngspice printed."""
+    seconds: float
+    """Wall time of the run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What an ``.ac`` or ``.dc`` analysis that counts has produced."""
+
+    axis: NDArray[np.float64]
+    """(k,), strictly increasing: frequency in Hz, or the swept source in V."""
+    signals: Mapping[str, NDArray[np.complex128]]
+    """Name as it was asked for → (k,), V; the imaginary part is 0 for ``.dc``."""
+    log: str
+    """What ngspice printed."""
+    seconds: float
+    """Wall time of the run."""
+
+
+class SimulationFailed(DesignerError):
+    """A run that does not count: why, and what ngspice printed (cut to `LOG_LIMIT`)."""
+
+    def __init__(self, reason: str, log: str = "") -> None:
+        self.reason = reason
+        self.log = log if len(log) <= LOG_LIMIT else log[:LOG_LIMIT] + "\n… (cut)"
+        super().__init__(self.reason, self.log)  # both in args: pickling calls this again
+
+    def __str__(self) -> str:
+        return self.reason
+
+
+LOG_LIMIT = 20_000
+
+
+class Simulator(Protocol):
+    """A way to run a deck."""
+
+    name: str
+    """``ngspice-shared`` or ``ngspice-batch``."""
+    version: str
+    """ngspice's own, such as ``39``."""
+    usable: bool
+    """False once the session is beyond repair; only a new process helps."""
+
+    def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
+        """Run a deck and return the wanted signals.
+
+        Parameters
+        ----------
+        netlist : a whole deck: title, elements, one ``.tran``, ``.end``.
+        signals : node names, any case.
+        stop_time : s; the run must reach it.
+
+        Raises
+        ------
+        ValueError : `check_netlist` refuses the deck.
+        SimulationFailed : the run does not count.
+        """
+
+    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+        """Run a deck with one ``.ac`` or ``.dc`` and return the wanted signals.
+
+        Parameters
+        ----------
+        stop : last frequency [Hz], or last value of the swept source [V]; the run must reach it.
+
+        Raises
+        ------
+        As `run`.
+        """
+
+    def close(self) -> None:
+        """Release what can be released. May be called twice."""
+
+
+def require_version(found: str) -> str:
+    """``found`` if it is recent enough.
+
+    Raises
+    ------
+    EnvironmentMissing : it is not, or it is no version at all.
+    """
+    major = re.match(r"\d+", found)
+    if major is None or int(major[0]) < OLDEST_NGSPICE:
+        raise EnvironmentMissing(f"ngspice {found or 'of unknown version'} found; {HOW_TO_INSTALL}")
+    return found
+
+
+# ---------------------------------------------------------------------------------------------
+# What may reach ngspice
+
+
+# ---------------------------------------------------------------------------------------------
+# When a run counts
+
+_OFFENDING = re.compile(
+    r"error|warning|singular|timestep too small|no such|undefined|doanalyses|aborted|fatal"
+    # "Note: v1: has no value, DC 0 assumed": a source whose value was lost or misspelt
+    r"|has no value",
+    re.IGNORECASE,
+)
+
+# Steps on the way to an operating point. Where the way ends in vain, a line follows that counts
+# ("source stepping failed", "Transient op failed", "doAnalyses"); where it does not, the point
+# that was found satisfies the equations as any other does. "singular matrix" is never harmless.
+_HARMLESS = re.compile(
+    r"Warning: (Further gmin increment|Last gmin step failed"
+    r"|Dynamic gmin stepping failed|True gmin stepping failed)",
+)
+
+# Lines that quote the deck: its title, and the table of node names and voltages, where a node
+# may be called "error".
+_QUOTATION = re.compile(r"\s*(Circuit: .*|\S+\s+[-+]?\d[\d.]*(e[-+]?\d+)?)\s*", re.IGNORECASE)
+
+
+def offending_line(log: str) -> str | None:
+    """The first line of a log that says that the run cannot be trusted."""
+    for line in log.splitlines():
+        if not _QUOTATION.fullmatch(line) and _OFFENDING.search(_HARMLESS.sub("", line)):
+            return line.strip()
+    return None
+
+
+def said(line: str) -> str:
+    """A reason that quotes a line of ngspice's log."""
+    return f"ngspice said: {line[:200]}"
+
+
+def accept(
+    vectors: Mapping[str, NDArray[np.float64]],
+    signals: Sequence[str],
+    stop_time: float,
+    log: str,
+    seconds: float,
+) -> Waveforms:
+    """The waveforms of a run, if it counts.
+
+    Parameters
+    ----------
+    vectors : of the transient analysis, by lower-case name, with ``time``; empty if there is none.
+    signals, stop_time : as in `Simulator.run`.
+
+    Raises
+    ------
+    SimulationFailed : the log holds an `offending_line`; or the time vector is missing, does not
+        increase, does not reach the stop time; or a signal is missing or not finite.
+    """
+    time, found = _accepted(vectors, "time", signals, stop_time, log)
+    return Waveforms(time=time, signals=found, log=log, seconds=seconds)
+
+
+AXES = {"ac": "frequency", "dc": "v-sweep"}
+"""What ngspice calls the axis of each analysis."""
+
+
+def accept_sweep(
+    vectors: Mapping[str, NDArray[np.complex128]],
+    signals: Sequence[str],
+    stop: float,
+    analysis: Analysis,
+    log: str,
+    seconds: float,
+) -> Sweep:
+    """The sweep of an ``.ac`` or ``.dc`` analysis, if it counts: as `accept`.
+
+    Raises
+    ------
+    SimulationFailed : as `accept`, of the axis that `AXES` names.
+    """
+    axis, found = _accepted(vectors, AXES[analysis], signals, stop, log)
+    complex_ = {name: values.astype(np.complex128) for name, values in found.items()}
+    return Sweep(axis=axis, signals=complex_, log=log, seconds=seconds)
+
+
+_WORDS = {
+    "time": ("transient", "time vector", "s"),
+    "frequency": ("ac", "frequency vector", "Hz"),
+    "v-sweep": ("dc", "vector of the swept source", "V"),
+}
+
+
+def _accepted(
+    vectors: Mapping[str, NDArray[Any]], name: str, signals: Sequence[str], stop: float, log: str
+) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
+    line = offending_line(log)
+    if line is not None:
+        raise SimulationFailed(said(line), log)
+    analysis, what, unit = _WORDS[name]
+    axis = vectors.get(name)
+    if axis is None or axis.size == 0:
+        raise SimulationFailed(f"ngspice made no {analysis} analysis", log)
+    axis = np.array(axis.real, dtype=np.float64)
+    if not np.all(np.isfinite(axis)) or not np.all(np.diff(axis) > 0.0):
+        raise SimulationFailed(f"the {what} does not increase", log)
+    if axis[-1] < stop - 1e-9 * abs(stop):
+        raise SimulationFailed(f"the run ends at {axis[-1]:.9g} {unit}, not {stop:.9g} {unit}", log)
+    found: dict[str, NDArray[Any]] = {}
+    for name in signals:
+        values = vectors.get(name.lower())
+        if values is None:
+            raise SimulationFailed(f"the circuit has no node {name!r}", log)
+        if values.shape != axis.shape or not np.all(np.isfinite(values)):
+            raise SimulationFailed(f"node {name!r} has values that are not finite", log)
+        found[name] = values
+    return axis, found

@@ -1,0 +1,344 @@
+"""The spread of a design: a model file's rules and the catalogue's figures, part by part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from designer.base.errors import InputError, Unreachable
+from designer.base.schema import one_of
+from designer.base.units import format_quantity
+from designer.catalog.catalog import Catalog
+from designer.catalog.entries import Figure, Kind, PartFamily
+from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
+from designer.circuit.resistors import composites_of
+from designer.model.distributions import Law, Split, Uniform
+from designer.model.spread_table import DataSheet, PartRule, Shape, check_binned
+from designer.spread.spread import Group, Spread
+
+if TYPE_CHECKING:
+    from designer.model.model_file import ModelFile
+
+Part = Resistor | Capacitor | Reference
+KINDS = {"resistors": Resistor, "capacitors": Capacitor, "references": Reference}
+"""What a list of parts may say for all of a kind."""
+
+
+def spread_of(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Spread:
+    """What a model file says about the boards of this circuit.
+
+    Raises
+    ------
+    InputError : a part that the circuit lacks, a part in two networks, a temperature where the
+        catalogue sells no such part, measured values that cannot be of this circuit.
+    """
+    return _Rules(modelfile, circuit, catalog).spread()
+
+
+def check_names(modelfile: ModelFile, circuit: Circuit) -> None:
+    """Refuse names of parts that no design of this circuit has, before one is sought.
+
+    circuit : of any values. Where resistors may become two parts, their names are known too.
+
+    Raises
+    ------
+    InputError : names the first unknown part, and the known ones.
+    """
+    may = modelfile.circuit.composites
+    halves = [f"{r.name}{half}" for r in circuit.resistors for half in "AB" if may]
+    parts = [p.name for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)]
+    known = [*KINDS, *parts]
+    rules = modelfile.spread
+    asked = [(f"part[{i}].names", rule.names) for i, rule in enumerate(rules.part, start=1)]
+    asked += [(f"network[{i}].parts", rule.parts) for i, rule in enumerate(rules.network, start=1)]
+    for field, names in asked:
+        for name in names:
+            if name not in known and name not in halves:
+                raise InputError(modelfile.source, f"spread.{field}", name, one_of(name, known))
+    if modelfile.measured is not None:
+        modelfile.measured.check_names(circuit, halves)
+
+
+class _Rules:
+    def __init__(self, modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> None:
+        self.modelfile, self.circuit, self.catalog = modelfile, circuit, catalog
+        self.rules, self.choice = modelfile.spread, modelfile.circuit
+        self.file = None if modelfile.source is None else str(modelfile.source)
+        self.parts: dict[str, Part] = {
+            p.name: p for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)
+        }
+        self.own = dict(self._own())
+        self.own |= dict(self._of_arrays())
+
+    def spread(self) -> Spread:
+        rules, choice = self.rules, self.choice
+        opamp = self.catalog.opamp(self.circuit.opamp)
+        offset = rules.offset
+        measured = self.modelfile.measured
+        if measured is not None:
+            measured.check(self.circuit)
+        elif rules.measured is not None:
+            raise self.refuse("measured", rules.measured, "a model file on disk, with the list")
+        return Spread(
+            resistor=choice.resistor_grade,
+            capacitor=choice.capacitor_grade,
+            offset_sigma=opamp.offset_sigma if offset is None else offset.sigma,
+            offset_limit=opamp.offset_limit if offset is None else offset.limit,
+            saturation=rules.saturation,
+            resistor_shape=rules.resistors.over(choice.resistor_grade),
+            capacitor_shape=rules.capacitors.over(choice.capacitor_grade),
+            bias=_of_figure(rules.bias, opamp.bias),
+            gain_bandwidth=_of_figure(rules.gain_bandwidth, opamp.gbw),
+            supply=rules.supply,
+            grades=self.grades(),
+            shapes=self.shapes(),
+            temperature=rules.temperature,
+            tempco=self.tempco() if rules.temperature is not None else {},
+            ageing=self.ageing(),
+            groups=(*self.networks(), *self.reels()),
+            measured=measured,
+        )
+
+    def refuse(self, key: str, found: object, expected: str) -> InputError:
+        return InputError(self.file, f"spread.{key}", found, expected)
+
+    def _own(self) -> Iterator[tuple[str, PartRule]]:
+        """What each part has of its own; a later table adds to an earlier one."""
+        found: dict[str, PartRule] = {}
+        for number, rule in enumerate(self.rules.part, start=1):
+            for name in self.named(rule.names, f"part[{number}].names"):
+                before = found.get(name, PartRule((name,)))
+                said = PartRule(
+                    (name,),
+                    before.grade if rule.grade is None else rule.grade,
+                    before.law if rule.law is None else rule.law,
+                    before.tempco if rule.tempco is None else rule.tempco,
+                    before.ageing if rule.ageing is None else rule.ageing,
+                )
+                part = self.parts[name]
+                shape, grade = self.shape(part, said), self.grade(part, said)
+                check_binned(shape, grade, f"spread.part[{number}].law", self.file)
+                found[name] = said
+        yield from found.items()
+
+    def _of_arrays(self) -> Iterator[tuple[str, PartRule]]:
+        """What parts have as elements of arrays; a temperature coefficient and a drift of their own
+        go before the array's."""
+        for number, rule in enumerate(self.rules.network, start=1):
+            if rule.family is None:
+                continue
+            field = f"network[{number}].parts"
+            for name in self.named(rule.parts, field):
+                part, before = self.parts[name], self.own.get(name, PartRule((name,)))
+                if not isinstance(part, Resistor | Capacitor):
+                    raise self.refuse(field, name, "two or more resistors, or capacitors")
+                family = self.array(rule.family, name, number)
+                if before.grade is not None:
+                    expected = "parts without a grade of their own: the array has one"
+                    raise self.refuse(field, name, expected)
+                width = family.temperature_coefficient
+                ageing = before.ageing
+                if ageing is None and self.rules.ageing == "catalogue":
+                    if family.drift is None:
+                        said = f"{name}, {family.name}, of which the catalogue has no drift"
+                        expected = "a drift there, or an ageing in [[spread.part]]"
+                        raise self.refuse("ageing", said, expected)
+                    ageing = (-family.drift, family.drift)
+                tempco = (-width, width) if before.tempco is None else before.tempco
+                yield name, PartRule((name,), family.grade, before.law, tempco, ageing)
+
+    def array(self, family: str, name: str, number: int) -> PartFamily:
+        """The family of arrays that a part is an element of."""
+        part = self.parts[name]
+        assert isinstance(part, Resistor | Capacitor)
+        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
+        try:
+            sold = self.catalog.array(family, part.value).family
+        except InputError as error:
+            said = f"{name}, {error.found}" if isinstance(error, Unreachable) else error.found
+            raise self.refuse(f"network[{number}].family", said, error.expected) from None
+        if sold.kind != kind:
+            raise self.refuse(f"network[{number}].parts", name, f"{sold.kind}s, as {family} holds")
+        return sold
+
+    def named(self, names: tuple[str, ...], field: str) -> Iterator[str]:
+        """The parts that are meant: of a kind, both of a composite, or the one of that name."""
+        kinds = {
+            word: [name for name, part in self.parts.items() if isinstance(part, kind)]
+            for word, kind in KINDS.items()
+        }
+        pairs = {name: [f"{name}A", f"{name}B"] for name in composites_of(self.circuit)}
+        for name in names:
+            if name in self.parts:
+                yield name
+            elif name in pairs or kinds.get(name):
+                yield from pairs.get(name, kinds.get(name, []))
+            else:
+                raise self.refuse(field, name, one_of(name, [*kinds, *pairs, *self.parts]))
+
+    def grade(self, part: Part, rule: PartRule | None) -> float:
+        if rule is not None and rule.grade is not None:
+            return rule.grade
+        if isinstance(part, Reference):
+            stated = self.rules.reference_grade
+            return part.grade if stated is None else stated
+        resistor = isinstance(part, Resistor)
+        return self.choice.resistor_grade if resistor else self.choice.capacitor_grade
+
+    def shape(self, part: Part, rule: PartRule | None) -> Shape:
+        if rule is not None and rule.law is not None:
+            return rule.law
+        exact = rule is not None and rule.grade == 0.0  # whatever the others are
+        if exact or isinstance(part, Reference):
+            return Shape()
+        return self.rules.resistors if isinstance(part, Resistor) else self.rules.capacitors
+
+    def grades(self) -> dict[str, float]:
+        """Of the parts for which one is stated."""
+        named = [name for name, rule in self.own.items() if rule.grade is not None]
+        if self.rules.reference_grade is not None:
+            named += [r.name for r in self.circuit.references]
+        return {name: self.grade(self.parts[name], self.own.get(name)) for name in named}
+
+    def shapes(self) -> dict[str, Law]:
+        """Over the grade, of the parts for which one is stated."""
+        found = {}
+        for name, rule in self.own.items():
+            part = self.parts[name]
+            if rule.law is not None or rule.grade is not None:
+                found[name] = self.shape(part, rule).over(self.grade(part, rule))
+        return found
+
+    def tempco(self) -> dict[str, Law]:
+        """Of every part [1/K]: its own, or ± what the catalogue says of its family."""
+        found: dict[str, Law] = {}
+        for name, part in self.parts.items():
+            rule = self.own.get(name)
+            if rule is not None and rule.tempco is not None:
+                found[name] = Uniform(*rule.tempco)
+            else:
+                width = self.catalogued(part, rule)
+                found[name] = Uniform(-width, width)
+        return found
+
+    def catalogued(self, part: Part, rule: PartRule | None) -> float:
+        """The temperature coefficient [1/K] of a part as the bill of materials buys it."""
+        if isinstance(part, Reference):
+            return self.catalog.reference(part.model).temperature_coefficient
+        return self.family(part, rule, "temperature", "tempco").temperature_coefficient
+
+    def drift(self, part: Resistor | Capacitor, rule: PartRule | None) -> float:
+        """What a part's data sheet lets it change by."""
+        family = self.family(part, rule, "ageing", "ageing")
+        if family.drift is None:
+            said = f"{part.name}, {family.name}, of which the catalogue has no drift"
+            raise self.refuse("ageing", said, "a drift there, or an ageing in [[spread.part]]")
+        return family.drift
+
+    def family(
+        self, part: Resistor | Capacitor, rule: PartRule | None, key: str, own: str
+    ) -> PartFamily:
+        """The family that the bill of materials buys the part from; for the figure ``own``."""
+        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
+        try:
+            bought = self.catalog.part(kind, part.value, self.grade(part, rule))
+        except Unreachable as error:
+            said = f"{part.name}, {error.found}"
+            expected = f"{error.expected}; or {own} in [[spread.part]]"
+            raise self.refuse(key, said, expected) from None
+        return bought.family
+
+    def ageing(self) -> dict[str, Law]:
+        """Of the parts that age: resistors and capacitors by the file's figure, or their own."""
+        found: dict[str, Law] = {}
+        for name, part in self.parts.items():
+            rule = self.own.get(name)
+            if rule is not None and rule.ageing is not None:
+                found[name] = Uniform(*rule.ageing)
+            elif self.rules.ageing is None or isinstance(part, Reference):
+                continue
+            elif self.rules.ageing == "catalogue":
+                width = self.drift(part, rule)
+                found[name] = Uniform(-width, width)
+            else:
+                found[name] = Uniform(*self.rules.ageing)
+        return found
+
+    def networks(self) -> tuple[Group, ...]:
+        groups: list[Group] = []
+        for number, rule in enumerate(self.rules.network, start=1):
+            field = f"network[{number}].parts"
+            names = tuple(self.named(rule.parts, field))
+            if len(names) < 2 or len({type(self.parts[name]) for name in names}) > 1:
+                said = ", ".join(names)
+                raise self.refuse(field, said, "two or more resistors, or capacitors")
+            for name in names:
+                if names.count(name) > 1 or any(name in g.parts for g in groups):
+                    raise self.refuse(field, name, "parts that are in one network, once")
+                if self.picked(name):
+                    expected = "uniform or normal parts: a binned one is picked by itself"
+                    raise self.refuse(field, f"{name}, binned", expected)
+            share = rule.share
+            if rule.family is not None:
+                family = self.array(rule.family, names[0], number)
+                share = family.share
+                same = {float(f"{_sold(self.parts[name]):.9g}") for name in names}
+                if len(same) > 1 or len(names) > family.elements:
+                    expected = f"up to {family.elements} parts of one value, as an array holds"
+                    raise self.refuse(field, ", ".join(names), expected)
+            assert share is not None
+            groups.append(Group(f"network:{number}", names, share))
+        return tuple(groups)
+
+    def reels(self) -> tuple[Group, ...]:
+        """Parts of one kind and value come from one reel, but for those in a network and those
+        that were picked."""
+        share = self.rules.reels
+        taken = {name for group in self.networks() for name in group.parts}
+        reels: dict[str, list[str]] = {}
+        for letter, parts in (("R", self.circuit.resistors), ("C", self.circuit.capacitors)):
+            for part in parts:
+                if part.name not in taken and not self.picked(part.name):
+                    key = f"reel:{letter}:{format_quantity(part.value, digits=12)}"
+                    reels.setdefault(key, []).append(part.name)
+        return tuple(
+            Group(name, tuple(parts), share, reel=True)
+            for name, parts in reels.items()
+            if share > 0.0 and len(parts) > 1
+        )
+
+    def picked(self, name: str) -> bool:
+        """Whether a part's deviation is its own for having been measured: binned."""
+        return self.shape(self.parts[name], self.own.get(name)).law == "binned"
+
+
+def _sold(part: Part) -> float:
+    """The value that a resistor or capacitor is sold for."""
+    assert isinstance(part, Resistor | Capacitor)
+    return part.value
+
+
+def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Law | None:
+    """A section's figure from board to board; None: the typical one on all.
+
+    A bound that the data sheet does not give is as far from the typical figure, as a ratio, as the
+    one that it gives.
+    """
+    if rule == "typical":
+        return None
+    if not isinstance(rule, str):
+        return Uniform(*rule)
+    low, middle, high = figure.min, figure.typ, figure.max
+    if middle is None:
+        return None if low is None or high is None else Uniform(low, high)
+    if low is None and high is None:
+        return None
+    if low is None:
+        assert high is not None
+        low = _mirrored(high, middle)
+    return Split(low, middle, _mirrored(low, middle) if high is None else high)
+
+
+def _mirrored(bound: float, middle: float) -> float:
+    same_sign = bound * middle > 0.0
+    return middle * middle / bound if same_sign else 2.0 * middle - bound

@@ -1,0 +1,342 @@
+"""How boards differ: what varies by how much, and the boards of uniform numbers.
+
+The reference spread ``bench-1`` of docs/definitions.md is what a ``Spread`` is by default; the
+table ``[spread]`` of a model file says more (docs/spread.md). Diodes are exact: their drop stands
+inside a loop. The boards of a study are those of (seed, sample index) alone
+(``spread.random_streams``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.catalog.catalog import Catalog, OpAmp
+from designer.circuit.board_arrays import Boards
+from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resistor
+from designer.model.distributions import Law, Normal, Uniform
+from designer.model.measured_values import Measured
+from designer.spread import random_streams
+
+if TYPE_CHECKING:
+    from designer.model.model_file import ModelFile
+
+NAME = "bench-1"
+SATURATION_SPREAD = 0.05
+ROOM = 25.0
+"""°C at which parts have the values they are sold for."""
+
+NO_BANDWIDTH = (
+    "does not enter the yield: the exact circuit and ngspice's rung ideal, on which it is decided, "
+    "have no bandwidth"
+)
+"""What a spread of the gain-bandwidth comes with."""
+
+EVEN = Uniform(-1.0, 1.0)
+"""Anywhere within the grade."""
+
+Passive = Resistor | Capacitor
+BOARD, TEMPERATURE = "board", "temperature"
+_WHAT = ("offset", "low", "high", "bias", "gbw", "tempco", "ageing")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Parts that vary together, of one network or (``reel``) one reel.
+
+    share : in [0, 1], of a part's deviation that it has in common with the others; the rest is its
+    own. So the total stays within the grade, and two parts correlate by s²/(s² + (1 − s)²).
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    share: float
+    reel: bool = False
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What varies from board to board, and by how much.
+
+    resistor, capacitor : grades as fractions; their shapes : of a deviation over the grade.
+    offset_sigma, offset_limit [V]. saturation : half-width as a fraction. reference : half-width
+    over the grade of each reference. bias [A], gain_bandwidth [Hz] : of each section; None: the
+    circuit's, which is the typical figure. supply : half-width as a fraction, each rail its own.
+    grades, shapes : of the parts that have their own. temperature : range [°C] of the board.
+    tempco [1/K], ageing (relative) : by part; tempco counts where there is a temperature.
+    groups : parts that track. measured : a bench's list, which goes before anything drawn.
+    """
+
+    resistor: float
+    capacitor: float
+    offset_sigma: float
+    offset_limit: float
+    saturation: float = SATURATION_SPREAD
+    reference: float = 1.0
+    resistor_shape: Law = EVEN
+    capacitor_shape: Law = EVEN
+    bias: Law | None = None
+    gain_bandwidth: Law | None = None
+    supply: float = 0.0
+    grades: Mapping[str, float] = field(default_factory=dict)
+    shapes: Mapping[str, Law] = field(default_factory=dict)
+    temperature: tuple[float, float] | None = None
+    tempco: Mapping[str, Law] = field(default_factory=dict)
+    ageing: Mapping[str, Law] = field(default_factory=dict)
+    groups: tuple[Group, ...] = ()
+    measured: Measured | None = None
+
+    @classmethod
+    def of(cls, modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Spread:
+        """What a model file says about the boards of a circuit; ``bench-1`` where it says nothing.
+
+        Raises
+        ------
+        InputError : see ``part_rules.spread_of``.
+        """
+        from designer.spread.part_rules import spread_of  # which makes what is defined here
+
+        return spread_of(modelfile, circuit, catalog)
+
+    @classmethod
+    def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:
+        """The reference spread for these grades and this op-amp."""
+        return cls(resistor_grade, capacitor_grade, opamp.offset_sigma, opamp.offset_limit)
+
+    @property
+    def name(self) -> str:
+        """``bench-1`` where nothing is added to it."""
+        plain = Spread(self.resistor, self.capacitor, self.offset_sigma, self.offset_limit)
+        return NAME if self == plain else "model file"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything that decides the boards, as JSON holds it."""
+        return {"name": self.name} | {
+            f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)
+        }
+
+    def with_grades(self, resistor: float | None = None, capacitor: float | None = None) -> Spread:
+        """The same spread with parts of another grade; those with a grade of their own keep it."""
+        return replace(
+            self,
+            resistor=self.resistor if resistor is None else resistor,
+            capacitor=self.capacitor if capacitor is None else capacitor,
+        )
+
+    def coordinates(self, circuit: Circuit) -> tuple[str, ...]:
+        """Names of what is drawn for a board of this circuit, in the order of a cube's columns.
+
+        A part's own deviation has the part's name; an op-amp section has ``U1A.offset``,
+        ``U1A.low``, ``U1A.high`` and, where they are spread, ``U1A.bias`` and ``U1A.gbw``; then
+        ``R1.tempco``, ``R1.ageing``, ``VCC``, ``VEE``, ``temperature``, and a group's common
+        ``network:1`` or ``reel:R:10k``, with ``.tempco`` and ``.ageing`` as a part has them;
+        ``board`` where several were measured. A measured quantity's is that of its tolerance.
+        """
+        parts = _varying(circuit)
+        names = [p.name for p in parts]
+        for s in circuit.sections:
+            names += [f"{s.name}.{what}" for what in ("offset", "low", "high")]
+            names += [f"{s.name}.bias"] * self._known(self.bias, f"{s.name}.bias")
+            names += [f"{s.name}.gbw"] * self._known(self.gain_bandwidth, f"{s.name}.gbw")
+        names += [r.name for r in circuit.rails if self._known(self.supply, r.name)]
+        if self.temperature is not None:
+            names.append(TEMPERATURE)
+        for suffix, laws in self._slow:
+            names += [p.name + suffix for p in parts if p.name in laws]
+        for group in self.groups:
+            names.append(group.name)
+            names += [group.name + suffix for suffix, _ in self._slow]
+        if self.measured is not None and len(self.measured.boards) > 1:
+            names.append(BOARD)
+        return tuple(names)
+
+    def from_cube(self, circuit: Circuit, cube: Array) -> Boards:
+        """N boards of a cube (N, K) of uniform numbers in [0, 1), columns as ``coordinates``.
+
+        Every quantity of a board is non-decreasing in its own numbers, the lower output limits and
+        the negative rail by their magnitude; below room temperature a part's value falls with its
+        temperature coefficient's.
+        """
+        names = self.coordinates(circuit)
+        if cube.ndim != 2 or cube.shape[1] != len(names):
+            raise ValueError(f"a cube of {cube.shape}; this circuit has {len(names)} coordinates")
+        return _Draw(self, circuit, dict(zip(names, cube.T, strict=True)), len(cube)).boards()
+
+    def _known(self, spread: Law | float | None, name: str) -> bool:
+        """Whether this quantity of a board is drawn or was measured."""
+        return bool(spread) or (self.measured is not None and name in self.measured.values)
+
+    @property
+    def _slow(self) -> tuple[tuple[str, Mapping[str, Law]], ...]:
+        """What a part does after it was measured, as a suffix of its name; by part."""
+        found = [(".ageing", self.ageing)] if self.ageing else []
+        if self.temperature is not None:
+            found.insert(0, (".tempco", self.tempco))
+        return tuple(found)
+
+    def shape_of(self, part: Passive | Reference) -> Law:
+        """Of a part's relative deviation over its grade."""
+        if part.name in self.shapes:
+            return self.shapes[part.name]
+        if isinstance(part, Reference):
+            return EVEN
+        return self.resistor_shape if isinstance(part, Resistor) else self.capacitor_shape
+
+    def grade_of(self, part: Passive | Reference) -> float:
+        """The grade of a part: its own, or that of its kind."""
+        if part.name in self.grades:
+            return self.grades[part.name]
+        if isinstance(part, Reference):
+            return self.reference * part.grade
+        return self.resistor if isinstance(part, Resistor) else self.capacitor
+
+
+def draw(circuit: Circuit, spread: Spread, seed: int, index: int) -> Board:
+    """Board number ``index`` of the study with this seed."""
+    return draw_many(circuit, spread, seed, range(index, index + 1)).board(0)
+
+
+def draw_many(
+    circuit: Circuit, spread: Spread, seed: int, indices: range, stream: str = ""
+) -> Boards:
+    """The boards of these numbers of the study with this seed.
+
+    stream : goes before the coordinates' names: boards that no study has, whatever its seed.
+    """
+    names = spread.coordinates(circuit)
+    cube = random_streams.cube(seed, [stream + name for name in names], indices)
+    if BOARD in names and spread.measured is not None:  # in turn: they are what there is
+        count = len(spread.measured.boards)
+        cube[:, names.index(BOARD)] = (np.asarray(indices) % count + 0.5) / count
+    return spread.from_cube(circuit, cube)
+
+
+def part_of(coordinate: str) -> str:
+    """The part, section, rail or group that a coordinate belongs to: ``U1A.offset`` is U1A's."""
+    head, _, what = coordinate.rpartition(".")
+    return head if what in _WHAT else coordinate
+
+
+class _Draw:
+    """The boards of one cube. u : (N,) uniform numbers by coordinate."""
+
+    def __init__(
+        self, spread: Spread, circuit: Circuit, u: Mapping[str, Array], count: int
+    ) -> None:
+        self.spread, self.circuit, self.u, self.count = spread, circuit, u, count
+        self.group = {name: group for group in spread.groups for name in group.parts}
+        self.measured = spread.measured
+        if spread.measured is not None:
+            boards = len(spread.measured.boards)
+            which = u.get(BOARD, np.zeros(count))
+            self.which = np.minimum((which * boards).astype(np.intp), boards - 1)
+
+    def boards(self) -> Boards:
+        c, spread = self.circuit, self.spread
+        sections = [s.name for s in c.sections]
+        offset = Normal(spread.offset_sigma, spread.offset_limit)
+        supply = self.supply()
+        low, high = self.limits(supply)
+        return Boards(
+            circuit=c,
+            values={p.name: self.value(p, p.value) for p in _passives(c)},
+            offset={s: self.drawn(f"{s}.offset", offset, 0.0) for s in sections},
+            low=low,
+            high=high,
+            bias={s: self.drawn(f"{s}.bias", spread.bias, c.bias) for s in sections},
+            reference={r.name: self.value(r, r.volts) for r in c.references},
+            drop={d.name: self.same(d.model.drop) for d in c.diodes},
+            supply=supply,
+            gain_bandwidth={
+                s: self.drawn(f"{s}.gbw", spread.gain_bandwidth, c.gain_bandwidth)
+                for s in sections
+                if f"{s}.gbw" in self.u
+            },
+            inverse_gain=self.same(1.0 / c.gain),
+        )
+
+    def same(self, value: float) -> Array:
+        return np.full(self.count, value)
+
+    def drawn(self, name: str, law: Law | None, typical: float) -> Array:
+        """What a section has of its own, unless it was measured."""
+        return self.known(name, self.same(typical) if law is None else law.ppf(self.u[name]))
+
+    def known(self, name: str, drawn: Array) -> Array:
+        """The measured value, within its tolerance, where there is one."""
+        if self.measured is None or name not in self.measured.values:
+            return drawn
+        value = np.array(self.measured.values[name])[self.which]
+        width = np.array(self.measured.tolerances[name])[self.which]
+        return np.where(np.isnan(value), drawn, value + width * (2.0 * self.u[name] - 1.0))
+
+    def value(self, part: Passive | Reference, sold: float) -> Array:
+        """A part's value on the day: as made or measured, aged, at the board's temperature."""
+        spread, name = self.spread, part.name
+        off = spread.grade_of(part) * self.shared(name, "", spread.shape_of(part))
+        value = self.known(name, sold * (1.0 + off))
+        if name in spread.ageing:
+            value = value * (1.0 + self.shared(name, ".ageing", spread.ageing[name]))
+        if spread.temperature is not None and name in spread.tempco:
+            warmer = Uniform(*spread.temperature).ppf(self.u[TEMPERATURE]) - ROOM
+            tempco = self.shared(name, ".tempco", spread.tempco[name])
+            value = value * (1.0 + tempco * warmer)
+        return value
+
+    def shared(self, name: str, what: str, law: Law) -> Array:
+        """A part's own draw; in a group mixed with the common one."""
+        own = law.ppf(self.u[name + what])
+        group = self.group.get(name)
+        if group is None:
+            return own
+        common = law.ppf(self.u[group.name + what])
+        return group.share * common + (1.0 - group.share) * own
+
+    def supply(self) -> dict[str, Array]:
+        """By rail; without those that are exact."""
+        law = Uniform(-self.spread.supply, self.spread.supply)
+        return {
+            r.name: self.known(r.name, r.volts * (1.0 + law.ppf(self.u[r.name])))
+            for r in self.circuit.rails
+            if r.name in self.u
+        }
+
+    def limits(self, supply: Mapping[str, Array]) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lowest and highest output of each section: its distance to the rail stays when the rail
+        moves, and no output passes its rail."""
+        c = self.circuit
+        law = Uniform(-self.spread.saturation, self.spread.saturation)
+        exact = self.same(c.supply)
+        above, below = supply.get("VCC", exact), -supply.get("VEE", -exact)  # of ground
+
+        def limit(name: str, rail: Array, sign: float) -> Array:
+            wanted = c.saturation * (1.0 + law.ppf(self.u[name])) + (rail - c.supply)
+            return self.known(name, sign * np.minimum(wanted, rail))
+
+        low = {s.name: limit(f"{s.name}.low", below, -1.0) for s in c.sections}
+        high = {s.name: limit(f"{s.name}.high", above, 1.0) for s in c.sections}
+        return low, high
+
+
+def _passives(circuit: Circuit) -> tuple[Passive, ...]:
+    return (*circuit.resistors, *circuit.capacitors)
+
+
+def _varying(circuit: Circuit) -> tuple[Passive | Reference, ...]:
+    """The parts that have a deviation of their own."""
+    return (*_passives(circuit), *circuit.references)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in sorted(value.items())}
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, Group):
+        return dataclasses.asdict(value)
+    return value.as_dict() if hasattr(value, "as_dict") else value

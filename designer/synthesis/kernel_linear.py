@@ -1,0 +1,686 @@
+"""Compiled loops of the linear block: joining ratios, and completing them to values.
+
+Everything is in logarithms and all loops are exhaustive: what they leave out cannot reach the
+level or breaks a condition. The mathematics stands in ``synthesis.linear_block``, the conditions in
+``synthesis.linear_rules``. Parts are numbered as in ``synthesis.linear_block.PARTS``. All loops
+stand in this one file: a callee in another would leave compiled code stale (``base.jit``).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from designer.base.arrays import Array, Index, Mask
+from designer.base.jit import compiled
+
+TINY = 1e-12
+"""Allowance for rounding in every comparison of logarithms."""
+PAIR, COMPLETION = 3, 20
+"""Steps that a pair of resistors and a completion count for: a step is some nanoseconds."""
+R1, R2, R3, R4, R5, R7, R8, R9, R10, R11, C1, C2, C3, C4 = range(14)
+
+
+class Values(NamedTuple):
+    """A catalogue in logarithms, sorted, with its sums and ratios.
+
+    r (n,), c (m,) : values. ratios (k,) : distinct ratios of two resistors; the pairs that have
+    ratio i are upper[first[i]:first[i+1]] over lower[...] (indices into r). sums (n·m,) : of
+    sum_r, sum_c (indices into r, c). deltas (d,) : distinct ratios C4/C2, nearest to zero first,
+    of the pairs delta_c2, delta_c4 from delta_first[i] on.
+    """
+
+    r: Array
+    c: Array
+    ratios: Array
+    first: Index
+    upper: Index
+    lower: Index
+    sums: Array
+    sum_r: Index
+    sum_c: Index
+    deltas: Array
+    delta_first: Index
+    delta_c2: Index
+    delta_c4: Index
+
+
+class Rules(NamedTuple):
+    """What a choice must keep, beside the level of error.
+
+    w (8,) : ln |wanted| of R2, R3, R4, R5, R8, R9, R10, R11. seconds (2,) : range of ln(time
+    scale). level, share : ln of those of ``linear_rules.Bounds``. stop (2,) : range of ln R4. peaks
+    (4,) : ln. ties (14, 14) : true where two parts must be equal. free_r (n,), free_c (m,) : true
+    for values that do not count as distinct. most : limit on distinct values. six, one, two, both :
+    elementary vectors, (k, 3) places and (k, 3) entries: of the six, and those that hold values of
+    the first mass, the second, and both.
+    """
+
+    w: Array
+    seconds: Array
+    level: float
+    share: float
+    stop: Array
+    peaks: Array
+    ties: Mask
+    free_r: Mask
+    free_c: Mask
+    most: int
+    six: tuple[Index, Array]
+    one: tuple[Index, Array]
+    two: tuple[Index, Array]
+    both: tuple[Index, Array]
+
+
+@compiled
+def _below(table: Array, x: float) -> int:
+    """How many entries of the sorted table are smaller than x."""
+    low, high = 0, len(table)
+    while low < high:
+        middle = (low + high) // 2
+        if table[middle] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def _largest(vectors: tuple[Index, Array], v: Array) -> float:
+    """Largest |y · v| over elementary vectors y."""
+    places, entries = vectors
+    out = 0.0
+    for k in range(len(places)):
+        total = (
+            entries[k, 0] * v[places[k, 0]]
+            + entries[k, 1] * v[places[k, 1]]
+            + entries[k, 2] * v[places[k, 2]]
+        )
+        out = max(out, abs(total))
+    return out
+
+
+@compiled
+def _agree(rules: Rules, parts: Index, part: int, value: int) -> bool:
+    """Whether part number ``part`` may have this value beside those chosen (-1: not yet)."""
+    for other in range(14):
+        if rules.ties[part, other] and parts[other] >= 0 and parts[other] != value:
+            return False
+    return True
+
+
+@compiled
+def _kinds(rules: Rules, parts: Index) -> int:
+    """Distinct values among the parts chosen, without the preferred ones."""
+    count = 0
+    for i in range(14):
+        if parts[i] < 0 or (rules.free_r[parts[i]] if i < 10 else rules.free_c[parts[i]]):
+            continue
+        new = True
+        for j in range(0 if i < 10 else 10, i):
+            new = new and parts[j] != parts[i]
+        count += new
+    return count
+
+
+@compiled
+def _ranges(
+    values: Values,
+    rules: Rules,
+    delta: float,
+    c2: tuple[float, float],
+    a: float,
+    p: float,
+    slack: float,
+    out: Array,
+) -> bool:
+    """Ranges (low, high) of ln R4 and ln R11 that the conditions leave, in out[0], out[1].
+
+    a, p : scales, each within ``slack`` of the nominal ones; c2 : range of ln C2.
+    """
+    r, w, peaks = values.r, rules.w, rules.peaks
+    low, high = r[0], r[-1]
+    c_low = max(c2[0], rules.seconds[0] - a) - slack
+    c_high = min(c2[1], rules.seconds[1] - a) + slack
+    if c_low > c_high:
+        return False
+    s_low, s_high = values.sums[0], values.sums[-1]
+    ratio4, ratio5 = delta + p + w[6] - w[2], delta + p + w[7] - w[3]
+    # R4: its own range, R10's, the stop, the levels of x1' and x2', R1 C1.
+    centre = peaks[1] - peaks[0] + a - w[2]
+    low4 = max(low, low + ratio4 - slack, rules.stop[0] - slack)
+    low4 = max(low4, centre - min(rules.level, rules.share))
+    low4 = max(low4, centre + peaks[3] - peaks[1] + p - rules.share, c_low + 2 * a - w[2] - s_high)
+    high4 = min(high, high + ratio4 + slack, centre + rules.level, c_high + 2 * a - w[2] - s_low)
+    high4 = min(high4, rules.stop[1] + slack)
+    out[0, 0], out[0, 1] = low4 - 4 * slack, high4 + 4 * slack
+    if out[0, 0] > out[0, 1]:
+        return False
+    # R11: its own range, R5's, the levels of x2' and x2, R7 C3.
+    centre = peaks[3] - peaks[2] + a - delta - w[7]
+    time = 2 * a - delta - w[7]
+    low11 = max(low, low - ratio5 - slack, centre - rules.level, c_low + time - s_high)
+    high11 = min(high, high - ratio5 + slack, centre + rules.level, c_high + time - s_low)
+    # ln of x2's peak voltage over x1's is q3 - q1 + p + ...; R4 at its largest leaves most room.
+    q1 = min(out[0, 1], high) + w[2] - a
+    high11 = min(high11, rules.share - peaks[2] + peaks[0] + q1 - p + a - delta - w[7])
+    out[1, 0], out[1, 1] = low11 - 4 * slack, high11 + 4 * slack
+    return bool(out[1, 0] <= out[1, 1])
+
+
+@compiled
+def _tied(rules: Rules, delta: float, p: float, slack: float) -> bool:
+    """Whether ties between the masses allow these ratios of capacitors and of velocities.
+
+    Where R1 = R7 and C1 = C3, equal stiffness resistors need equal wanted products.
+    """
+    if not (rules.ties[R1, R7] and rules.ties[C1, C3]):
+        return True
+    w = rules.w
+    wanted = (-w[2], -p - delta - w[6], p - w[3], -delta - w[7])
+    for i, one in enumerate((R4, R10, R5, R11)):
+        for j, two in enumerate((R4, R10, R5, R11)):
+            if rules.ties[one, two] and abs(wanted[i] - wanted[j]) > slack:
+                return False
+    return True
+
+
+@compiled
+def _ratios(
+    values: Values,
+    rules: Rules,
+    parts: Index,
+    pair: tuple[int, int],
+    allowed: Array,
+    by_upper: bool,
+    centre: float,
+    half: float,
+    most: int,
+    found: Index,
+) -> tuple[int, int]:
+    """Ratios within ``half`` of ``centre`` that some allowed pair of resistors has; the steps.
+
+    allowed : range of ln of the upper (else lower) resistor of the pair of parts. most : distinct
+    resistors that there may be, with those chosen already.
+    """
+    count, steps = 0, 0
+    k = _below(values.ratios, centre - half)
+    while k < len(values.ratios) and values.ratios[k] <= centre + half:
+        for i in range(values.first[k], values.first[k + 1]):
+            steps += PAIR
+            upper, lower = values.upper[i], values.lower[i]
+            anchor = values.r[upper] if by_upper else values.r[lower]
+            if (
+                anchor < allowed[0]
+                or anchor > allowed[1]
+                or not _agree(rules, parts, pair[0], upper)
+                or not _agree(rules, parts, pair[1], lower)
+                or (upper != lower and rules.ties[pair[0], pair[1]])
+            ):
+                continue
+            if most < 10:
+                parts[pair[0]], parts[pair[1]] = upper, lower
+                kinds = _kinds(rules, parts)
+                parts[pair[0]] = parts[pair[1]] = -1
+                if kinds > most:
+                    continue
+            found[count] = k
+            count += 1
+            break
+        k += 1
+    return count, steps
+
+
+@compiled
+def join(
+    values: Values, rules: Rules, level: float, start: int, patience: int, rows: Index,
+    errors: Array,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Rows (delta, R2, R9, R3, R8, R4/R10, R5/R11) whose eight-term error is at most ``level``.
+
+    Begins with pair ``start`` of (delta, R2), counted delta · n + R2, and ends after the last one,
+    where ``rows`` is full or after ``patience`` steps. Returns the pair to go on with, the rows
+    written, and the steps taken; if the first pair alone fills ``rows``, that pair is ``start``.
+    """
+    r, w = values.r, rules.w
+    n, room = len(r), len(errors)
+    w2, w3, w8, w9 = w[0], w[1], w[4], w[5]
+    v, allowed = np.zeros(10), np.zeros((2, 2))
+    parts = np.zeros(14, dtype=np.int64)
+    found4 = np.zeros(len(values.ratios), dtype=np.int64)
+    found5 = np.zeros(len(values.ratios), dtype=np.int64)
+    fives = np.zeros(len(values.ratios))
+    count, steps = 0, 0
+    stop = n * len(values.deltas)
+    for outer in range(start, stop):
+        if steps > patience:
+            return outer, count, steps
+        begin = count
+        i_delta, i2 = outer // n, outer % n
+        delta = values.deltas[i_delta]
+        if rules.ties[C2, C4] and abs(delta) > TINY:
+            continue
+        own = values.delta_c2[values.delta_first[i_delta] : values.delta_first[i_delta + 1]]
+        c2 = (values.c[own[0]], values.c[own[-1]])
+        # C2 and C4 have a value of their own, and where they differ two, unless it is preferred.
+        most = rules.most - (0 if rules.free_c.any() else 1 + (abs(delta) > TINY))
+        parts[:] = -1
+        parts[R2] = i2
+        v[0] = r[i2] + w2
+        i9 = _below(r, v[0] - delta - w9 - 2 * level - TINY)
+        while i9 < n and r[i9] + delta + w9 <= v[0] + 2 * level + TINY:
+            parts[R3] = parts[R8] = parts[R9] = -1
+            v[1] = r[i9] + delta + w9
+            if not _agree(rules, parts, R9, i9):
+                i9 += 1
+                continue
+            parts[R9] = i9
+            for i3 in range(n):
+                steps += 1
+                v[2] = r[i3] + w3
+                # Half the product R3 R8 is e24 + e42 - e22 - e44 within 4 levels.
+                wanted = v[0] + v[1] - v[2] - delta - w8
+                if wanted < r[0] - 4 * level - TINY or wanted > r[-1] + 4 * level + TINY:
+                    continue
+                parts[R3] = parts[R8] = -1
+                if not _agree(rules, parts, R3, i3):
+                    continue
+                parts[R3] = i3
+                p = v[2] - 0.5 * (v[0] + v[1])
+                centre = rules.peaks[1] - rules.peaks[3]
+                if abs(p - centre) > rules.level + 4 * level:
+                    continue
+                if not _tied(rules, delta, p, 8 * level + TINY):
+                    continue
+                mean = 0.5 * (v[0] + v[1])
+                if not _ranges(values, rules, delta, c2, mean, p, 4 * level + TINY, allowed):
+                    continue
+                i8 = _below(r, wanted - 4 * level - TINY)
+                while i8 < n and r[i8] <= wanted + 4 * level + TINY:
+                    steps += 1
+                    v[3] = r[i8] + delta + w8
+                    parts[R8] = -1
+                    fits = (
+                        _agree(rules, parts, R8, i8)
+                        and abs(0.5 * (v[2] - v[3]) - centre) <= rules.level + TINY
+                    )
+                    parts[R8] = i8
+                    # e22, e44 and e24 + e42: the four alone.
+                    spread = max(
+                        abs(v[0] - v[1]) / 2,
+                        abs(2 * v[0] - v[2] - v[3]) / 4,
+                        abs(2 * v[1] - v[2] - v[3]) / 4,
+                    )
+                    if not fits or spread > level + TINY or _kinds(rules, parts) > most:
+                        i8 += 1
+                        continue
+                    half = 4 * level + TINY
+                    count4, taken = _ratios(
+                        values, rules, parts, (R4, R10), allowed[0], True,
+                        delta + p + w[6] - w[2], half, most, found4,
+                    )  # fmt: skip
+                    steps += taken
+                    if count4:
+                        count5, taken = _ratios(
+                            values, rules, parts, (R5, R11), allowed[1], False,
+                            delta + p + w[7] - w[3], half, most, found5,
+                        )  # fmt: skip
+                        steps += taken
+                        for k in range(count5):
+                            fives[k] = 0.5 * (values.ratios[found5[k]] - delta + w[3] - w[7])
+                        for h in range(count4):
+                            v[4] = 0.5 * (values.ratios[found4[h]] - delta + w[2] - w[6])
+                            for k in range(count5):
+                                steps += PAIR
+                                v[5] = fives[k]
+                                if abs(v[4] - v[5]) > 2 * level + TINY:
+                                    continue
+                                error = _largest(rules.six, v)
+                                if error > level + TINY:
+                                    continue
+                                if count == room:
+                                    return outer, begin, steps
+                                rows[count, 0], rows[count, 1], rows[count, 2] = i_delta, i2, i9
+                                rows[count, 3], rows[count, 4] = i3, i8
+                                rows[count, 5], rows[count, 6] = found4[h], found5[k]
+                                errors[count] = error
+                                count += 1
+                    i8 += 1
+            i9 += 1
+    return stop, count, steps
+
+
+@compiled
+def _own(
+    values: Values, rules: Rules, row: Index, pick: int, parts: Index, v: Array
+) -> tuple[bool, float, float]:
+    """Put a row's own parts and capacitors in ``parts`` and its six numbers in ``v``.
+
+    Returns whether ties and time scale allow it, and the nominal scales alpha and p.
+    """
+    r, w = values.r, rules.w
+    delta = values.deltas[row[0]]
+    parts[:] = -1
+    v[0], v[1] = r[row[1]] + w[0], r[row[2]] + delta + w[5]
+    v[2], v[3] = r[row[3]] + w[1], r[row[4]] + delta + w[4]
+    v[4] = 0.5 * (values.ratios[row[5]] - delta + w[2] - w[6])
+    v[5] = 0.5 * (values.ratios[row[6]] - delta + w[3] - w[7])
+    parts[R2], parts[R9], parts[R3], parts[R8] = row[1], row[2], row[3], row[4]
+    parts[C2] = values.delta_c2[pick]
+    alpha, p = 0.25 * (v[0] + v[1] + v[2] + v[3]), 0.5 * (v[2] - v[3])
+    tau = alpha + values.c[parts[C2]]
+    good = tau >= rules.seconds[0] - TINY and tau <= rules.seconds[1] + TINY
+    good = good and _agree(rules, parts, C4, values.delta_c4[pick])
+    parts[C4] = values.delta_c4[pick]
+    return good, alpha, p
+
+
+@compiled
+def _side(
+    values: Values,
+    rules: Rules,
+    parts: Index,
+    v: Array,
+    delta: float,
+    scales: tuple[float, float],
+    second: bool,
+    ratio: int,
+    level: float,
+    found: Index,
+    numbers: Array,
+) -> tuple[int, bool, int]:
+    """Completions of one mass: stiffness pair, displacement integrator; error at most ``level``.
+
+    found (room, 4) gets the upper and lower resistor, the integrator's resistor and capacitor;
+    numbers (room, 4) the two further numbers of the minimax, the scale q and the error so far.
+    Returns how many, whether there was room, and the steps.
+    """
+    r, w, peaks = values.r, rules.w, rules.peaks
+    alpha, p = scales
+    c2 = values.c[parts[C2]]
+    upper, lower, resistor, capacitor = (R5, R11, R7, C3) if second else (R4, R10, R1, C1)
+    w_up, w_low = (w[3], w[7]) if second else (w[2], w[6])
+    place = 8 if second else 6
+    middle, count, steps = 0.5 * (v[0] + v[1]), 0, 0
+    for k in range(values.first[ratio], values.first[ratio + 1]):
+        steps += PAIR
+        up, low = values.upper[k], values.lower[k]
+        parts[upper] = parts[lower] = parts[resistor] = parts[capacitor] = -1
+        if not _agree(rules, parts, upper, up):
+            continue
+        parts[upper] = up
+        if not _agree(rules, parts, lower, low):
+            continue
+        parts[lower] = low
+        if second:
+            q = r[low] + w_low - (alpha - delta)
+            good = abs(peaks[3] - peaks[2] - q) <= rules.level + TINY
+        else:
+            q = r[up] + w_up - alpha
+            velocity = peaks[1] - peaks[0] - q
+            good = abs(velocity) <= rules.level + TINY
+            good = good and rules.stop[0] - TINY <= r[up] <= rules.stop[1] + TINY
+            good = good and max(velocity, velocity + peaks[3] - peaks[1] + p) <= rules.share + TINY
+        if not good:
+            continue
+        # The first mass's upper and the second's lower resistor belong to inverted states.
+        anchor = delta + r[low] + w_low if second else r[up] + w_up
+        wanted = 2 * middle + c2 - anchor
+        i = _below(values.sums, wanted - 4 * level - TINY)
+        while i < len(values.sums) and values.sums[i] <= wanted + 4 * level + TINY:
+            steps += COMPLETION
+            parts[resistor] = parts[capacitor] = -1
+            fits = _agree(rules, parts, resistor, values.sum_r[i])
+            fits = fits and _agree(rules, parts, capacitor, values.sum_c[i])
+            parts[resistor], parts[capacitor] = values.sum_r[i], values.sum_c[i]
+            fits = fits and (rules.most >= 14 or _kinds(rules, parts) <= rules.most)
+            v[place] = 0.5 * (r[up] + w_up + values.sums[i] - c2)
+            v[place + 1] = 0.5 * (delta + r[low] + w_low + values.sums[i] - c2)
+            if fits:
+                error = max(_largest(rules.six, v), _largest(rules.two if second else rules.one, v))
+                if error <= level + TINY:
+                    if count == len(found):
+                        return count, False, steps
+                    found[count, 0], found[count, 1] = up, low
+                    found[count, 2], found[count, 3] = values.sum_r[i], values.sum_c[i]
+                    numbers[count, 0], numbers[count, 1] = v[place], v[place + 1]
+                    numbers[count, 2], numbers[count, 3] = q, error
+                    count += 1
+            i += 1
+    parts[upper] = parts[lower] = parts[resistor] = parts[capacitor] = -1
+    return count, True, steps
+
+
+@compiled
+def _copy(into: Index, parts: Index) -> None:
+    for i in range(len(parts)):
+        into[i] = parts[i]
+
+
+@compiled
+def _put(parts: Index, found: Index, second: bool) -> None:
+    """Put one completion (its four indices) among the parts."""
+    if second:
+        parts[R5], parts[R11], parts[R7], parts[C3] = found[0], found[1], found[2], found[3]
+    else:
+        parts[R4], parts[R10], parts[R1], parts[C1] = found[0], found[1], found[2], found[3]
+
+
+@compiled
+def _pair(
+    rules: Rules, parts: Index, v: Array, p: float, found: Index, one: Array, two: Array
+) -> float:
+    """Error of a completion of both masses; infinite where the two do not go together.
+
+    The first mass's parts are in place; found, two : of the second; one : of the first.
+    """
+    # ln of x2's peak voltage over x1's.
+    if rules.peaks[2] - rules.peaks[0] - one[2] + p + two[2] > rules.share + TINY:
+        return np.inf
+    parts[R5] = parts[R11] = parts[R7] = parts[C3] = -1
+    for k, part in enumerate((R5, R11, R7, C3)):
+        if not _agree(rules, parts, part, found[k]):
+            return np.inf
+    v[6], v[7], v[8], v[9] = one[0], one[1], two[0], two[1]
+    return float(max(one[3], two[3], _largest(rules.both, v)))
+
+
+@compiled
+def _sorted(keys: Array) -> Index:
+    """Places of the keys in ascending order, equal ones as they come (Shell's method)."""
+    n = len(keys)
+    order = np.zeros(n, dtype=np.int64)
+    for i in range(n):
+        order[i] = i
+    gap = 1
+    while 3 * gap + 1 < n:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, n):
+            moved, j = order[i], i
+            while j >= gap:
+                other = order[j - gap]
+                a, b = keys[other], keys[moved]
+                if a < b or (a == b and other < moved):
+                    break
+                order[j] = other
+                j -= gap
+            order[j] = moved
+        gap //= 3
+    return order
+
+
+@compiled
+def complete(
+    values: Values, rules: Rules, rows: Index, errors: Array, level: float, patience: int,
+    room: int, best: Index,
+) -> tuple[float, int, bool, int]:  # fmt: skip
+    """The choice of least ten-term error that is at most ``level`` among these rows.
+
+    rows come in ascending order of their eight-term error, so that the rest cannot be better once
+    it passes the best. best (14,) gets the parts. Returns the error (infinite if there is none),
+    how far any row came (0: no time scale, 1: no completion, 2: no pair, 3: found), whether
+    nothing was left out for want of room or ``patience`` steps, and the steps.
+    """
+    gain = 1e-11
+    found1, found2 = np.zeros((room, 4), dtype=np.int64), np.zeros((room, 4), dtype=np.int64)
+    numbers1, numbers2 = np.zeros((room, 4)), np.zeros((room, 4))
+    parts, v = np.zeros(14, dtype=np.int64), np.zeros(10)
+    least, reached, whole, steps, any_found = level + gain, 0, True, 0, False
+    for i in range(len(rows)):
+        if errors[i] > least - gain:
+            break
+        if steps > patience:
+            whole = False
+            break
+        row = rows[i]
+        delta = values.deltas[row[0]]
+        for pick in range(values.delta_first[row[0]], values.delta_first[row[0] + 1]):
+            steps += COMPLETION
+            good, alpha, p = _own(values, rules, row, pick, parts, v)
+            if not good:
+                continue
+            reached = max(reached, 1)
+            scales = (alpha, p)
+            n1, full1, taken1 = _side(
+                values, rules, parts, v, delta, scales, False, row[5], least, found1, numbers1
+            )
+            steps += taken1
+            if n1 == 0:
+                continue
+            n2, full2, taken2 = _side(
+                values, rules, parts, v, delta, scales, True, row[6], least, found2, numbers2
+            )
+            whole = whole and full1 and full2
+            steps += taken2
+            if n2 == 0:
+                continue
+            reached = max(reached, 2)
+            order1 = _sorted(numbers1[:n1, 3])
+            order2 = _sorted(numbers2[:n2, 3])
+            for j in order1:
+                if numbers1[j, 3] > least - gain:
+                    break
+                if steps > patience:
+                    whole = False
+                    break
+                for k in order2:
+                    if numbers2[k, 3] > least - gain:
+                        break
+                    steps += COMPLETION
+                    _put(parts, found1[j], False)
+                    error = _pair(rules, parts, v, p, found2[k], numbers1[j], numbers2[k])
+                    if error > least - gain:
+                        continue
+                    _put(parts, found2[k], True)
+                    if _kinds(rules, parts) <= rules.most:
+                        least, reached, any_found = error, 3, True
+                        _copy(best, parts)
+            parts[:] = -1
+    return (least if any_found else np.inf), reached, whole, steps
+
+
+@compiled
+def gather(
+    values: Values,
+    rules: Rules,
+    rows: Index,
+    level: float,
+    patience: int,
+    room: int,
+    fewest: int,
+    groups: Index,
+    first: Index,
+    second: Index,
+    best: Index,
+) -> tuple[int, int, int, int, bool, int]:
+    """Every completion of both masses that can belong to a choice of the fewest distinct values.
+
+    Only choices with an error of at most ``level``. groups (g, 2) gets the row and the pair of
+    capacitors; first, second (k, 5) the group and the four indices of a completion; best (14,) a
+    choice of the fewest. fewest : a number of distinct values that is known to be reached, or
+    more. Returns the fewest values, how many groups and completions were written, whether nothing
+    was left out for want of room or ``patience`` steps, and the steps.
+    """
+    found1, found2 = np.zeros((room, 4), dtype=np.int64), np.zeros((room, 4), dtype=np.int64)
+    numbers1, numbers2 = np.zeros((room, 4)), np.zeros((room, 4))
+    kinds1, kinds2 = np.zeros((room, 1)), np.zeros((room, 1))
+    parts, v = np.zeros(14, dtype=np.int64), np.zeros(10)
+    n_groups, n_first, n_second, whole, steps = 0, 0, 0, True, 0
+    for i in range(len(rows)):
+        if steps > patience:
+            whole = False
+            break
+        row = rows[i]
+        delta = values.deltas[row[0]]
+        for pick in range(values.delta_first[row[0]], values.delta_first[row[0] + 1]):
+            good, alpha, p = _own(values, rules, row, pick, parts, v)
+            if not good or _kinds(rules, parts) > fewest:
+                continue
+            scales = (alpha, p)
+            n1, full1, taken1 = _side(
+                values, rules, parts, v, delta, scales, False, row[5], level, found1, numbers1
+            )
+            n2, full2, taken2 = _side(
+                values, rules, parts, v, delta, scales, True, row[6], level, found2, numbers2
+            )
+            whole = whole and full1 and full2
+            steps += COMPLETION + taken1 + taken2
+            for k in range(n1):
+                _put(parts, found1[k], False)
+                kinds1[k, 0] = _kinds(rules, parts)
+            parts[R4] = parts[R10] = parts[R1] = parts[C1] = -1
+            for k in range(n2):
+                _put(parts, found2[k], True)
+                kinds2[k, 0] = _kinds(rules, parts)
+            parts[R5] = parts[R11] = parts[R7] = parts[C3] = -1
+            order1 = _sorted(kinds1[:n1, 0])
+            order2 = _sorted(kinds2[:n2, 0])
+            reached = False
+            for j in order1:
+                if kinds1[j, 0] > fewest:
+                    break
+                for k in order2:
+                    if kinds2[k, 0] > fewest or (
+                        reached and max(kinds1[j, 0], kinds2[k, 0]) >= fewest
+                    ):
+                        break
+                    steps += COMPLETION
+                    _put(parts, found1[j], False)
+                    _put(parts, found2[k], True)
+                    kinds = _kinds(rules, parts)
+                    if kinds > fewest or (reached and kinds == fewest):
+                        continue
+                    error = _pair(rules, parts, v, p, found2[k], numbers1[j], numbers2[k])
+                    if error <= level + TINY:
+                        reached = True
+                        if kinds < fewest:
+                            _put(parts, found2[k], True)
+                            _copy(best, parts)
+                        fewest = kinds
+            if not reached:
+                continue
+            kept1, kept2 = 0, 0
+            for k in range(n1):
+                kept1 += kinds1[k, 0] <= fewest
+            for k in range(n2):
+                kept2 += kinds2[k, 0] <= fewest
+            full = n_groups < len(groups)
+            full = full and n_first + kept1 <= len(first) and n_second + kept2 <= len(second)
+            if not full:
+                whole = False
+                continue
+            for k in range(n1):
+                if kinds1[k, 0] <= fewest:
+                    first[n_first, 0] = n_groups
+                    _copy(first[n_first, 1:], found1[k])
+                    n_first += 1
+            for k in range(n2):
+                if kinds2[k, 0] <= fewest:
+                    second[n_second, 0] = n_groups
+                    _copy(second[n_second, 1:], found2[k])
+                    n_second += 1
+            groups[n_groups, 0], groups[n_groups, 1] = i, pick
+            n_groups += 1
+    return fewest, n_groups, n_first, n_second, whole, steps

@@ -1,0 +1,179 @@
+"""Side conditions as the search sees them: what each one limits, and how a limit is tightened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.catalog.catalog import Figure, OpAmp
+from designer.circuit.design import Check, Design
+from designer.circuit.noise_gains import stages
+from designer.circuit.resistors import effective
+from designer.model.circuit_table import CircuitSpec
+from designer.model.find_responses import Peaks
+from designer.synthesis.linear_rules import Bounds
+
+SWING_SHARE = 0.85
+"""Of the op-amp's limit: what the peaks of an output may use; the rest is for spread."""
+LEVEL_RATIO = 4.0
+"""Largest ratio between the peaks of the state voltages that belong together."""
+SHARE = 1.6
+"""How much larger than x1's peak voltage another state's may be: the clearance gets the swing."""
+LEAST_SIGNAL = 10.0
+"""Peak of x1 over the op-amp's largest offset: below it a circuit shows offsets, not dynamics."""
+LOAD, SIGNAL = 2e3, (4.7e3, 5e5)
+"""Least load of an output [ohm]; range of the signal resistors [ohm], for load and for noise."""
+NOISE_GAIN = 30.0
+"""Of a stage whose gain is a ratio of resistors: its offset and noise appear so much larger."""
+BANDWIDTH_SHARE = 0.05
+"""Of the gain-bandwidth: noise gain times frequency of the highest harmonic that matters, so that
+the phase error of a stage there, where a velocity has a thousandth of its largest harmonic, stays
+below 0.05 rad."""
+SIGNAL_RESISTORS = frozenset(f"R{i}" for i in (1, 2, 3, 4, 5, 7, 8, 9, 10, 11))
+"""Resistors of the linear block, by the paper's names for two masses."""
+GENERATOR_PEAK = 5.0
+"""Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
+INVERTER_GAIN = 2.0
+"""Noise gain of an inverter, which every circuit has."""
+MARGIN = 1e-3
+"""How much further than the excess a limit is tightened."""
+
+
+@dataclass(frozen=True)
+class Aims:
+    """What a choice of parts aims at inside its side conditions; a search moves these.
+
+    swing : share of the op-amp's limit that the peaks of the outputs may use. share : how much
+    larger than x1's peak voltage another state's may be. noise_gain : of a stage whose gain is a
+    ratio of resistors. Wider than the side conditions they have no effect.
+    """
+
+    swing: float = SWING_SHARE
+    share: float = SHARE
+    noise_gain: float = NOISE_GAIN
+
+
+NO_AIMS = Aims()
+"""The side conditions themselves."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """kept : names of the conditions that hold; the limits of the others are infinite or zero.
+
+    seconds : range of the time scale [s per unit of model time]. swing : what the peaks of the
+    outputs are aimed at [V], whether or not it is a condition. level, share : ratios of peaks of
+    the state voltages. load : least resistance that a part may put on an output [ohm]. signal :
+    range of the signal resistors [ohm]. noise_gain : of a ratio stage.
+    """
+
+    kept: frozenset[str]
+    seconds: tuple[float, float]
+    swing: float
+    level: float
+    share: float
+    load: float
+    signal: tuple[float, float]
+    noise_gain: float
+
+    def bounds(self, mu: float, peaks: Peaks, resistors: Array) -> Bounds:
+        """What the linear block has to keep. mu : stop stiffness over K1; 0 without a stop."""
+        least = max(self.load, float(resistors.min()))
+        return Bounds(
+            seconds=self.seconds,
+            level=self.level,
+            share=self.share,
+            stop=least * mu / output_gain(peaks),
+            peaks=peaks.states,
+            signal=self.signal,
+        )
+
+    def tightened(self, broken: Sequence[Check], design: Design, *, slower: bool) -> Limits:
+        """Limits that should bring these checks of a finished design inside theirs.
+
+        slower : whether bandwidth is sought in a slower time scale; otherwise in a smaller gain of
+        the dead zone's stages, which costs nothing where it can be had.
+        """
+        out = self
+        for check in broken:
+            by = check.excess * (1.0 + MARGIN)
+            if check.quantity in ("swing_v", "rectifier_fv_v", "generator_peak_v"):
+                out = replace(out, swing=out.swing / by)
+            elif check.quantity == "signal_level_ratio":
+                out = replace(out, level=out.level / by)
+            elif check.quantity == "signal_share_ratio":
+                out = replace(out, share=out.share / by)
+            elif check.name == "load":
+                out = out._lighter(design, check.where)
+            elif check.name == "noise_gain":
+                out = replace(out, noise_gain=out.noise_gain / by)
+            elif check.name == "bandwidth" and slower:
+                seconds = design.errors.scales.seconds * by
+                out = replace(out, seconds=(seconds, out.seconds[1]))
+            elif check.name == "bandwidth":
+                gain = next(s.gain for s in stages(design.circuit) if s.section.name == check.where)
+                out = replace(out, noise_gain=min(out.noise_gain, gain / by))
+        return out
+
+    def _lighter(self, design: Design, section: str) -> Limits:
+        """Without the resistor that loads this section's output most, and any as small."""
+        output = next(s.output for s in design.circuit.sections if s.name == section)
+        values = effective(design.circuit.values, design.composites)
+        at = {r.name: r.value for r in design.circuit.resistors if output in r.nets}
+        name = min(at, key=lambda n: at[n])
+        floor = values.get(name, at[name]) * (1.0 + MARGIN)
+        low = max(floor, self.signal[0]) if name in SIGNAL_RESISTORS else self.signal[0]
+        return replace(self, load=max(floor, self.load), signal=(low, self.signal[1]))
+
+
+def limits(
+    spec: CircuitSpec,
+    kept: frozenset[str],
+    opamp: OpAmp,
+    saturation: float,
+    fastest: float,
+    aims: Aims = NO_AIMS,
+) -> Limits:
+    """The limits of these conditions for an op-amp with this output limit [V].
+
+    fastest : angular frequency, in model units, of the highest harmonic that matters.
+    """
+    low, high = spec.frequency
+    seconds = 1.0 / (2.0 * np.pi * high), 1.0 / (2.0 * np.pi * low)
+    if "bandwidth" in kept:
+        least = INVERTER_GAIN * fastest / (2.0 * np.pi * bandwidth_limit(opamp))
+        seconds = max(seconds[0], least), seconds[1]
+    inf = float("inf")
+    return Limits(
+        kept=kept,
+        seconds=seconds,
+        swing=min(SWING_SHARE, aims.swing) * saturation,
+        level=LEVEL_RATIO if "level" in kept else inf,
+        share=min(SHARE, aims.share) if "level" in kept else inf,
+        load=LOAD if "load" in kept else 0.0,
+        signal=SIGNAL if "resistors" in kept else (0.0, inf),
+        noise_gain=min(NOISE_GAIN, aims.noise_gain) if "noise_gain" in kept else inf,
+    )
+
+
+def bandwidth_limit(opamp: OpAmp) -> float:
+    """Largest product of noise gain and frequency [Hz]."""
+    return BANDWIDTH_SHARE * guaranteed(opamp.gbw)
+
+
+def guaranteed(figure: Figure) -> float:
+    """A figure's minimum; where the data sheet has none, its typical value."""
+    return figure.min if figure.min is not None else figure.nominal
+
+
+def output_gain(peaks: Peaks) -> float:
+    """Largest slope of fv: x1 fills the swing, fv at the deepest penetration of a stop too."""
+    return float(peaks.states[0] / depth(peaks))
+
+
+def depth(peaks: Peaks) -> float:
+    """Deepest penetration of a stop, in model units; a stop that is hardly met counts a little."""
+    return max(peaks.penetration, 0.02 * float(peaks.states[0]))

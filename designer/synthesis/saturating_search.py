@@ -1,0 +1,272 @@
+"""The search for a saturating stage: from few values to the whole catalogue.
+
+The values of u = ln A-/R209 are taken in the order of their slope error. The least largest error is
+known as soon as the next slope error exceeds it: an exact minimum over every row of the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.coefficients import EXACT
+from designer.synthesis import saturating_rows, saturating_stage
+from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
+from designer.synthesis.equal_parts import Ties, tied_lists
+from designer.synthesis.saturating_tables import (
+    MOST_SHIFT,
+    Box,
+    Tables,
+    box,
+    free_box,
+    relaxed_errors,
+    slope_errors,
+    tables,
+)
+from designer.synthesis.value_program import Ranking
+from designer.synthesis.value_tables import distance, distinct
+
+LAST_LEVEL = 0.1
+"""Errors above it are no answer."""
+JOINT = 150
+"""Values of u for which null and bias are sought together."""
+LARGEST = 3_000_000
+"""Rows of a table past which the whole catalogue is not enumerated."""
+ROOMS = ((1.06, 1.6, 2.5), (1.2, 1.6, 2.5))
+"""How far below its largest value each of threshold, A- and fv slope may lie: first and at most."""
+OPEN = (np.inf, np.inf, np.inf)
+HANDY = 8
+"""Most values of a resistor that only sets a level, before all are tried."""
+LEVEL_SETTERS = ("R200", "R202", "R206", "R208", "R209")
+LIGHT = ("R205", "R211", "R212")
+"""Resistors that no output drives."""
+ATOMS = (
+    ("R206", "R207", "R209"),
+    ("R210", "R50"),
+    ("R200", "R201"),
+    ("R202", "R203"),
+    ("R204", "R205", "R208"),
+    ("R200", "R211", "R212"),
+)
+"""Parts that stand in one table of the saturating stage."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the search: the values of each part and the ranges.
+
+    slope, whole : whether the slope's tables, or all, hold every value that the conditions leave.
+    rescue : the stage is for where the ones before have no answer.
+    """
+
+    lists: Mapping[str, Array]
+    box: Box
+    slope: bool = False
+    whole: bool = False
+    rescue: bool = False
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the stages found: the tables with the least error, a bound that holds for the whole
+    catalogue, rows looked at, and where there is nothing, the condition that binds."""
+
+    best: tuple[Tables, Least] | None
+    bound: float
+    looked_at: int
+    binding: str
+
+    @property
+    def error(self) -> float:
+        return LAST_LEVEL if self.best is None else self.best[1].error
+
+
+def size(
+    target: DeadZoneTarget, resistors: Array, base: float, ranking: Ranking, ties: Ties
+) -> DeadZone | str:
+    if target.shift[0] >= MOST_SHIFT:
+        return "dead-zone bias"
+    found = Search(None, 0.0, 0, "stop slope")
+    for stage in _stages(target, resistors, base, ranking.free, ties):
+        if stage.rescue and found.best is not None:
+            break
+        found = _search(target, stage, ties, ranking.free | {base}, found)
+        if found.best is not None and found.error <= max(found.bound, 0.0) + EXACT:
+            break
+        if found.best is not None and stage.whole:
+            break
+    if found.best is None:
+        return found.binding
+    t, least = found.best
+    picked = saturating_rows.pick(t, least.error, least.u, ranking, LAST_LEVEL)
+    if picked is None:
+        without = replace(ranking, most=None)
+        free = saturating_rows.pick(t, least.error, least.u, without, LAST_LEVEL)
+        rule = "noise gain" if np.isfinite(target.noise_gain) else "dead-zone bias"
+        return rule if free is None else "distinct values"
+    values, word = picked
+    values = {name: values[name] for name in parts_of(target.kind, target.sides)}
+    return _answer(target, values, found, word)
+
+
+def _search(
+    target: DeadZoneTarget, stage: Stage, ties: Ties, free: frozenset[float], so_far: Search
+) -> Search:
+    """One stage, for every value of the parts that are tied across tables."""
+    best, looked_at, binding = so_far.best, so_far.looked_at, so_far.binding
+    bound = np.inf
+    for lists in tied_lists(stage.lists, ties, ATOMS):
+        if lists is None:
+            bound = 0.0
+            break
+        level = LAST_LEVEL if best is None else best[1].error
+        t = tables(target, lists, ties.tie, stage.box, free, level)
+        why = t.empty()
+        if why is not None:
+            binding = why if best is None else binding
+            continue
+        slope = float(slope_errors(t).min())
+        if t.steep_count() > LARGEST:
+            bound = min(bound, slope)
+            continue
+        least = least_error(t, EXACT, level)
+        looked_at += len(t.left) + len(t.right) + len(t.divider) + t.steep_count()
+        bound = min(bound, least.bound if stage.whole else slope)
+        # A wider range only where it is of use: the narrow one has the better threshold.
+        margin = 0.0 if best is None or best[0].box == stage.box else EXACT
+        if least.error <= (LAST_LEVEL if best is None else best[1].error - margin - 1e-12):
+            best = (t, least)
+        elif best is None:
+            binding = "dead-zone null" if t.shift is None else "dead-zone bias"
+        if best is not None and best[1].error <= EXACT:
+            break
+    if best is not None:
+        bound = min(bound, best[1].error)  # no row of the tables is better than the best known
+    if not (stage.slope or stage.whole) or (best is not None and best[1].error <= EXACT):
+        bound = 0.0
+    return Search(best, bound, looked_at, binding)
+
+
+def _answer(
+    target: DeadZoneTarget,
+    values: dict[str, float],
+    found: Search,
+    word: str,
+) -> DeadZone:
+    errors = saturating_stage.errors(target, values)
+    worst = max(abs(e) for e in errors.values())
+    bound = min(found.bound, worst)
+    if worst <= EXACT:
+        proof = "nothing to improve: every error of the dead zone is at most 1e-6"
+    elif worst <= bound + EXACT:
+        proof = (
+            "every value of R206, R207, R209 with the nearest R210/R50, in the order of the slope "
+            "error, each with the nearest A+ and loaded divider of the whole catalogue"
+        )
+    else:
+        proof = "best found; the whole catalogue was not searched"
+    return DeadZone(
+        values=values,
+        errors=errors,
+        threshold=saturating_stage.threshold(target, values),
+        bound=bound,
+        proved=worst <= max(bound, 0.0) + EXACT,
+        proof=proof,
+        solver=word,
+        looked_at=found.looked_at,
+        seconds=0.0,
+    )
+
+
+def _stages(
+    target: DeadZoneTarget, resistors: Array, base: float, free: frozenset[float], ties: Ties
+) -> Iterator[Stage]:
+    near, far = (box(target, *room) for room in ROOMS)
+    names = parts_of(target.kind, target.sides)
+    heavy = resistors[resistors >= target.load]
+    every = {name: resistors if name in LIGHT else heavy for name in names}
+    every |= {name: heavy[np.isclose(heavy, v, rtol=1e-9)] for name, v in ties.value.items()}
+    handy = _handy(heavy, base, free)
+    few = {name: np.intersect1d(every[name], handy[:1]) for name in LEVEL_SETTERS}
+    some = {name: np.intersect1d(every[name], handy) for name in LEVEL_SETTERS}
+    given = {name: every[name] for name in ties.value}
+    slopes = every | some | given | {name: every[name] for name in ("R206", "R209")}
+    fits = len(resistors) ** 3 <= LARGEST
+    yield Stage(every | few | given, near)
+    yield Stage(every | few | given, far)
+    yield Stage(every | some | given, far)
+    yield Stage(slopes, far, slope=target.strict)
+    if target.strict:
+        if fits:
+            yield Stage(every, far, whole=True)
+        last = box(target, *OPEN)
+    else:
+        last = free_box(target)
+        yield Stage(slopes, replace(last, steep=far.steep), slope=True)
+    lists = every if fits else slopes
+    yield Stage(lists, last, slope=True, whole=fits, rescue=target.strict)
+
+
+def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
+    """Values for resistors that only set a level, the first first: few where the list is long."""
+    if len(heavy) == 0:
+        return heavy
+    room = [v for v in sorted(free) if base <= v <= 10.0 * base]
+    wanted = [base, *room, *(base * f for f in (2.0, 5.0, 10.0, 3.0, 1.5, 4.0, 7.0))]
+    near = [float(heavy[np.argmin(np.abs(np.log(heavy / v)))]) for v in wanted]
+    most = int(np.clip(LARGEST / 2.5 / len(heavy) ** 2, 2, HANDY))
+    return np.array(list(dict.fromkeys(near))[:most])
+
+
+@dataclass(frozen=True)
+class Least:
+    """The least largest error of the tables and the u that has it; bound : no row of them has a
+    smaller one, rules that tie the slope's tables to the others left out; looked_at : values of u
+    that were completed."""
+
+    error: float
+    u: float
+    bound: float
+    looked_at: int
+
+
+def least_error(t: Tables, tolerance: float, most: float) -> Least:
+    """The minimum over every row of the tables, sought below ``most``."""
+    error = relaxed_errors(t)
+    steep = distinct(t.steep_logs[0])
+    divider = distinct(t.divider_logs)
+    best, where, looked_at, floor = np.inf, float("nan"), 0, np.inf
+    for k in np.argsort(error, kind="stable"):
+        if error[k] >= min(best, most) or best <= tolerance:
+            break
+        if t.shift is not None and looked_at >= JOINT:
+            floor = min(floor, float(error[k]))
+            break
+        wanted = steep - t.u[k]
+        null = t.target.mu * float(distance(divider, wanted, wanted).min(initial=np.inf))
+        reached = max(float(error[k]), null)
+        if reached >= min(best, most):
+            continue
+        looked_at += 1
+        if t.shift is not None:
+            least, cut = _joint_error(t, int(k), reached, min(best, most))
+            floor = min(floor, reached) if cut else floor
+            reached = max(reached, least)
+        if reached < best:
+            best, where = reached, float(t.u[k])
+    return Least(best, where, min(best, floor), looked_at)
+
+
+def _joint_error(t: Tables, key: int, start: float, most: float) -> tuple[float, bool]:
+    """Least of the larger of null and bias error for one u, infinite above ``most``; and whether
+    rows were left out on the way."""
+    level, cut = max(start, EXACT), False
+    while True:
+        rows, part = saturating_rows.null_rows(t, key, min(level, most))
+        cut = cut or part
+        if len(rows) or level >= most:
+            return float(rows.error.min(initial=np.inf)), cut
+        level *= 2.0

@@ -1,0 +1,242 @@
+"""The last step of sizing a dead zone: one row of each table, by a mixed-integer program.
+
+Least error, then the fewest new values, then the lowest price. The tables are reduced before, so
+the program is small; cvxpy states it and HiGHS solves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from designer.base.arrays import Array, Index
+from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.value_tables import ValueTable, new_values
+
+PRICE_WEIGHT = 1e-3
+"""Of one price class against one distinct value: price only breaks ties."""
+ERROR_WEIGHT = 1e-4
+"""Of the error over its limit: it decides where values and price are the same."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """One table of the program: its values, the error of each row, and a key that the rows chosen
+    from all tables must share."""
+
+    table: ValueTable
+    error: Array
+    key: Index
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def take(self, which: Index) -> Rows:
+        """The rows of an index array."""
+        return Rows(self.table.take(which), self.error[which], self.key[which])
+
+
+@dataclass(frozen=True)
+class Rule:
+    """low <= sum over the tables of the chosen row's weight <= high."""
+
+    weights: tuple[Array, ...]
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What counts after the error.
+
+    free : values that cost nothing. price : price class by value. tolerance : errors up to it count
+    as none. slack : how far above its least the error may be. most : limit on new values.
+    """
+
+    free: frozenset[float]
+    price: Mapping[float, float]
+    tolerance: float
+    slack: float
+    most: int | None = None
+
+
+@dataclass(frozen=True)
+class Pick:
+    """The chosen row of each table, the largest error, and the solver's word."""
+
+    rows: tuple[int, ...]
+    error: float
+    solver: str
+
+
+def choose(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> Pick | None:
+    """Rows with the same key that keep every rule; None where there are none."""
+    tables, kept = _shared_keys(tables)
+    if any(len(t) == 0 for t in tables):
+        return None
+    rules = [_of_rows(rule, kept) for rule in rules]
+    # With a limit on the values, only rows that stand in a choice inside it.
+    near = [np.arange(len(t)) for t in tables]
+    if ranking.most is not None:
+        near = _few_enough(tables, rules, ranking)
+        if any(len(k) == 0 for k in near):
+            return None
+    first = _solve(
+        [t.take(k) for t, k in zip(tables, near, strict=True)],
+        [_of_rows(rule, near) for rule in rules],
+        ranking,
+        None,
+    )
+    if first is None:
+        return None
+    rows, word = tuple(int(k[i]) for k, i in zip(near, first[0], strict=True)), first[1]
+    reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
+    limit = (max(reached, ranking.tolerance) + ranking.slack) * (1.0 + 1e-9) + 1e-12
+    useful = _promising(tables, rules, ranking, limit)
+    fewer = [t.take(k) for t, k in zip(tables, useful, strict=True)]
+    second = _solve(fewer, [_of_rows(rule, useful) for rule in rules], ranking, limit)
+    if second is not None:
+        rows = tuple(int(k[i]) for k, i in zip(useful, second[0], strict=True))
+        reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
+    found = tuple(int(k[i]) for k, i in zip(kept, rows, strict=True))
+    return Pick(found, reached, f"HiGHS: {word}")
+
+
+def _of_rows(rule: Rule, kept: Sequence[Index]) -> Rule:
+    """The rule for the rows that are kept of each table."""
+    return Rule(tuple(w[k] for w, k in zip(rule.weights, kept, strict=True)), rule.low, rule.high)
+
+
+def _promising(
+    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, limit: float
+) -> list[Index]:
+    """Places of the rows that stand in some choice inside the limit with the fewest new values.
+
+    The tables are short, so the choices of one key are simply counted; what is left to the program
+    is the price, and the error where that is the same too.
+    """
+    inside = [np.flatnonzero(t.error <= limit) for t in tables]
+    best = sum(t.table.values.shape[1] for t in tables)
+    kept: list[list[Index]] = []
+    for grid, count in _counted(tables, rules, ranking, inside):
+        least = int(count.min(initial=best + 1))
+        if least < best:
+            best, kept = least, []
+        if least == best:
+            kept.append([np.unique(g[count == best]) for g in grid])
+    return _joined(kept, inside)
+
+
+def _few_enough(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> list[Index]:
+    """Places of the rows that stand in a choice of least error among those with at most
+    ``ranking.most`` new values; none where there is no such choice."""
+    every = [np.arange(len(t)) for t in tables]
+    best, kept = np.inf, list[list[Index]]()
+    for grid, count in _counted(tables, rules, ranking, every):
+        few = count <= (len(count) if ranking.most is None else ranking.most)
+        grid = [g[few] for g in grid]
+        error = np.max([t.error[g] for t, g in zip(tables, grid, strict=True)], axis=0)
+        least = float(error.min(initial=np.inf))
+        if least < best:
+            best, kept = least, []
+        if len(error) and least == best:
+            kept.append([np.unique(g[error == best]) for g in grid])
+    return _joined(kept, [np.zeros(0, dtype=np.intp)] * len(tables))
+
+
+def _counted(
+    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, places: Sequence[Index]
+) -> Iterator[tuple[list[Index], Index]]:
+    """For each key the choices that keep the rules, and how many new values each has."""
+    for key in np.unique(tables[0].key):
+        own = [k[t.key[k] == key] for t, k in zip(tables, places, strict=True)]
+        grid = [a.ravel() for a in np.meshgrid(*own, indexing="ij")]
+        good = np.ones(len(grid[0]), dtype=bool)
+        for rule in rules:
+            total = sum(w[g] for w, g in zip(rule.weights, grid, strict=True))
+            good &= (total >= rule.low) & (total <= rule.high)
+        grid = [g[good] for g in grid]
+        values = np.hstack([t.table.values[g] for t, g in zip(tables, grid, strict=True)])
+        yield grid, new_values(values, ranking.free)
+
+
+def _joined(kept: Sequence[Sequence[Index]], without: list[Index]) -> list[Index]:
+    """The places of all keys together."""
+    if not kept:
+        return without
+    return [np.unique(np.concatenate(places)) for places in zip(*kept, strict=True)]
+
+
+def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:
+    """The rows whose key every table has, and their places."""
+    common = tables[0].key
+    for t in tables[1:]:
+        common = np.intersect1d(common, t.key)
+    kept = [np.flatnonzero(np.isin(t.key, common)) for t in tables]
+    return [t.take(k) for t, k in zip(tables, kept, strict=True)], kept
+
+
+def _kinds(
+    tables: Sequence[Rows], picks: Sequence[cp.Variable], ranking: Ranking
+) -> tuple[cp.Variable, Any, list[object]]:
+    """One variable per value that is not free, at least as large as the use made of it."""
+    every = np.unique(np.concatenate([t.table.values.ravel() for t in tables]))
+    every = every[~np.isin(every, np.array(sorted(ranking.free), dtype=float))]
+    kinds = cp.Variable(max(len(every), 1), nonneg=True)
+    uses: list[object] = []
+    price: Any = 0.0
+    for t, z in zip(tables, picks, strict=True):
+        for column in t.table.values.T:
+            own = np.intersect1d(column, every)
+            if len(own):
+                member = (column[None, :] == own[:, None]).astype(float)
+                uses.append(member @ z <= kinds[np.searchsorted(every, own)])
+            cost = np.array([ranking.price.get(float(v), 0.0) for v in column])
+            if cost.any():
+                price = price + cost @ z
+    return kinds, price, uses
+
+
+def _solve(
+    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, limit: float | None
+) -> tuple[tuple[int, ...], str] | None:
+    """Rows of least error; with a ``limit`` of the error, of fewest values and least price."""
+    picks = [cp.Variable(len(t), boolean=True) for t in tables]
+    error = cp.Variable(nonneg=True)
+    held: list[object] = [cp.sum(z) == 1 for z in picks]
+    keys = np.unique(tables[0].key)
+    members = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
+    if len(keys) > 1:
+        for member, z in zip(members[1:], picks[1:], strict=True):
+            held.append(members[0] @ picks[0] == member @ z)
+    for rule in rules:
+        total = sum(w @ z for w, z in zip(rule.weights, picks, strict=True))
+        held += [total >= rule.low] if np.isfinite(rule.low) else []
+        held += [total <= rule.high] if np.isfinite(rule.high) else []
+    held += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
+    objective: Any = error
+    if limit is not None or ranking.most is not None:
+        kinds, price, uses = _kinds(tables, picks, ranking)
+        held += uses
+    if ranking.most is not None:
+        held.append(cp.sum(kinds) <= ranking.most)
+    if limit is not None:
+        objective = cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / limit * error
+        held.append(error <= limit)
+    problem = cp.Problem(cp.Minimize(objective), held)
+    problem.solve(solver=cp.HIGHS, **SOLVER)
+    for z in picks:
+        # An infeasible or interrupted program may leave zeros behind: rows count only if whole.
+        if z.value is None or abs(z.value.sum() - 1.0) > 1e-6 or abs(z.value.max() - 1.0) > 1e-6:
+            return None
+    return tuple(int(np.argmax(z.value)) for z in picks), str(problem.status)
+
+
+def fewest(rows: Rows, free: frozenset[float], most: int) -> Index:
+    """Places of the ``most`` rows with the fewest new values, then the smallest error."""
+    count = new_values(rows.table.values, free)
+    return np.lexsort((rows.error, count))[:most]

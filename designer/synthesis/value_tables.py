@@ -1,0 +1,120 @@
+"""Tables of part values: every combination of a few lists, with the parts that must be equal.
+
+A table is the first step of each search: it holds the combinations of the parts of one product or
+ratio, so that sums of logarithms of two tables can be joined by sorting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array, Index, Mask
+
+DIGITS = 11
+"""Decimals of a logarithm to which two combinations count as the same."""
+
+
+@dataclass(frozen=True)
+class ValueTable:
+    """Combinations of values: values (rows, parts) [ohm], parts in the order of ``names``."""
+
+    names: tuple[str, ...]
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, name: str) -> Array:
+        """(rows,) values of one part."""
+        return np.asarray(self.values[:, self.names.index(name)])
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Values by part."""
+        return {name: self[name] for name in self.names}
+
+    def take(self, which: Index | Mask) -> ValueTable:
+        """The rows of an index or mask array."""
+        return ValueTable(self.names, self.values[which])
+
+    def beside(self, other: ValueTable) -> ValueTable:
+        """The columns of both, row by row."""
+        return ValueTable(self.names + other.names, np.hstack([self.values, other.values]))
+
+
+def combinations(
+    names: Sequence[str], lists: Mapping[str, Array], tie: Mapping[str, str]
+) -> ValueTable:
+    """Every combination of the lists; parts that ``tie`` maps to the same name are equal.
+
+    lists : ascending values by part. tie : part to the name of its group; absent: a group of its
+    own.
+    """
+    groups = list(dict.fromkeys(tie.get(name, name) for name in names))
+    own = [
+        _common([lists[name] for name in names if tie.get(name, name) == group]) for group in groups
+    ]
+    grid = [a.ravel() for a in np.meshgrid(*own, indexing="ij")]
+    columns = [grid[groups.index(tie.get(name, name))] for name in names]
+    return ValueTable(tuple(names), np.stack(columns, axis=1))
+
+
+def _common(lists: Sequence[Array]) -> Array:
+    shared = lists[0]
+    for other in lists[1:]:
+        shared = np.intersect1d(shared, other)
+    return shared
+
+
+def distinct(logs: Array) -> Array:
+    """The different entries of an array of logarithms, ascending."""
+    return np.unique(np.round(logs, DIGITS))
+
+
+def sums(first: Array, second: Array) -> Array:
+    """Every different sum of one entry of each."""
+    return distinct((first[:, None] + second[None, :]).ravel())
+
+
+def distance(table: Array, low: Array, high: Array) -> Array:
+    """From each interval [low, high] to the nearest entry of an ascending table; 0 inside."""
+    if len(table) == 0:
+        return np.full(len(low), np.inf)
+    right = np.searchsorted(table, low)
+    above = table[np.minimum(right, len(table) - 1)] - high
+    above = np.where(right < len(table), np.maximum(above, 0.0), np.inf)
+    below = np.where(right > 0, low - table[np.maximum(right - 1, 0)], np.inf)
+    return np.asarray(np.minimum(above, below))
+
+
+def between(table: Array, low: Array, high: Array) -> tuple[Index, Index]:
+    """(interval, entry) for every entry of an ascending table inside each interval."""
+    first = np.searchsorted(table, low, side="left")
+    last = np.searchsorted(table, high, side="right")
+    count = np.maximum(last - first, 0)
+    row = np.repeat(np.arange(len(low)), count)
+    offset = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
+    return row, np.repeat(first, count) + offset
+
+
+def how_many_between(table: Array, low: Array, high: Array) -> Index:
+    """How many entries of an ascending table each interval holds."""
+    first = np.searchsorted(table, low, side="left")
+    return np.asarray(np.maximum(np.searchsorted(table, high, side="right") - first, 0))
+
+
+def new_values(values: Array, free: frozenset[float]) -> Index:
+    """(rows,) how many different values each row has that are not free."""
+    known = np.isin(values, np.array(sorted(free), dtype=float))
+    # Free values become one common value, which is then not counted.
+    ordered = np.sort(np.where(known, 0.0, values), axis=-1)
+    kinds = 1 + (np.diff(ordered, axis=-1) > 0.0).sum(axis=-1)
+    return np.asarray(kinds - known.any(axis=-1))
+
+
+def inside(values: Array, limits: tuple[float, float]) -> Mask:
+    """Which values lie in a range, its ends included."""
+    return np.asarray((values >= limits[0] * (1.0 - 1e-9)) & (values <= limits[1] * (1.0 + 1e-9)))

@@ -1,0 +1,200 @@
+"""What a person with an oscilloscope and a generator finds: the procedure of docs/bench.md, played.
+
+The person sees v1 and fv on a screen of 8 bits, never the exact orbit: readings are off by up to
+one step of the screen, low pulses are not seen, small differences between periods neither. Where
+the person stops, the exact circuit says what the response really is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
+from designer.model.tuning_bands import Bands
+from designer.yields.generator_offsets import AS_BUILT, Adjustment
+from designer.yields.verdict import Question
+
+BITS = 8
+SCREEN = 2.5
+"""Volts on the whole screen, over the nominal response's peak."""
+READINGS = 4
+"""Readings that the person takes the mean of."""
+SEEN = 0.002
+"""Of the nominal response's deepest penetration: lower pulses of fv, and shallower valleys between
+two, are not seen. A step of the screen with fv magnified five times."""
+DWELL = 100
+"""Drive periods that the person waits after each change."""
+WATCHED = 16
+"""Drive periods on the screen; three times the wanted n where that is more."""
+POINTS = 512
+"""Points of the trace per drive period."""
+FIRST_OFFSET = 0.01
+"""Of the amplitude: the first change of the DC offset, and half of the largest."""
+CENTRING_STEPS = 6
+"""Settings of the DC offset that the person tries at most."""
+FREQUENCY_STEPS = 5
+"""Steps from the middle of the frequency band to its edge."""
+AMPLITUDES = (0.0, -0.5, 0.5, -1.0, 1.0)
+"""Of the half-band: amplitudes at which the frequency is swept, in order."""
+MOST_STEPS = 1 + CENTRING_STEPS + 2 * FREQUENCY_STEPS + 4 * (2 * FREQUENCY_STEPS + 1)
+"""Settings of the generator after which the person gives up."""
+DIGITS = 4
+"""Decimals of the DC offset over the amplitude that the generator is set to."""
+TAG = 0xBE7C
+"""Sets the readings' noise apart from the other draws of a sample."""
+
+
+@dataclass(frozen=True)
+class BenchResult:
+    """Where the person stopped. state : (states,) of the board there, at drive phase 0; seen :
+    whether the wanted pattern was on the screen; steps : settings tried, the first one included.
+    failure : why the procedure could not be played; "" where it was."""
+
+    setting: Adjustment
+    state: Array
+    seen: bool
+    steps: int
+    failure: str = ""
+
+
+def find_on_bench(
+    system: PiecewiseLinearSystem, question: Question, bands: Bands, *, seed: Sequence[int]
+) -> BenchResult:
+    """Play the procedure on one board, from the nominal orbit at the setting of ``setup.csv``.
+
+    seed : of the readings. Where the pattern is seen nowhere, the setting is the one as built.
+    """
+    person = _Person(system, question, bands, np.random.default_rng([*seed, TAG]))
+    seen = person.look(AS_BUILT) or person.centre() or person.sweep()
+    return BenchResult(person.setting if seen else AS_BUILT, person.state, seen, person.steps)
+
+
+class _Person:
+    """At the bench with one board: what is on the screen and where the knobs are.
+
+    state : (states,) of the board at drive phase 0. high, low : of v1, as read.
+    """
+
+    def __init__(
+        self,
+        system: PiecewiseLinearSystem,
+        question: Question,
+        bands: Bands,
+        rng: np.random.Generator,
+    ) -> None:
+        self.system, self.question, self.bands, self.rng = system, question, bands, rng
+        self.moving = system.displacement[0] if system.displacement else 0
+        peak = float(np.abs(question.start.extremes[self.moving]).max())
+        self.step = SCREEN * peak / 2**BITS
+        self.stops = _stops(system)
+        inside = min((abs(v) for v in self.stops.values()), default=peak)
+        self.low_pulse = SEEN * max(peak - inside, 0.0)
+        self.state = question.start.start
+        self.setting = AS_BUILT
+        self.high = self.low = 0.0
+        self.steps = 0
+
+    def look(self, setting: Adjustment) -> bool:
+        """Set the generator, wait, look: whether the wanted pattern is on the screen."""
+        self.setting = setting
+        self.steps += 1
+        wanted = self.question.spec.expect or self.question.start
+        periods = wanted.n * max(-(-WATCHED // wanted.n), 3)
+        flow = Flow(self.system, setting.of(self.question.excitation).drive)
+        waited = flow.run(self.state, DWELL)
+        shown = flow.run(waited.strobes[-1], periods, mode=waited.mode, points=POINTS)
+        if {waited.status, shown.status} != {FlowStatus.DONE}:
+            self.state = self.question.start.start  # switched off and on again
+            return False
+        self.state = shown.strobes[-1]
+        trace = shown.strobes[:-1, self.moving]
+        self.high, self.low = self._read(float(trace.max())), self._read(float(trace.min()))
+        return self._shows(trace, wanted.n)
+
+    def centre(self) -> bool:
+        """Turn the DC offset until the peaks of v1 stand equally far beyond the stops, by the rule
+        of proportion; whether the pattern appeared. With one stop there is nothing to centre."""
+        if set(self.stops) != {1, -1}:
+            return False
+        stops = {side: self._read(value) for side, value in self.stops.items()}
+
+        def uneven() -> float:
+            return (self.high - stops[1]) - (stops[-1] - self.low)
+
+        before, here, error = 0.0, min(FIRST_OFFSET, self.bands.offset), uneven()
+        for _ in range(CENTRING_STEPS):
+            if abs(error) <= self.step or here == before:
+                break
+            here = round(here, DIGITS)
+            if self.look(Adjustment(offset=here)):
+                return True
+            now = uneven()
+            slope = (now - error) / (here - before)
+            change = -now / slope if slope else 0.0
+            change = min(max(change, -2.0 * FIRST_OFFSET), 2.0 * FIRST_OFFSET)
+            before, error = here, now
+            here = min(max(here + change, -self.bands.offset), self.bands.offset)
+        return False
+
+    def sweep(self) -> bool:
+        """Step the frequency through its band at one amplitude after the other."""
+        centred = self.setting.offset
+        return any(self.look(setting) for setting in _snake(centred, self.bands))
+
+    def _shows(self, trace: Array, wanted: int) -> bool:
+        """Whether v1 over whole multiples of the wanted period is the wanted pattern to the eye."""
+        laps = trace.reshape(-1, POINTS)
+        n = next(
+            (
+                m
+                for m in range(1, wanted + 1)
+                if np.abs(laps[m:] - laps[:-m]).max() < 2.0 * self.step
+            ),
+            0,
+        )
+        if n != wanted:
+            return False
+        p, q = (self._pulses(trace, side) / (len(laps) // n) for side in (1, -1))
+        spec, nominal = self.question.spec, self.question.start
+        if spec.expect is None:
+            return (p, q) in ((nominal.p, nominal.q), (nominal.q, nominal.p))
+        return p == int(p) and q == int(q) and spec.accepts(n, int(p), int(q))
+
+    def _pulses(self, trace: Array, side: int) -> int:
+        """How often v1 goes far enough beyond a stop to be seen on fv; the trace is a loop."""
+        if side not in self.stops:
+            return 0
+        beyond = side * (trace - self.stops[side]) > self.low_pulse
+        return int((beyond & ~np.roll(beyond, 1)).sum())
+
+    def _read(self, volts: float) -> float:
+        """The mean of a few readings, each off by up to one step of the screen, in whole steps."""
+        noisy = volts / self.step + self.rng.uniform(-1.0, 1.0, READINGS)
+        return float(np.round(noisy).mean() * self.step)
+
+
+def _stops(system: PiecewiseLinearSystem) -> dict[int, float]:
+    """The first displacement [V] at which fv leaves zero, by side: 1 upper, -1 lower."""
+    if not system.clearances:
+        return {}
+    moving = system.displacement[0]
+    rows = system.contact_rows(0)
+    return {side: -float(row[-1] / row[moving]) for side, row in rows.items()}
+
+
+def _snake(offset: float, bands: Bands) -> Iterator[Adjustment]:
+    """Frequencies down from the middle and then up; at the next amplitude back again."""
+    steps = list(np.arange(-FREQUENCY_STEPS, FREQUENCY_STEPS + 1) / FREQUENCY_STEPS)
+    first = [*steps[FREQUENCY_STEPS - 1 :: -1], *steps[FREQUENCY_STEPS + 1 :]]
+    if bands.frequency == 0.0:
+        steps, first = [0.0], []
+    amplitudes = AMPLITUDES if bands.amplitude else AMPLITUDES[:1]
+    for number, amplitude in enumerate(amplitudes):
+        row = first if number == 0 else steps[:: -1 if number % 2 else 1]
+        for step in row:
+            yield Adjustment(bands.frequency * float(step), bands.amplitude * amplitude, offset)

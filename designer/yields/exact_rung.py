@@ -1,0 +1,130 @@
+"""A block of boards on the exact circuit rung: every question, from its nominal orbit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble, displacement
+from designer.circuit.netlist import nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.flow import Flow
+from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.spice.numerics_gate import Subject
+from designer.spread.spread import draw_many
+from designer.yields.verdict import Answer, StudyPlan, judge, kept
+
+
+def block(
+    plan: StudyPlan,
+    indices: range,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Answer]:
+    """An answer for every board and every question, in order; ``progress`` is called once each."""
+    boards = draw_many(plan.circuit, plan.spread, plan.seed, indices)
+    return of_boards(plan, boards, indices, jobs, progress)
+
+
+def of_boards(
+    plan: StudyPlan,
+    boards: Boards,
+    indices: range,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Answer]:
+    """``block`` of what the boards of these samples have become, by an adjustment on the board."""
+    return [answer for answer, _, _ in _asked(plan, boards, indices, jobs, progress)]
+
+
+def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, Subject | None]]:
+    """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
+    return [
+        (
+            answer,
+            Subject(boards.reduction(answer.sample - indices.start), excitation, orbit)
+            if len(orbit.start)
+            else None,
+        )
+        for answer, orbit, boards in _asked(
+            plan,
+            draw_many(plan.circuit, plan.spread, plan.seed, indices),
+            indices,
+            jobs,
+            lambda: None,
+        )
+        for excitation in [plan.questions[answer.question].excitation]
+    ]
+
+
+def _asked(
+    plan: StudyPlan, drawn: Boards, indices: range, jobs: int, progress: Callable[[], None]
+) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
+    boards = Ensemble(drawn, jobs=jobs)
+    drives = [q.excitation.drive for q in plan.questions]
+    asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
+    found = boards.respond(
+        [i for i, _ in asked],
+        [drives[number] for _, number in asked],
+        np.array([plan.questions[number].start.start for _, number in asked]),
+        jobs=jobs,
+        progress=progress,
+    )
+    twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
+    wanted = [
+        images(_nominal_displacement(plan, k), mirror=twins) for k in range(len(plan.questions))
+    ]
+    for (i, number), response in zip(asked, found, strict=True):
+        orbit, question = response.orbit, plan.questions[number]
+        verdict, reason = judge(orbit, question.spec, question.start)
+        waveform = float("nan")
+        if orbit.status is OrbitStatus.PERIODIC:
+            waveform = waveform_error(response.trace, wanted[number])
+        answer = Answer(
+            sample=indices[i],
+            question=number,
+            verdict=verdict,
+            response=orbit.response,
+            reason=reason,
+            radius=kept(orbit.radius),
+            penetration=kept(orbit.penetration),
+            miss=kept(orbit.miss),
+            asymmetry=kept(orbit.asymmetry),
+            periods=orbit.periods,
+            waveform=kept(waveform),
+        )
+        yield answer, orbit, boards
+
+
+def images(wanted: Array, *, mirror: bool = False) -> Array:
+    """(k, n · POINTS) a displacement (n · POINTS,) from each of its n drive periods on.
+
+    mirror : the mirror image, half a drive period on, too: a board with stops on both sides may
+    show the twin, and is as good.
+    """
+    both = [wanted] + ([-np.roll(wanted, -POINTS // 2)] if mirror else [])
+    shifted = [np.roll(one, k * POINTS) for one in both for k in range(len(wanted) // POINTS)]
+    return np.array(shifted).reshape(len(shifted), len(wanted))
+
+
+def waveform_error(shown: Array, wanted: Array) -> float:
+    """RMS difference of a displacement (m,) and the ``images`` (k, m) that are wanted, from the
+    nearest of them, over their peak; nan where they have different periods."""
+    if shown.shape != wanted.shape[1:] or not len(wanted):
+        return float("nan")
+    square = ((wanted - shown) ** 2).mean(axis=1).min()
+    return float(np.sqrt(square) / np.abs(wanted[0]).max())
+
+
+def _nominal_displacement(plan: StudyPlan, number: int) -> Array:
+    """Empty where the nominal circuit has no answer; then no board has a waveform error."""
+    question = plan.questions[number]
+    system = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
+    try:
+        return displacement(Flow(system, question.excitation.drive), question.start)
+    except ArithmeticError:
+        return np.zeros(0)

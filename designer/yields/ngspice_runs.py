@@ -1,0 +1,295 @@
+"""ngspice's word on samples: which runs it makes, and how long.
+
+Two starts. On the sample's own orbit of the exact circuit rung ngspice only has to stay there. From
+the nominal design's orbit it has to find its way, as the exact rung did: at least 5/(1 - ρ) drive
+periods (times n for a period of n), and no fewer than the exact trajectory from that very start
+takes to come within `REMAINDER` of its attractor. `yields.ngspice_sampling` says who is asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.spice import convergence_aids as remedies
+from designer.spice import numerics_gate
+from designer.spice.deck import SolverSettings
+from designer.spice.numerics_gate import Subject
+from designer.spice.opamp_model import Rung
+from designer.spice.pool import SpicePool
+from designer.spice.read_orbit import Read
+from designer.spice.simulator import SimulationFailed
+from designer.yields import exact_rung
+from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, Kind, is_answer
+from designer.yields.verdict import StudyPlan
+
+UNKNOWN_PERIODS = 20
+"""Drive periods for a sample without a period: 64 more follow, in which none must be found."""
+REMAINDER = 5e-4
+"""Of the peak: a quarter of the strobe tolerance."""
+MOST_PERIODS = 4000
+"""Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
+out by name."""
+MOST_AGAIN = 2 * MOST_PERIODS
+"""Longest run that is made again, in drive periods at the step of the first; half steps count
+twice."""
+STRETCH = 40
+"""Drive periods after which the exact trajectory is looked at again, and for which it must have
+stayed with the attractor before it counts as arrived."""
+LONG = 4 * MAX_PERIOD
+"""Drive periods in which any period, or none, is seen."""
+OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
+"""How often the step is halved where ngspice disagrees, until two step sizes say the same."""
+
+
+@dataclass(frozen=True)
+class Query:
+    """One run of ngspice. expected : the exact circuit's response. refinements : how often the
+    step is halved at most."""
+
+    subject: Subject
+    settings: SolverSettings
+    expected: str
+    refinements: int = OWN_REFINEMENTS
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What ngspice said: n-p-q, status or `UNDECIDED`, with the reason and the remedies of the last
+    run. An undecided one's reason has both answers, as has ``either`` if both are any."""
+
+    response: str
+    reason: str = ""
+    remedies: str = ""
+    symmetric: bool = False
+    either: str = ""
+
+
+def hear(
+    plan: StudyPlan,
+    asks: Sequence[Ask],
+    pool: SpicePool,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+    *,
+    rung: Rung = "ideal",
+    refinements: int = NOMINAL_REFINEMENTS,
+) -> list[Hearing]:
+    """ngspice's answers, in the order of ``asks``; ``progress`` is called once for each.
+
+    The exact rung is asked again for the boards in question: where to start and how long to run
+    is its to say. refinements : of runs from the nominal orbit. rung : the op-amps' model. Above
+    ``ideal`` a board's own orbit is only near ngspice's, so that as many periods are discarded as
+    shrink a deviation to a hundredth.
+    """
+    subjects = _subjects(plan, asks, jobs)
+    queries: dict[int, Query] = {}
+    heard: dict[int, Hearing] = {}
+    for k, ask in enumerate(asks):
+        subject, question = subjects.get((ask.sample, ask.question)), plan.questions[ask.question]
+        if subject is None or question.settings is None:
+            continue
+        halvings = OWN_REFINEMENTS
+        if ask.kind is Kind.NOMINAL:
+            way = periods_to_settle(_flow(subject), question.start.start, subject.orbit)
+            if way > MOST_PERIODS:
+                heard[k] = _too_long(ask, way)
+                progress()
+                continue
+            subject = replace(subject, start=question.start.start, discard=int(way))
+            halvings = refinements
+        elif rung != "ideal":
+            subject = replace(subject, discard=way_to_rung(subject.orbit))
+        subject = replace(subject, rung=rung)
+        expected = subject.orbit.response
+        queries[k] = Query(subject, question.settings, expected, halvings)
+    answers = confirm(pool, list(queries.values()), progress)
+    for (k, query), said in zip(queries.items(), answers, strict=True):
+        heard[k] = Hearing(
+            asks[k].sample,
+            asks[k].question,
+            asks[k].kind,
+            asks[k].why,
+            said.response,
+            said.reason,
+            said.remedies,
+            query.subject.discard,
+            said.symmetric,
+            said.either,
+        )
+    return [heard[k] for k in sorted(heard)]
+
+
+def _subjects(
+    plan: StudyPlan, asks: Sequence[Ask], jobs: int
+) -> dict[tuple[int, int], Subject | None]:
+    """What ngspice needs of each board, by (sample, question)."""
+    numbers = sorted({a.question for a in asks})
+    fewer = replace(plan, questions=tuple(plan.questions[n] for n in numbers))
+    found: dict[tuple[int, int], Subject | None] = {}
+    for run in _runs(sorted({a.sample for a in asks})):
+        for answer, subject in exact_rung.subjects(fewer, run, jobs):
+            found[answer.sample, numbers[answer.question]] = subject
+    return found
+
+
+def _runs(samples: Sequence[int]) -> list[range]:
+    """Sorted sample indices as runs without gaps."""
+    runs: list[range] = []
+    for i in samples:
+        if runs and runs[-1].stop == i:
+            runs[-1] = range(runs[-1].start, i + 1)
+        else:
+            runs.append(range(i, i + 1))
+    return runs
+
+
+def way_to_rung(orbit: Orbit) -> int:
+    """Drive periods from the exact circuit's orbit to that of another rung: n·5/(1 - ρ)."""
+    if orbit.n == 0:
+        return UNKNOWN_PERIODS
+    way = orbit.n * 5.0 / (1.0 - orbit.radius) if orbit.radius < 1.0 else math.inf
+    return math.ceil(min(max(way, numerics_gate.DISCARD), numerics_gate.MOST_DISCARDED))
+
+
+def _too_long(ask: Ask, way: float) -> Hearing:
+    needed = f"{way:.0f} drive periods" if math.isfinite(way) else "more than can be said"
+    reason = f"too long a way from the nominal orbit: {needed}, at most {MOST_PERIODS} are run"
+    return Hearing(ask.sample, ask.question, ask.kind, ask.why, "", reason, "", 0, False)
+
+
+def _flow(subject: Subject) -> Flow:
+    return Flow(subject.system, subject.excitation.drive)
+
+
+def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
+    """Drive periods from ``start`` (states,) to the attractor ``orbit``.
+
+    At least n · 5/(1 - ρ), rounded up, and until every later strobe of the exact trajectory is
+    within `REMAINDER` of a strobe of the orbit; "later" ends when the trajectory has stayed there
+    for that least number again, or for `STRETCH`. More than `MOST_PERIODS`, possibly inf, where the
+    way is longer than that.
+    """
+    if orbit.n == 0:
+        return UNKNOWN_PERIODS
+    if not orbit.radius < 1.0:
+        return math.inf
+    least = math.ceil(orbit.n * 5.0 / (1.0 - orbit.radius))
+    if least > MOST_PERIODS:
+        return least
+    laps = flow.run(orbit.start, orbit.n, mode=orbit.mode or None).strobes[:-1]
+    peak = np.abs(orbit.extremes).max(axis=1)
+    x, mode, done, arrived = start, None, 0, 0
+    stay = max(STRETCH, least)
+    while done - arrived < stay:
+        if arrived > MOST_PERIODS:
+            return math.inf
+        way = flow.run(x, stay - (done - arrived), mode=mode)
+        if way.status is not FlowStatus.DONE:
+            return math.inf
+        gap = (np.abs(way.strobes[:, None] - laps) / peak).max(axis=2).min(axis=1)
+        far = np.flatnonzero(gap > REMAINDER)
+        arrived = done + int(far[-1]) + 1 if len(far) else arrived
+        done += len(way.strobes) - 1
+        x, mode = way.strobes[-1], way.mode
+    return max(least, arrived)
+
+
+def confirm(
+    pool: SpicePool,
+    queries: Sequence[Query],
+    progress: Callable[[], None] = lambda: None,
+) -> list[Heard]:
+    """ngspice's answers, in order.
+
+    A first answer that is the expected one stands: its settings have passed the gate at two step
+    sizes. Where it is another the step is halved, at most as often as the query says, until two
+    step sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A
+    failed run is no answer: it is neither the same as another nor different. Nor is one that has
+    not settled: it is made again, longer (`longer`). Neither is done where it would take more than
+    `MOST_AGAIN` periods' steps. ``progress`` is called once a query.
+    """
+    heard: list[Heard | None] = [None] * len(queries)
+    asked = [_Try(k, q.subject, q.settings) for k, q in enumerate(queries)]
+    while asked:
+        # The longest first: the workers then end together.
+        asked.sort(key=lambda one: (-one.steps, one.query))
+        again = []
+        for i, outcome in remedies.run(
+            pool, [numerics_gate.task(t.subject, t.settings) for t in asked]
+        ):
+            tried = asked[i]
+            follows = _after(tried, queries[tried.query], _heard(outcome))
+            if isinstance(follows, _Try):
+                again.append(follows)
+            else:
+                heard[tried.query] = follows
+                progress()
+        asked = again
+    return [h for h in heard if h is not None]
+
+
+@dataclass(frozen=True)
+class _Try:
+    """A run to be made. query : its number. halved : how often its step has been. before : the last
+    answer at a larger step, None where there was none."""
+
+    query: int
+    subject: Subject
+    settings: SolverSettings
+    halved: int = 0
+    before: str | None = None
+
+    @property
+    def steps(self) -> float:
+        """Steps of the run, which its time goes with."""
+        return numerics_gate.length(self.subject) * self.subject.period / self.settings.max_step
+
+
+def _after(tried: _Try, query: Query, said: Heard) -> _Try | Heard:
+    """What is asked next, or what is heard in the end."""
+    none = not is_answer(said.response)
+    if not none and said.response == (tried.before or query.expected):
+        return said
+    fine, more = 2**tried.halved, longer(tried.subject)
+    if (
+        said.response == OrbitStatus.NOT_SETTLED
+        and tried.subject.judged < LONG
+        and fine * numerics_gate.length(more) <= MOST_AGAIN
+    ):
+        return replace(tried, subject=more)
+    if (
+        tried.halved < query.refinements
+        and 2 * fine * numerics_gate.length(tried.subject) <= MOST_AGAIN
+    ):
+        half = replace(tried.settings, max_step=tried.settings.max_step / 2.0)
+        before = tried.before if none else said.response
+        return replace(tried, settings=half, halved=tried.halved + 1, before=before)
+    return said if none else _undecided(tried.before, said)
+
+
+def longer(subject: Subject) -> Subject:
+    """Twice the way and `STRETCH` more, and `LONG` periods to judge: what had not settled may have
+    been on its way yet, or have a period or none that a few strobes do not show."""
+    return replace(subject, discard=2 * subject.discard + STRETCH, judged=LONG)
+
+
+def _undecided(before: str | None, said: Heard) -> Heard:
+    if before is None:
+        return Heard(UNDECIDED, f"only one run had an answer: {said.response}", said.remedies)
+    both = f"{before}, at a smaller step {said.response}"
+    return Heard(UNDECIDED, both, said.remedies, either=OR.join((before, said.response)))
+
+
+def _heard(outcome: remedies.Outcome[Read]) -> Heard:
+    tried = " ".join(outcome.tried)
+    if isinstance(outcome.result, SimulationFailed):
+        return Heard(str(OrbitStatus.FAILED), outcome.result.reason, tried)
+    orbit = outcome.result.orbit
+    return Heard(orbit.response, orbit.reason, tried, bool(orbit.symmetric))

@@ -1,0 +1,245 @@
+"""A setting of the generator at which a board shows a wanted response: a stated search.
+
+All settings lie inside the bands. The DC offset that centres the board comes first, by
+``yields.centring``; what is then left is a window in frequency and amplitude. In rounds, until
+one works:
+
+1. the centred board, nothing else changed;
+2. the corners and the edge midpoints of the frequency-amplitude band, centred;
+3. halfway between two settings of which one has too few impacts on a stop and the other not, from
+   the nominal orbit and then from the attractor of the better one (as on the bench, where the
+   state carries over);
+4. what a path from the nominal board leads to, which follows the wanted orbit and keeps the setting
+   in the middle of its window (``yields.window_path``); then three more such paths.
+
+Nothing is random. No board is asked more than ``MOST_TRIES`` times, and no more than
+``MOST_FOLLOWED`` orbits are followed for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.threads import parallel
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble
+from designer.dynamics.orbit import Orbit
+from designer.model.tuning_bands import Bands
+from designer.yields import window_path
+from designer.yields.generator_offsets import AS_BUILT, Adjustment
+from designer.yields.verdict import Question, Verdict, judge
+from designer.yields.window_path import Trail, find_window
+
+HALVED = 4
+"""Pairs of settings halved at once."""
+APART = 0.02
+"""Of the half-bands: settings nearer than this are one."""
+PATHS = ((0.0, True), (0.5, True), (-0.5, True), (0.5, False))
+"""Of each path, half-bands of DC offset at which it sets out, and whether it is tied."""
+SPOTS = 3
+"""Settings of a path that are asked, at most: those deepest inside the window."""
+MOST_TRIES = (1 + 8 + 2 * HALVED) + len(PATHS) * SPOTS
+MOST_FOLLOWED = len(PATHS) * window_path.MOST_FOLLOWED
+
+
+@dataclass(frozen=True)
+class Try:
+    """One setting that a board was asked at, and what it answered."""
+
+    setting: Adjustment
+    orbit: Orbit
+    verdict: Verdict
+    reason: str
+
+    @property
+    def margin(self) -> float:
+        """How far the impacts are from changing their number, in units of the displacement."""
+        return min(self.orbit.penetration, self.orbit.miss)
+
+
+@dataclass
+class Case:
+    """One board, by its place in the ensemble, and one response that it does not show as built.
+
+    centre : the DC offset that centres the board, over the amplitude. followed : orbits that were
+    followed on paths to it.
+    """
+
+    board: int
+    question: Question
+    centre: float
+    tries: list[Try] = field(default_factory=list)
+    followed: int = 0
+
+    @property
+    def found(self) -> Try | None:
+        """The setting that works with the greatest margin, if any does."""
+        good = [t for t in self.tries if t.verdict is Verdict.OK]
+        return max(good, key=lambda t: t.margin) if good else None
+
+    @property
+    def wanted(self) -> tuple[int, int, int]:
+        """n, p and q."""
+        spec, nominal = self.question.spec.expect, self.question.start
+        return (nominal.n, nominal.p, nominal.q) if spec is None else (spec.n, spec.p, spec.q)
+
+    @property
+    def unanswered(self) -> int:
+        """Tries that gave no answer."""
+        return sum(t.verdict is Verdict.FAILED for t in self.tries)
+
+
+Asked = tuple[Adjustment, Array]
+"""A setting, and the state that the board starts from there."""
+
+
+def seek(
+    ensemble: Ensemble, cases: Sequence[Case], bands: Bands, *, jobs: int = 1
+) -> Sequence[Case]:
+    """Ask every case in rounds until it works or the rounds are over; fills in the tries."""
+    for propose in _rounds(ensemble.boards, bands):
+        left = [case for case in cases if case.found is None]
+        proposed = zip(left, parallel(propose, left, jobs), strict=True)
+        asked = [(case, setting, start) for case, some in proposed for setting, start in some]
+        if not asked:
+            continue
+        orbits = ensemble.settle(
+            [case.board for case, _, _ in asked],
+            [setting.of(case.question.excitation).drive for case, setting, _ in asked],
+            np.array([start for _, _, start in asked]),
+            jobs=jobs,
+        )
+        for (case, setting, _), orbit in zip(asked, orbits, strict=True):
+            verdict, reason = judge(orbit, case.question.spec, case.question.start)
+            case.tries.append(Try(setting, orbit, verdict, reason))
+    return cases
+
+
+Round = Callable[[Case], list[Asked]]
+
+
+def _rounds(boards: Boards, bands: Bands) -> list[Round]:
+    def centred(points: Sequence[tuple[float, float]]) -> Round:
+        """Frequency and amplitude in half-bands as settings, from the nominal orbit."""
+
+        def propose(case: Case) -> list[Asked]:
+            settings = [
+                Adjustment(bands.frequency * f, bands.amplitude * a, case.centre).within(bands)
+                for f, a in points
+            ]
+            return [(s, case.question.start.start) for s in _new(case, settings, bands)]
+
+        return propose
+
+    def halved(follow: bool) -> Round:
+        return lambda case: _halfway(case, bands, follow)
+
+    def path(first: float, tied: bool) -> Round:
+        def propose(case: Case) -> list[Asked]:
+            board = boards.take([case.board])
+            trail = find_window(board, case.question, bands, first, tied=tied)
+            case.followed += trail.followed
+            return [(s, case.question.start.start) for s in _deepest(trail, case, bands)]
+
+        return propose
+
+    edge = (-1.0, 0.0, 1.0)
+    frame = [(f, a) for a in edge for f in edge if (f, a) != (0.0, 0.0)]
+    return [
+        centred([(0.0, 0.0)]),
+        centred(frame),
+        halved(False),
+        halved(True),
+        *(path(first, tied) for first, tied in PATHS),
+    ]
+
+
+def _deepest(trail: Trail, case: Case, bands: Bands) -> list[Adjustment]:
+    """Settings of a path, the one deepest inside the window first, and none twice.
+
+    A window may be smaller than ``APART``, so a setting is left out only where the very same was
+    tried.
+    """
+    known = [AS_BUILT, *(t.setting for t in case.tries)]
+    chosen: list[Adjustment] = []
+    for spot in sorted(trail.spots, key=lambda spot: -spot.radius):
+        here = spot.setting
+        if here not in known and all(_distance(here, s, bands) > APART for s in chosen):
+            chosen.append(here)
+    return chosen[:SPOTS]
+
+
+def _halfway(case: Case, bands: Bands, follow: bool) -> list[Asked]:
+    """Between pairs of settings that leave the wanted counts between them, the best pair first.
+
+    follow : start from the attractor of the better one; otherwise from the nominal orbit.
+    """
+    chosen: list[Asked] = []
+    for better, worse in _brackets(case, bands):
+        middle = _middle(better.setting, worse.setting)
+        known = [setting for setting, _ in chosen]
+        if not _new(case, [*known, middle], bands)[len(known) :]:
+            continue
+        chosen.append((middle, better.orbit.start if follow else case.question.start.start))
+        if len(chosen) == HALVED:
+            break
+    return chosen
+
+
+def _brackets(case: Case, bands: Bands) -> list[tuple[Try, Try]]:
+    """Pairs of tries, the better one of each first, by how far their counts are off and then by
+    their distance. A pair leaves the wanted count of a stop between it if not both have too many
+    impacts there, or both too few; one stop of which that holds is enough, two are better."""
+    n, p, q = case.wanted
+    counted = [t for t in case.tries if t.orbit.n]
+    found = []
+    for wanted in {(p, q), (q, p)}:
+        off = [
+            (t.orbit.p / t.orbit.n - wanted[0] / n, t.orbit.q / t.orbit.n - wanted[1] / n)
+            for t in counted
+        ]
+        # The right counts over the wrong period are wrong too.
+        cost = [
+            abs(a) + abs(b) + 0.5 * (t.orbit.n != n) for (a, b), t in zip(off, counted, strict=True)
+        ]
+        for i, j in combinations(range(len(counted)), 2):
+            outside = sum(a * b > 0.0 for a, b in zip(off[i], off[j], strict=True))
+            if outside == 2 or off[i] == off[j]:
+                continue
+            i, j = (i, j) if cost[i] <= cost[j] else (j, i)
+            apart = _distance(counted[i].setting, counted[j].setting, bands)
+            found.append((cost[i] + cost[j] + outside, apart, i, j))
+    return [(counted[i], counted[j]) for _, _, i, j in sorted(found)]
+
+
+def _new(case: Case, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
+    """Those that differ from what was tried, from as built and from each other."""
+    known = [AS_BUILT, *(t.setting for t in case.tries)]
+    fresh: list[Adjustment] = []
+    for setting in settings:
+        if all(_distance(setting, other, bands) > APART for other in (*known, *fresh)):
+            fresh.append(setting)
+    return fresh
+
+
+def _middle(a: Adjustment, b: Adjustment) -> Adjustment:
+    return Adjustment(
+        0.5 * (a.frequency + b.frequency),
+        0.5 * (a.amplitude + b.amplitude),
+        0.5 * (a.offset + b.offset),
+    )
+
+
+def _distance(a: Adjustment, b: Adjustment, bands: Bands) -> float:
+    """Largest difference over the half-band; a band of no width has only one value."""
+    pairs = (
+        (a.frequency - b.frequency, bands.frequency),
+        (a.amplitude - b.amplitude, bands.amplitude),
+        (a.offset - b.offset, bands.offset),
+    )
+    return max((abs(d) / width for d, width in pairs if width > 0.0), default=0.0)

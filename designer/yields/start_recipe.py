@@ -1,0 +1,188 @@
+"""How to start a board so that it ends on the wanted response: where to switch on, how to sweep.
+
+Several attractors coexist at one setting, so the generator's phase at power-up may decide; a sweep
+from where only one exists does not leave it to chance. ``yields.start_recipe_search`` finds
+recipes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from designer.circuit.netlist import Excitation
+from designer.dynamics.piecewise_linear import Drive
+
+SLOWER = 10
+"""How many times slower than it says a recipe is tried as well."""
+FINER = 5
+"""Into so many parts each step of a sweep is cut where it stands for a smooth one."""
+
+
+class Way(StrEnum):
+    """Kinds of recipe, the simplest first."""
+
+    DIRECT = "direct"
+    FROM_ABOVE = "sweep down"
+    FROM_BELOW = "sweep up"
+    AMPLITUDE = "amplitude up"
+    FROM_FAR = "long sweep down"
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Switch on at ``first``, go to ``target`` in steps of equal ratio, wait.
+
+    steps : of the sweep, ``hold`` drive periods each, the one at ``first`` included; 0 without
+    one. wait : drive periods at the target. omega : dimensionless frequency of the target.
+    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : starts
+    of the ``able`` sample boards that show the response as built, of ``boards`` drawn. smooth,
+    slower : whether a sweep
+    without steps, and one ``SLOWER`` times as slow, did as well.
+    """
+
+    way: Way
+    omega: float | None
+    target: Excitation
+    first: Excitation
+    steps: int
+    hold: int
+    wait: int
+    reached: int = 0
+    trials: int = 0
+    board_reached: int = 0
+    board_trials: int = 0
+    boards: int = 0
+    able: int = 0
+    smooth: bool = False
+    slower: bool = False
+
+    def stages(self) -> Iterator[tuple[Excitation, int]]:
+        """Settings of the generator in order, each with its whole drive periods."""
+        for k in range(self.steps):
+            part = k / self.steps
+            yield (
+                Excitation(
+                    _between(self.first.frequency, self.target.frequency, part),
+                    _between(self.first.amplitude, self.target.amplitude, part),
+                    self.target.offset,
+                ),
+                self.hold,
+            )
+        yield self.target, self.wait
+
+    @property
+    def drives(self) -> list[tuple[Drive, int]]:
+        """The stages as the exact circuit sees them."""
+        return [(excitation.drive, periods) for excitation, periods in self.stages()]
+
+    @property
+    def sweep_seconds(self) -> float:
+        return sum(p / e.frequency for e, p in list(self.stages())[:-1])
+
+    @property
+    def wait_seconds(self) -> float:
+        return self.wait / self.target.frequency
+
+    @property
+    def rate(self) -> float:
+        """Of all trials, those that reached it."""
+        trials = self.trials + self.board_trials
+        return (self.reached + self.board_reached) / trials if trials else 0.0
+
+    def refined(self, slower: int = 1) -> Recipe:
+        """The same sweep in steps ``FINER`` times as fine, ``slower`` times as long in all."""
+        return replace(
+            self, steps=FINER * self.steps, hold=max(1, slower * self.hold // FINER), reached=0
+        )
+
+    @property
+    def text(self) -> str:
+        """The recipe in words, for ``setup.csv``: what a person sets on a generator."""
+        said = [f"wait {seconds(self.wait_seconds)} or longer", *self._success()]
+        if self.way is Way.DIRECT:
+            return "; ".join(["switch on at this setting", *said])
+        return "; ".join([f"set {self._setting(self.first)}, switch on", self._sweep(), *said])
+
+    def _sweep(self) -> str:
+        """What is turned, to where, in what time."""
+        took = seconds(self.sweep_seconds)
+        steps = f"in {self.steps} steps of equal ratio, {self.hold} periods each ({took} in all)"
+        slower = f" (up to {SLOWER} times slower is fine)" if self.slower else ""
+        if self.way is Way.AMPLITUDE:
+            how = f"in {took}" if self.smooth else steps
+            return f"raise the amplitude to {volts(self.target.amplitude)} V peak {how}{slower}"
+        to = f"{self._hertz(self.target)}"
+        if not self.smooth:
+            return f"step to {to} {steps}, without a break in phase{slower}"
+        return f"sweep logarithmically to {to} in {took}, once, then hold{slower}"
+
+    def _success(self) -> Iterator[str]:
+        """How often it led to the response, and a warning where little is known of boards."""
+        if not self.trials:
+            return
+        tried = f"it worked from {self.reached} of {self.trials} switch-on phases"
+        if self.board_trials:
+            tried += (
+                f", and at {self.board_reached} of {self.board_trials} starts of "
+                f"{self.able} sample boards"
+            )
+        yield tried
+        if 2 * self.able < self.boards:
+            shows = self.able or "none"
+            yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"
+
+    def _setting(self, at: Excitation) -> str:
+        return f"{self._hertz(at)}, {volts(at.amplitude)} V peak"
+
+    def _hertz(self, at: Excitation) -> str:
+        """In Hz and dimensionless."""
+        said = f"{hertz(at.frequency)} Hz"
+        if self.omega is None:
+            return said
+        return f"{said} (omega {self.omega * at.frequency / self.target.frequency:.4g})"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: settings in Hz and V, times in drive periods and seconds."""
+        return {
+            "way": str(self.way),
+            "frequency_hz": self.first.frequency,
+            "amplitude_v_peak": self.first.amplitude,
+            "to_frequency_hz": self.target.frequency,
+            "to_amplitude_v_peak": self.target.amplitude,
+            "steps": self.steps,
+            "hold_periods": self.hold,
+            "wait_periods": self.wait,
+            "sweep_seconds": self.sweep_seconds,
+            "wait_seconds": self.wait_seconds,
+            "reached": self.reached,
+            "trials": self.trials,
+            "board_reached": self.board_reached,
+            "board_trials": self.board_trials,
+            "boards": self.boards,
+            "able": self.able,
+            "smooth": self.smooth,
+            "slower": self.slower,
+            "text": self.text,
+        }
+
+
+def _between(first: float, last: float, part: float) -> float:
+    return first if first == last else first * (last / first) ** part
+
+
+def hertz(value: float) -> str:
+    """A frequency [Hz] as it is typed into a generator."""
+    return f"{float(f'{value:.6g}'):.12g}"
+
+
+def volts(value: float) -> str:
+    """A voltage [V] as it is typed into a generator."""
+    return f"{float(f'{value:.5g}'):.12g}"
+
+
+def seconds(value: float) -> str:
+    """A time on the bench: two digits are enough."""
+    return f"{float(f'{value:.2g}'):.12g} s"

@@ -1,0 +1,205 @@
+"""Which recipe to give a response: candidates tried from the simplest on.
+
+Each is tried on the nominal circuit and on sample boards of its own, from discharged
+capacitors, with phases of the generator that fill the circle. The first that always worked is
+taken. Where none did, all are tried on the same starts: the simplest of those that no other beats
+by more than chance is taken. Its sweep is then tried without steps, and slower: what a person does
+with a generator.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import Excitation, nominal_board
+from designer.dynamics.orbit import Orbit
+from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
+from designer.spread.spread import draw_many
+from designer.yields.power_up_yield import switched_on
+from designer.yields.start_recipe import SLOWER, Recipe, Way
+from designer.yields.verdict import Question, StudyPlan, Verdict, judge
+
+TRIALS = 12
+"""Phases at which the nominal circuit is switched on."""
+BOARDS = 24
+"""Sample boards that a recipe is tried on, if they show the response as built."""
+STARTS = 3
+"""Phases from which each of them is switched on."""
+TRIAL = "recipe:"
+"""Stream of those boards."""
+STEP = 0.01
+"""Largest step of a sweep, as a fraction."""
+HOLD = 20
+"""Drive periods at each step of a sweep."""
+SETTLE = 40
+"""Drive periods of the last wait, beside those that shrink a deviation to ``REMAINDER``."""
+REMAINDER = 1e-3
+LONGEST_WAIT = 4000
+"""Drive periods of the last wait at most."""
+ASIDE = 0.10
+"""How far from the wanted frequency a short sweep begins."""
+SOFT = 0.5
+"""Of the amplitude: where an amplitude ramp begins."""
+ABOVE = 1.1
+"""Of the highest resonance inside the clearance: where the long sweep begins."""
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+
+
+def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
+    """A recipe for each question of the plan; its seed and number of samples do not matter."""
+    nominal = Ensemble(Boards.of(plan.circuit, [nominal_board(plan.circuit)]))
+    sample = Ensemble(draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL))
+    return tuple(_find(question, nominal, sample, jobs) for question in plan.questions)
+
+
+def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Recipe]:
+    """Recipes for a response, the simplest first. system : the nominal circuit."""
+    target = question.excitation
+    wait = _wait(question.start)
+
+    def sweep(way: Way, frequency: float, amplitude: float) -> Recipe:
+        first = Excitation(frequency, amplitude, target.offset)
+        ratio = max(
+            abs(math.log(frequency / target.frequency)),
+            abs(math.log(amplitude / target.amplitude)),
+        )
+        steps = math.ceil(ratio / math.log1p(STEP) - 1e-9)
+        return Recipe(way, question.spec.omega, target, first, steps, HOLD, wait)
+
+    frequency, amplitude = target.frequency, target.amplitude
+    yield Recipe(Way.DIRECT, question.spec.omega, target, target, 0, HOLD, wait)
+    yield sweep(Way.FROM_ABOVE, frequency * (1.0 + ASIDE), amplitude)
+    yield sweep(Way.FROM_BELOW, frequency * (1.0 - ASIDE), amplitude)
+    yield sweep(Way.AMPLITUDE, frequency, SOFT * amplitude)
+    far = ABOVE * highest_resonance(system)
+    if far > frequency * (1.0 + ASIDE):
+        yield sweep(Way.FROM_FAR, far, amplitude)
+
+
+def highest_resonance(system: PiecewiseLinearSystem) -> float:
+    """Of the free motion inside the clearance, per unit of the system's time; 0 without one."""
+    poles = np.linalg.eigvals(system.mode(system.start).A).astype(complex)
+    return float(np.abs(poles.imag).max()) / (2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """A recipe with what became of its starts: on the nominal circuit, and on each able board."""
+
+    recipe: Recipe
+    nominal: tuple[bool, ...] = ()
+    boards: tuple[bool, ...] = ()
+
+    @property
+    def certain(self) -> bool:
+        return all(self.nominal) and all(self.boards)
+
+    @property
+    def starts(self) -> tuple[bool, ...]:
+        return (*self.nominal, *self.boards)
+
+    def beaten_by(self, other: _Trials) -> bool:
+        """Whether the other one works more often, by a standard error of the difference or more:
+        of the starts that one of the two fails at and the other does not, in √ of their number."""
+        pairs = list(zip(self.starts, other.starts, strict=True))
+        worse, better = pairs.count((False, True)), pairs.count((True, False))
+        return worse > better and worse - better >= math.sqrt(worse + better)
+
+    @property
+    def counted(self) -> Recipe:
+        return replace(
+            self.recipe,
+            reached=sum(self.nominal),
+            trials=len(self.nominal),
+            board_reached=sum(self.boards),
+            board_trials=len(self.boards),
+        )
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """Where the recipes of a question are tried. able : sample boards that show it as built."""
+
+    question: Question
+    nominal: Ensemble
+    sample: Ensemble
+    able: tuple[int, ...]
+    jobs: int
+
+    def on_nominal(self, trials: _Trials) -> _Trials:
+        starts = [(0, self.question, trials.recipe, phase(k)) for k in range(TRIALS)]
+        return replace(trials, nominal=self._worked(self.nominal, starts))
+
+    def on_boards(self, trials: _Trials, each: int = STARTS) -> _Trials:
+        """``each`` : phases for each board; with fewer, the first ones."""
+        starts = [
+            (i, self.question, trials.recipe, phase(STARTS * i + k))
+            for k in range(each)
+            for i in self.able
+        ]
+        return replace(trials, boards=self._worked(self.sample, starts))
+
+    def _worked(
+        self, ensemble: Ensemble, starts: Sequence[tuple[int, Question, Recipe, float]]
+    ) -> tuple[bool, ...]:
+        ended = switched_on(ensemble, starts, self.jobs)
+        return tuple(e.verdict is Verdict.OK for e in ended)
+
+
+def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
+    as_built = sample.settle(
+        range(BOARDS),
+        [question.excitation.drive] * BOARDS,
+        np.tile(question.start.start, (BOARDS, 1)),
+        jobs=jobs,
+    )
+    able = [i for i, o in enumerate(as_built) if judge(o, question.spec, question.start)[0] == "ok"]
+    bench = _Bench(question, nominal, sample, tuple(able), jobs)
+    tried: list[_Trials] = []
+    for option in candidates(question, nominal.reduction(0).system()):
+        known = bench.on_nominal(_Trials(replace(option, boards=BOARDS, able=len(able))))
+        if all(known.nominal):
+            known = bench.on_boards(known)
+            if known.certain:
+                return _by_hand(known, bench)
+        tried.append(known)
+    whole = [t if t.boards else bench.on_boards(t) for t in tried]
+    best = max(whole, key=lambda trials: sum(trials.starts))
+    return _by_hand(next(t for t in whole if not t.beaten_by(best)), bench)
+
+
+def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
+    """The recipe with how freely its sweep may be done: without steps, and slower. These are tried
+    from one phase of each board."""
+    recipe = trials.counted
+    if recipe.way is Way.DIRECT:
+        return recipe
+    first = trials.boards[: len(bench.able)]
+
+    def as_well(other: Recipe) -> bool:
+        met = bench.on_boards(bench.on_nominal(_Trials(other)), 1)
+        return sum(met.nominal) >= sum(trials.nominal) and sum(met.boards) >= sum(first)
+
+    smooth = as_well(recipe.refined())
+    slow = recipe.refined(SLOWER) if smooth else replace(recipe, hold=SLOWER * recipe.hold)
+    return replace(recipe, smooth=smooth, slower=as_well(slow))
+
+
+def phase(number: int) -> float:
+    """Phases [rad] that fill the circle, and its half, however many are taken: by the golden
+    section."""
+    return 2.0 * math.pi * ((0.5 + number * GOLDEN) % 1.0)
+
+
+def _wait(orbit: Orbit) -> int:
+    """Drive periods until a deviation from the orbit has shrunk, by its slowest multiplier."""
+    radius = orbit.radius
+    if not 0.0 < radius < 1.0:
+        return SETTLE
+    return min(SETTLE + math.ceil(orbit.n * math.log(REMAINDER) / math.log(radius)), LONGEST_WAIT)

@@ -1,0 +1,141 @@
+"""The tolerance study of a design: which responses can be asked, and what became of each board."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from designer.check.checked_design import Checked
+from designer.yields import two_engine_yield as combined
+from designer.yields.blame_analysis import Blame
+from designer.yields.joint_yield import all_on_one
+from designer.yields.ngspice_sampling import Hearing
+from designer.yields.power_up_yield import Reached
+from designer.yields.start_recipe import Recipe
+from designer.yields.study_layers import RUNGS, RungName, Stores
+from designer.yields.tolerance_study import check, tolerance
+from designer.yields.trimmed_yield import Trimmed
+from designer.yields.tuned_yield import Tuned
+from designer.yields.two_engine_yield import Combined
+from designer.yields.verdict import Answer, StudyPlan, Yield, count
+from designer.yields.yield_maps import YieldMap
+
+if TYPE_CHECKING:
+    pass
+
+SAMPLES = 200
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Study:
+    """A tolerance study of the responses in ``checked``.
+
+    asked : for each question of the plan, the index of its response. left_out : why a response
+    is no question, by index. heard : what ngspice said. until : the width that was asked for;
+    narrow : whether every interval is narrower (None where no width was asked for). tuned,
+    reached : their rows; None where they were not asked for. trimmed : likewise; None where no
+    trimmer is fitted. recipes : one for each question.
+    blame, maps : by question, where they were asked for.
+    """
+
+    checked: tuple[Checked, ...]
+    plan: StudyPlan
+    asked: tuple[int, ...]
+    left_out: dict[int, str]
+    answers: tuple[Answer, ...]
+    heard: tuple[Hearing, ...] = ()
+    until: float | None = None
+    narrow: bool | None = None
+    tuned: tuple[Tuned, ...] | None = None
+    trimmed: tuple[Trimmed, ...] | None = None
+    reached: tuple[Reached, ...] | None = None
+    recipes: tuple[Recipe, ...] | None = None
+    blame: Blame | None = None
+    maps: tuple[YieldMap, ...] = ()
+
+    def answers_to(self, index: int) -> tuple[Answer, ...]:
+        """The answers for response number ``index``, by sample."""
+        return self._answers.get(index, ())
+
+    def heard_of(self, index: int) -> tuple[Hearing, ...]:
+        """What ngspice said about response number ``index``, by sample."""
+        return tuple(h for h in self.heard if self.asked[h.question] == index)
+
+    def tuned_of(self, index: int) -> tuple[Tuned, ...]:
+        """The rows of the tuned layer of response number ``index``."""
+        return tuple(t for t in self.tuned or () if self.asked[t.question] == index)
+
+    def trimmed_of(self, index: int) -> tuple[Trimmed, ...]:
+        """The rows of the trimmed layer of response number ``index``."""
+        return tuple(t for t in self.trimmed or () if self.asked[t.question] == index)
+
+    def reached_of(self, index: int) -> tuple[Reached, ...]:
+        """The rows of the reached layer of response number ``index``."""
+        return tuple(r for r in self.reached or () if self.asked[r.question] == index)
+
+    @property
+    def yields(self) -> tuple[Yield | None, ...]:
+        """For each response; None where it was left out."""
+        return tuple(
+            count(self.answers_to(i)) if i in self.asked else None for i in range(len(self.checked))
+        )
+
+    @cached_property
+    def combined(self) -> tuple[Combined | None, ...]:
+        """For each response: both engines together; None where ngspice has no answer."""
+        return tuple(
+            combined.combine(
+                self.answers_to(i), self.heard_of(i), self.plan.questions[self.asked.index(i)]
+            )
+            if i in self.asked
+            else None
+            for i in range(len(self.checked))
+        )
+
+    @property
+    def all_on_one_board(self) -> Yield | None:
+        """Boards that show every response as built; None unless there are two at least and each
+        was asked."""
+        return self._on_one(self.answers)
+
+    @property
+    def all_tuned(self) -> Yield | None:
+        """The same with the generator free within the bands, for each response its own."""
+        return self._on_one(self.tuned)
+
+    @property
+    def all_trimmed(self) -> Yield | None:
+        """The same with the trimmer at its one setting, the generator as built."""
+        return self._on_one(self.trimmed)
+
+    @property
+    def all_reached(self) -> Yield | None:
+        """The same from power-up by the recipes."""
+        return self._on_one(self.reached)
+
+    def _on_one(self, rows: Sequence[Answer | Tuned | Trimmed | Reached] | None) -> Yield | None:
+        if not rows or len(self.asked) < max(len(self.checked), 2):
+            return None
+        return all_on_one(rows)
+
+    @cached_property
+    def _answers(self) -> dict[int, tuple[Answer, ...]]:
+        by: dict[int, list[Answer]] = {index: [] for index in self.asked}
+        for a in self.answers:
+            by[self.asked[a.question]].append(a)
+        return {index: tuple(rows) for index, rows in by.items()}
+
+
+__all__ = (
+    "RUNGS",
+    "SAMPLES",
+    "SEED",
+    "RungName",
+    "Stores",
+    "Study",
+    "check",
+    "tolerance",
+)

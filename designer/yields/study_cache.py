@@ -1,0 +1,139 @@
+"""What a study need not do again when it gets another layer: its checks and its blame.
+
+One file in the design folder, beside the rows: each item under a name with a hash of all that
+decides it, and it counts for that hash alone. Numbers are kept to the last bit, so that a study
+made in two goes is the one made at once. A file that cannot be read holds nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.spice.deck import SolverSettings
+from designer.spice.equation_check import EquationCheck, Finding
+from designer.spice.numerics_gate import GateResult
+from designer.spice.read_orbit import Read
+from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame, Subject
+from designer.yields.corners import Corner
+from designer.yields.margins import Prediction
+from designer.yields.sobol import Index
+from designer.yields.verdict import Verdict
+
+KEPT = "kept.npz"
+FORMAT = 1
+_SAID = "items"
+_RECORDS: dict[str, type[Any]] = {
+    kind.__name__: kind
+    for kind in (
+        Blame, Corner, EquationCheck, Finding, GateResult, Index, NearLimit, Orbit, Prediction,
+        Read, ResponseBlame, SolverSettings, Subject,
+    )
+}  # fmt: skip
+_WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}
+
+
+class Kept:
+    """The items in the file at ``path``, and a way to keep more. write : puts the file there."""
+
+    def __init__(self, path: Path, write: Callable[[bytes], None]) -> None:
+        self._items = _read(path)
+        self._write = write
+        self._used: set[str] = set()
+
+    def get(self, name: str, key: str) -> Any | None:
+        """None where there is none of this name that this key decides."""
+        known, value = self._items.get(name, ("", None))
+        if known != key:
+            return None
+        self._used.add(name)
+        return value
+
+    def put(self, name: str, key: str, value: Any) -> None:
+        """Keep it, in the place of any other of this name."""
+        self._items[name] = (key, value)
+        self._used.add(name)
+        self._write(_bytes(self._items))
+
+    def forget_unused(self) -> None:
+        """Drop what nobody has got or put since: it is of another design or study."""
+        if not self._used.issuperset(self._items):
+            self._items = {name: self._items[name] for name in self._used}
+            self._write(_bytes(self._items))
+
+
+def _bytes(items: Mapping[str, tuple[str, Any]]) -> bytes:
+    arrays: list[Array] = []
+    said = {name: [key, _plain(value, arrays)] for name, (key, value) in sorted(items.items())}
+    text = json.dumps({"format": FORMAT, _SAID: said}, sort_keys=True)
+    stream = io.BytesIO()
+    named = {f"array{k}": array for k, array in enumerate(arrays)}
+    np.savez_compressed(stream, **{_SAID: np.array(text)}, **named)  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+_UNREADABLE = (
+    OSError,
+    BadZipFile,
+    zlib.error,
+    NotImplementedError,  # a method of compression that there is not
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    EOFError,
+)
+
+
+def _read(path: Path) -> dict[str, tuple[str, Any]]:
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as held:
+            said = json.loads(str(held[_SAID]))
+            if said["format"] != FORMAT:
+                return {}
+            return {name: (key, _made(value, held)) for name, (key, value) in said[_SAID].items()}
+    except _UNREADABLE:
+        return {}
+
+
+def _plain(value: Any, arrays: list[Array]) -> Any:
+    """JSON data that says the same; arrays go into the list."""
+    if isinstance(value, Enum):
+        return {"word": [type(value).__name__, value.value]}
+    if is_dataclass(value) and _RECORDS.get(type(value).__name__) is type(value):
+        said = {f.name: _plain(getattr(value, f.name), arrays) for f in fields(value)}
+        return {"record": [type(value).__name__, said]}
+    if isinstance(value, np.ndarray):
+        arrays.append(value)
+        return {"array": len(arrays) - 1}
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, tuple):
+        return {"tuple": [_plain(v, arrays) for v in value]}
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    raise TypeError(f"{type(value).__name__} cannot be kept")
+
+
+def _made(value: Any, held: Mapping[str, Any]) -> Any:
+    if not isinstance(value, dict):
+        return value
+    ((kind, said),) = value.items()
+    if kind == "word":
+        return _WORDS[said[0]](said[1])
+    if kind == "record":
+        return _RECORDS[said[0]](**{name: _made(v, held) for name, v in said[1].items()})
+    if kind == "array":
+        return held[f"array{said}"]
+    return tuple(_made(v, held) for v in said)

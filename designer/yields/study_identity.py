@@ -1,0 +1,111 @@
+"""Which study a row on disk belongs to: a hash of everything that decides it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from designer.base.plain_json import plain
+from designer.base.version import __version__
+from designer.circuit.netlist import Part
+from designer.yields import ngspice_runs, ngspice_sampling
+from designer.yields.verdict import StudyPlan, kept
+
+RULES = {
+    "samples": 1,
+    "ngspice": 3,
+    "tuned": 3,
+    "reached": 3,
+    "trimmed": 1,
+    "blame": 1,
+    "checks": 1,
+}
+"""Numbers of the rules by which each layer's rows are made. Whoever changes what a row says under
+the same inputs (how an attractor is sought, a verdict given, ngspice asked) raises the number of
+the layer, so that rows of the old rules are not taken for rows of the new ones. So with the blame
+and with the equation check and the gate."""
+
+
+def study_hash(
+    plan: StudyPlan, layer: str = "samples", more: Mapping[str, Any] | None = None
+) -> str:
+    """Hash of everything that decides the rows of a layer; not of how many there are.
+
+    Every layer stands on the samples; ngspice's also on its settings. more : what else decides.
+    What is computed (settings of the generator and of ngspice, starts, recipes) counts to nine
+    digits: the last ones depend on the machine's linear algebra.
+    """
+    said = _samples(plan)
+    if layer != "samples":
+        said["layer"] = [layer, RULES[layer], nine_digits(plain(more or {}))]
+    if layer == "ngspice":
+        said["ngspice"] = {
+            "refinements": [ngspice_runs.OWN_REFINEMENTS, ngspice_runs.NOMINAL_REFINEMENTS],
+            "periods": [
+                ngspice_runs.UNKNOWN_PERIODS,
+                ngspice_runs.REMAINDER,
+                ngspice_runs.MOST_PERIODS,
+                ngspice_runs.STRETCH,
+                ngspice_runs.LONG,
+                ngspice_runs.MOST_AGAIN,
+            ],
+            "undecided": ngspice_sampling.UNDECIDED,
+            "settings": [
+                None if q.settings is None else nine_digits(plain(q.settings.as_dict()))
+                for q in plan.questions
+            ],
+        }
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode("ascii")).hexdigest()
+
+
+def blame_hash(plan: StudyPlan) -> str:
+    """Hash of everything that decides the blame of a study's answers."""
+    return study_hash(plan, "blame", {"samples": plan.samples})
+
+
+def checks_hash(design: str | None, ngspice: str | None) -> str:
+    """Hash of everything that decides what ngspice says of a design's nominal board.
+
+    design : hash of ``design.json``. ngspice : its version.
+    """
+    said = [__version__, RULES["checks"], design, ngspice]
+    return hashlib.sha256(json.dumps(said).encode("ascii")).hexdigest()
+
+
+def nine_digits(value: Any) -> Any:
+    """JSON data with every number in it to nine digits."""
+    if isinstance(value, float):
+        return kept(value)
+    if isinstance(value, Mapping):
+        return {key: nine_digits(v) for key, v in value.items()}
+    return [nine_digits(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+def _simulated(part: Part) -> dict[str, Any]:
+    """What a part is to a simulation: not where else it stands."""
+    return {key: value for key, value in asdict(part).items() if key != "views"}
+
+
+def _samples(plan: StudyPlan) -> dict[str, Any]:
+    circuit = plan.circuit
+    return {
+        "version": __version__,
+        "rules": RULES["samples"],
+        "parts": [[type(p).__name__, plain(_simulated(p))] for p in circuit.parts],
+        "opamp": [circuit.opamp, circuit.gain, circuit.bias, circuit.supply, circuit.saturation],
+        "figures": repr(circuit.figures),
+        "spread": plain(plan.spread.as_dict()),
+        "seed": plan.seed,
+        "questions": [
+            {
+                "spec": asdict(q.spec),
+                "excitation": nine_digits(asdict(q.excitation)),
+                "start": nine_digits([float(v) for v in q.start.start]),
+                "nominal": q.start.response,
+            }
+            for q in plan.questions
+        ],
+    }

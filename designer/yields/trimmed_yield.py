@@ -1,0 +1,221 @@
+"""The DC trimmer of a board: one setting for all responses, found once, and what the board shows
+there.
+
+The fitted trimmer (``board.board_parts``) is simulated with its track in two parts and the
+resistor from its wiper into the velocity integrator's summing node, by the same nodal equations as
+everything else. The person at the bench reads the two voltages of v1 at which fv leaves zero,
+switches the generator off and turns until v1 rests as far from them as it does on the nominal board
+(docs/bench.md). Then every response is judged at that setting, from its nominal orbit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.views import View
+from designer.board.board_parts import board_circuit
+from designer.circuit.board_arrays import Boards
+from designer.circuit.board_parts_only import Trimmer
+from designer.circuit.netlist import Circuit, Resistor, nominal_board
+from designer.circuit.rest_point import at_rest
+from designer.spread.spread import draw_many
+from designer.yields import exact_rung
+from designer.yields.bench_procedure import BITS, READINGS
+from designer.yields.verdict import Answer, StudyPlan, Verdict, kept
+
+if TYPE_CHECKING:
+    from designer.check.synthesis_result import Synthesis
+
+HIGH, LOW = "RV901H", "RV901L"
+"""The track between the wiper and its ends."""
+END = 1e-3
+"""Of the travel at either end: what stays unused."""
+SCREEN = 4.0
+"""Volts on the whole screen while the stops are read, over the nominal board's stop."""
+FINER = 10.0
+"""How much larger the scale is on which the rest point is read: it lies still, near 0 V."""
+TURNS = 4
+"""Corrections by the rule of proportion; the rest point is all but linear in the setting."""
+TAG = 0x7213
+"""Sets the readings' noise apart from the other draws of a sample."""
+
+
+@dataclass(frozen=True)
+class DcTrim:
+    """circuit : with the trimmer and its resistor among its parts, the wiper in the middle. track
+    [Ω]. adjustability : how finely the wiper is set, ± of the travel."""
+
+    circuit: Circuit
+    track: float
+    adjustability: float
+
+    @classmethod
+    def of(cls, circuit: Circuit, part: Trimmer, series: Resistor, adjustability: float) -> DcTrim:
+        """The trimmer ``part`` with ``series`` from its wiper, in a circuit without fittings."""
+        half = 0.5 * part.value
+        added = (
+            Resistor(HIGH, part.high, part.wiper, half, part.role),
+            Resistor(LOW, part.low, part.wiper, half, part.role),
+            replace(series, views=View.EVERYWHERE),
+        )
+        bare = replace(circuit, parts=(*circuit.parts, *added), fittings=())
+        return cls(bare, part.value, adjustability)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What decides a setting beside the plan, as JSON holds it."""
+        own = {p.name: p.value for p in self.circuit.resistors[-3:]}
+        return {"parts": own, "adjustability": self.adjustability}
+
+    def on(self, circuit: Circuit) -> DcTrim:
+        """The same trimmer in a circuit that differs in its references."""
+        parts = (*circuit.parts, *self.circuit.parts[-3:])
+        return replace(self, circuit=replace(circuit, parts=parts, fittings=()))
+
+    def at(self, boards: Boards, position: Array) -> Boards:
+        """These boards of ``circuit`` with the wiper there: (N,) of the travel, 0 at the negative
+        rail and 1 at the positive one."""
+        track = {HIGH: self.track * (1.0 - position), LOW: self.track * position}
+        return replace(boards, values={**boards.values, **track})
+
+
+@dataclass(frozen=True)
+class Trimmed:
+    """One sample of one response at the board's one setting of the trimmer.
+
+    verdict, response, reason : the exact circuit's; the margins are its. position : of the wiper,
+    0 at the negative rail and 1 at the positive one. at_end : whether the trimmer reaches no
+    further.
+    """
+
+    sample: int
+    question: int
+    verdict: Verdict
+    response: str
+    reason: str
+    position: float
+    at_end: bool
+    radius: float
+    penetration: float
+    miss: float
+    asymmetry: float
+
+
+def dc_trim(made: Synthesis) -> DcTrim | None:
+    """The trimmer of a design; None where the model file does not ask for a fitted one, or no
+    summing node is driven.
+
+    Raises
+    ------
+    Unreachable : no resistor for it can be bought.
+    """
+    if made.modelfile.board.dc_trim != "fitted":
+        return None
+    board, _ = board_circuit(made)
+    part = next((p for p in board.fittings if isinstance(p, Trimmer)), None)
+    if part is None:
+        return None
+    series = next(p for p in board.fittings if isinstance(p, Resistor) and part.wiper in p.nets)
+    adjustability = made.catalog.trimmer(part.value).adjustability
+    return DcTrim.of(made.design.circuit, part, series, adjustability)
+
+
+def trimmed_boards(trim: DcTrim, plan: StudyPlan, indices: range) -> tuple[Boards, Array]:
+    """The boards of these samples with their trimmers set, and the settings (N,)."""
+    boards = draw_many(trim.circuit, plan.spread, plan.seed, indices)
+    position = settings(trim, boards, plan.seed, indices)
+    return trim.at(boards, position), position
+
+
+def trimmed_answers(
+    trim: DcTrim,
+    plan: StudyPlan,
+    indices: range,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> tuple[list[Answer], Array]:
+    """An answer for every board and every question, in order, and the settings (N,).
+
+    plan : of the circuit without the trimmer. progress : called once an answer.
+    """
+    boards, position = trimmed_boards(trim, plan, indices)
+    return exact_rung.of_boards(plan, boards, indices, jobs, progress), position
+
+
+def trimmed_block(
+    trim: DcTrim,
+    plan: StudyPlan,
+    indices: range,
+    jobs: int,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Trimmed]:
+    """A row for every board and every question, in order; arguments as ``trimmed_answers``."""
+    answers, position = trimmed_answers(trim, plan, indices, jobs, progress)
+    return [
+        Trimmed(
+            sample=a.sample,
+            question=a.question,
+            verdict=a.verdict,
+            response=a.response,
+            reason=a.reason,
+            position=kept(float(here)),
+            at_end=bool(min(here, 1.0 - here) < END * (1.0 + 1e-9)),
+            radius=a.radius,
+            penetration=a.penetration,
+            miss=a.miss,
+            asymmetry=a.asymmetry,
+        )
+        for a in answers
+        for here in [position[a.sample - indices.start]]
+    ]
+
+
+def settings(trim: DcTrim, boards: Boards, seed: int, indices: range) -> Array:
+    """(N,) where the procedure leaves the wiper of each board, as a person reads the screen.
+
+    The middle of the travel where a board has no rest point.
+    """
+    nominal = Boards.of(trim.circuit, [nominal_board(trim.circuit)])
+    wanted, stops = at_rest(nominal)
+    middle = trim.at(boards, np.full(len(boards), 0.5))
+    _, read = at_rest(middle)
+    step = SCREEN * max((abs(float(v[0])) for v in stops.values()), default=0.0) / 2**BITS
+    people = [np.random.default_rng([seed, i, TAG]) for i in indices]
+    target = np.full(len(boards), float(wanted[0]))
+    if stops:
+        away = [_seen(read[s], step, people) + float(wanted[0] - stops[s][0]) for s in stops]
+        target = np.mean(away, axis=0)
+    target = _seen(target, step / FINER, people)
+    position = _turned(trim, boards, target)
+    slip = np.array([p.uniform(-1.0, 1.0) for p in people])
+    return np.clip(position + trim.adjustability * slip, END, 1.0 - END)
+
+
+def _turned(trim: DcTrim, boards: Boards, target: Array) -> Array:
+    """(N,) the setting at which v1 rests at ``target`` [V], the nearest end where none does."""
+
+    def off(position: Array) -> Array:
+        return at_rest(trim.at(boards, position))[0] - target
+
+    before, here = np.full(len(boards), END), np.full(len(boards), 1.0 - END)
+    error, now = off(before), off(here)
+    for _ in range(TURNS):
+        change = now - error
+        safe = np.where(change == 0.0, 1.0, change)
+        move = np.where(change == 0.0, 0.0, -now * (here - before) / safe)
+        before, error = here, now
+        here = np.clip(np.nan_to_num(here + move, nan=0.5), END, 1.0 - END)
+        now = off(here)
+    return here
+
+
+def _seen(volts: Array, step: float, people: list[np.random.Generator]) -> Array:
+    """(N,) the mean of a few readings of a screen, each off by up to one step, in whole steps."""
+    if step == 0.0:
+        return volts
+    noise = np.array([p.uniform(-1.0, 1.0, READINGS) for p in people])
+    return np.asarray(np.round(volts[:, None] / step + noise).mean(axis=1) * step)

@@ -1,0 +1,266 @@
+"""The exact rung and ngspice together: one yield from both, and where they differ.
+
+All N boards have the exact rung's verdict X; some have ngspice's from the nominal orbit too, Y.
+The estimate of ngspice's yield is the difference estimator (the exact rung is the control
+variate), in strata h that the exact rung defines: boards nearest to a boundary, slow ones, the
+rest::
+
+    p = mean of X over all + sum over h of (N_h/N) · mean of (Y - X) over those asked in h
+
+Given the exact answers, those asked in a stratum are a simple random sample of it (of the first so
+many indices of independent draws; all of those at a boundary), so the estimate is unbiased if all
+of them have an answer. Those without are left out as if they were like the others, which they need
+not be (the way to an attractor is longest next to the loss of its stability); the estimates if all
+of them were lost, and if all were ok, stand beside. The variance is that of two-phase sampling,
+S_Y²/N + Σ (N_h/N)² (1/n_h - 1/N_h) S_D² (Cochran, Sampling Techniques, 1977, 12.2 and 7.2;
+Särndal, Swensson and Wretman, 1992, 9.6). The interval joins the
+terms by the method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27,
+2008, 1693): each enters with its own Wilson limits instead of its standard error, D = +1 and
+D = -1 apart. So fifty boards without a difference do not make the exact rung's interval ngspice's:
+the disagreement may be as large as fifty boards can hide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from designer.base.proportion import wilson
+from designer.dynamics.orbit import OrbitStatus
+from designer.spice.read_orbit import STROBE_TOLERANCE
+from designer.yields.ngspice_sampling import BOUNDARY_SAMPLES, SLOW, Hearing, Kind, Why, distance
+from designer.yields.verdict import Answer, Question, Verdict
+
+
+class Explanation(StrEnum):
+    """Why two engines differ on a board, where a margin or another run of ngspice shows it.
+
+    That a board is slow or its period long shows nothing: such boards can differ for any reason.
+    """
+
+    GRAZING = "grazing margin"
+    BASIN = "another attractor from the nominal orbit"
+    CLIPPED = "clipped"
+    NONE = "unexplained"
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """One board on which ngspice says another response than the exact rung."""
+
+    sample: int
+    kind: Kind
+    why: Why
+    exact: str
+    ngspice: str
+    distance: float
+    explanation: Explanation
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share with its two-sided 95 % Wilson interval."""
+
+    count: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return wilson(float(self.count), self.of)
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """samples : N_h. asked : n_h, those with an answer. gained, lost : of these, boards that only
+    ngspice calls ok, and that only the exact rung does."""
+
+    name: str
+    samples: int
+    asked: int
+    gained: int
+    lost: int
+    could_gain: int
+    could_lose: int
+
+
+@dataclass(frozen=True)
+class Combined:
+    """The yield by both engines; low, high : 95 %. disagreement : of n-p-q, on the random subset
+    from the nominal orbit. undecided : boards that were asked and have no answer; if_lost, if_ok :
+    the estimate if ngspice lost all of these, and if it called all of them ok."""
+
+    estimate: float
+    low: float
+    high: float
+    disagreement: Rate
+    undecided: int
+    if_lost: float
+    if_ok: float
+    strata: tuple[Stratum, ...]
+    differences: tuple[Disagreement, ...]
+
+    @property
+    def width(self) -> float:
+        return self.high - self.low
+
+
+def combine(
+    answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
+) -> Combined | None:
+    """Both engines on one question; None where ngspice has no answer from the nominal orbit.
+
+    answers, heard : of this question, by sample.
+    """
+    mine = {a.sample: a for a in answers if a.verdict is not Verdict.FAILED}
+    theirs = {
+        h.sample: said
+        for h in heard
+        if h.kind is Kind.NOMINAL and (said := h.survives(question)) is not None
+    }
+    theirs = {sample: said for sample, said in theirs.items() if sample in mine}
+    if not theirs:
+        return None
+    ok = sum(a.verdict is Verdict.OK for a in mine.values())
+    strata = tuple(_strata(list(mine.values()), theirs, heard, question))
+    estimate, low, high = interval(ok, strata)
+    silent = {
+        h.sample
+        for h in heard
+        if h.kind is Kind.NOMINAL and h.sample in mine and h.survives(question) is None
+    }
+
+    def if_all(said: bool) -> float:
+        whole = {**theirs, **dict.fromkeys(silent, said)}
+        return interval(ok, _strata(list(mine.values()), whole, heard, question))[0]
+
+    random = [h for h in heard if h.kind is Kind.NOMINAL and h.why in (Why.RANDOM, Why.ALL)]
+    known = {a.sample: a for a in answers}
+    agreed = [h.agrees(known[h.sample]) for h in random if h.sample in known]
+    return Combined(
+        estimate,
+        low,
+        high,
+        Rate(sum(a is False for a in agreed), sum(a is not None for a in agreed)),
+        len(silent),
+        if_all(False),
+        if_all(True),
+        strata,
+        tuple(differences(answers, heard, question)),
+    )
+
+
+def interval(ok: int, strata: Sequence[Stratum]) -> tuple[float, float, float]:
+    """Estimate and 95 % limits, from ``ok`` boards on the exact rung and the strata."""
+    total = sum(s.samples for s in strata)
+    estimate = ok / total
+    below = above = 0.0
+    for s in strata:
+        share = s.samples / total
+        estimate += share * (s.gained - s.lost) / s.asked
+        gain_below, gain_above = _off(s.gained, s.could_gain, s)
+        loss_below, loss_above = _off(s.lost, s.could_lose, s)
+        below += share**2 * (gain_below**2 + loss_above**2)
+        above += share**2 * (gain_above**2 + loss_below**2)
+    estimate = min(max(estimate, 0.0), 1.0)
+    low, high = wilson(estimate * total, total)
+    return (
+        estimate,
+        max(estimate - math.sqrt((estimate - low) ** 2 + below), 0.0),
+        min(estimate + math.sqrt((high - estimate) ** 2 + above), 1.0),
+    )
+
+
+def _off(count: int, could: int, stratum: Stratum) -> tuple[float, float]:
+    """How far below and above its estimate a rate of differences may be in its stratum.
+
+    could : boards of the stratum that could differ this way: only an ok one can be lost.
+    """
+    if stratum.asked == stratum.samples:
+        return 0.0, 0.0
+    rate = count / stratum.asked
+    low, high = wilson(float(count), stratum.asked)
+    high = max(min(high, could / stratum.samples), rate)
+    # Of a finite number of boards; what was asked is no longer uncertain.
+    finite = math.sqrt(1.0 - stratum.asked / stratum.samples)
+    return finite * (rate - low), finite * (high - rate)
+
+
+def _strata(
+    answers: Sequence[Answer],
+    theirs: dict[int, bool],
+    heard: Iterable[Hearing],
+    question: Question,
+) -> list[Stratum]:
+    """Boundary, slow, rest; one without an answer goes with the rest, the rest with another."""
+    near = set[int]()
+    if any(h.why is Why.BOUNDARY for h in heard):
+        far = sorted((distance(a, question.start), a.sample) for a in answers)
+        near = {sample for d, sample in far[:BOUNDARY_SAMPLES] if d < math.inf}
+    groups: dict[str, list[Answer]] = {"boundary": [], "slow": [], "rest": []}
+    for a in answers:
+        name = "boundary" if a.sample in near else "slow" if a.radius > SLOW else "rest"
+        groups[name].append(a)
+    spoken = [n for n, group in groups.items() if any(a.sample in theirs for a in group)]
+    home = next(name for name in ("rest", "slow", "boundary") if name in spoken)
+    for name, group in groups.items():
+        if name not in spoken:
+            groups[home] = groups[home] + group
+    return [_stratum(name, groups[name], theirs) for name in groups if name in spoken]
+
+
+def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> Stratum:
+    ok = {a.sample: a.verdict is Verdict.OK for a in answers}
+    asked = [sample for sample in ok if sample in theirs]
+    return Stratum(
+        name,
+        len(ok),
+        len(asked),
+        sum(theirs[s] and not ok[s] for s in asked),
+        sum(ok[s] and not theirs[s] for s in asked),
+        sum(not o for o in ok.values()),
+        sum(ok.values()),
+    )
+
+
+def differences(
+    answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
+) -> list[Disagreement]:
+    """Every board on which ngspice says another n-p-q, or two others at two step sizes, with what
+    explains it, if anything does."""
+    known = {a.sample: a for a in answers}
+    stayed = {
+        h.sample
+        for h in heard
+        if h.kind is Kind.OWN and h.sample in known and h.agrees(known[h.sample])
+    }
+    return [
+        Disagreement(
+            h.sample,
+            h.kind,
+            h.why,
+            known[h.sample].response,
+            h.either or h.response,
+            distance(known[h.sample], question.start),
+            _explain(known[h.sample], h, question, h.sample in stayed),
+        )
+        for h in heard
+        if h.sample in known and h.agrees(known[h.sample]) is False
+    ]
+
+
+def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) -> Explanation:
+    """The first that applies: what ngspice cannot resolve comes before what is only unlikely."""
+    extremes = question.start.extremes
+    peak = float(np.abs(extremes[0]).max()) if len(extremes) else math.nan
+    grazes = OrbitStatus.GRAZING in (answer.response, said.response)
+    if grazes or min(answer.penetration, answer.miss) < STROBE_TOLERANCE * peak:
+        return Explanation.GRAZING
+    if answer.response == OrbitStatus.CLIPPED:
+        return Explanation.CLIPPED
+    if said.kind is Kind.NOMINAL and stayed:
+        return Explanation.BASIN
+    return Explanation.NONE

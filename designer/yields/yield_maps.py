@@ -1,0 +1,406 @@
+"""Yield over ω, over b, over the parts' grade, and over ω × grade: where to sit in a window.
+
+At each point the nominal circuit's wanted orbit is continued from the neighbouring point; where the
+nominal circuit does not show the response, the yield is 0 and the point is marked as not there. The
+same boards are asked at every point (and, over the grade, the same uniform numbers), so that
+neighbours differ by their setting and not by the draw. Over b the threshold stays and the
+generator's amplitude goes as 1/b.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit
+from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
+from designer.spread.spread import draw_many
+from designer.yields.verdict import Question, StudyPlan, Verdict, Yield, judge
+
+Over = Literal["omega", "b", "grade", "omega-grade"]
+OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade")
+Counts = NDArray[np.int64]
+
+POINTS = 17
+"""Of ω or b across a window; the setting in use is one more."""
+SAMPLES = 100
+GRADES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
+"""Of resistors and capacitors alike."""
+PACE, LARGEST_PACE = 0.0025, 0.01
+"""Relative: first and largest step of the search for the window's edges."""
+REACH = 0.3
+"""Relative: how far from the setting in use a window is followed."""
+HALVINGS = 6
+"""Of the last step, at each edge."""
+DOUBTED = 10
+"""Boards left open by a forecast that are settled before the others are taken for lost."""
+NEARLY_SYMMETRIC = 0.01
+"""Of the peak: a nominal orbit below it is past its pitchfork; bias currents leave it so much."""
+SEED_SHIFT = 1_000_003
+"""Added to the study's seed: a setting that was chosen on a map is judged on boards it has not
+seen."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """name : "omega", "b" or "grade" (a fraction, of resistors and capacitors)."""
+
+    name: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class YieldMap:
+    """Counts of a response on a grid of settings; every array has the axes' shape.
+
+    question : of the plan. there : whether the nominal circuit shows the response, with the
+    symmetry that is asked for. window : edges of the nominal circuit's window in the first axis's
+    unit, None over the grade; an edge at the reach of the search is marked in ``open`` (below,
+    above). used : the setting of the plan, at which the generator runs at ``frequency`` [Hz].
+    """
+
+    over: Over
+    question: int
+    axes: tuple[Axis, ...]
+    there: NDArray[np.bool_]
+    ok: Counts
+    lost: Counts
+    grazing: Counts
+    failed: Counts
+    samples: int
+    seed: int
+    used: float
+    window: tuple[float, float] | None
+    open: tuple[bool, bool]
+    attractors: int
+    seconds: float
+    frequency: float | None = None
+
+    def at(self, *index: int) -> Yield:
+        """The yield at one point."""
+        return Yield(*(int(a[index]) for a in (self.ok, self.lost, self.grazing, self.failed)))
+
+    @property
+    def rate(self) -> Array:
+        """ok/(samples - failed), 0 where the response is not there."""
+        return self._each(lambda y: 0.0 if np.isnan(y.rate) else y.rate)
+
+    @property
+    def low(self) -> Array:
+        """Lower end of the 95 % Wilson interval, 0 where the response is not there."""
+        return self._each(lambda y: y.interval[0])
+
+    @property
+    def high(self) -> Array:
+        """Upper end, 0 where the response is not there."""
+        return self._each(lambda y: y.interval[1])
+
+    @property
+    def recommended(self) -> tuple[float, ...] | None:
+        """The setting in use if none is better, else the best one, on every axis; None where no
+        board is ok anywhere.
+
+        The best has the interval with the highest lower end; a setting whose interval overlaps it
+        is as good. Of the rows of such neighbours that hold a best one, the middle of the longest.
+        Over the grade and of grades, the coarsest of those with the highest lower end. The nominal
+        circuit shows the response there.
+        """
+        counts = self.there & (self.ok > 0)
+        if not counts.any():
+            return None
+        low, high = (np.where(counts, end, -1.0) for end in (self.low, self.high))
+        best = float(low.max())
+        grade: tuple[float, ...] = ()
+        if low.ndim == 2:
+            column = int(np.flatnonzero((low == best).any(axis=0))[-1])
+            grade = (self.axes[1].values[column],)
+            low, high = low[:, column], high[:, column]
+        if self.over == "grade":
+            return (self.axes[0].values[int(np.flatnonzero(low == best)[-1])],)
+        values = np.array(self.axes[0].values)
+        equal = np.flatnonzero(high >= best)
+        if self.used in values[equal]:
+            return (self.used, *grade)
+        rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)
+        rows = [row for row in rows if (low[row] == best).any()]
+        longest = max(rows, key=lambda row: float(values[row[-1]] - values[row[0]]))
+        middle = 0.5 * (values[longest[0]] + values[longest[-1]])
+        nearest = longest[int(np.argmin(np.abs(values[longest] - middle)))]
+        return (float(values[nearest]), *grade)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "over": self.over,
+            "question": self.question,
+            "axes": [{"name": a.name, "values": list(a.values)} for a in self.axes],
+            "there": self.there.tolist(),
+            **{name: getattr(self, name).tolist() for name in _COUNTS},
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "samples": self.samples,
+            "seed": self.seed,
+            "used": self.used,
+            "frequency_hz": self.frequency,
+            "window": None if self.window is None else list(self.window),
+            "open": list(self.open),
+            "recommended": None if self.recommended is None else list(self.recommended),
+            "cost": {"attractors": self.attractors, "seconds": self.seconds},
+        }
+
+    def _each(self, value: Callable[[Yield], float]) -> Array:
+        out = np.zeros(self.there.shape)
+        for index in np.ndindex(self.there.shape):
+            if self.there[index]:
+                out[index] = value(self.at(*index))
+        return out
+
+
+_COUNTS = ("ok", "lost", "grazing", "failed")
+
+
+def yield_map(
+    plan: StudyPlan,
+    number: int,
+    over: Over,
+    b: float,
+    *,
+    values: Sequence[float] | None = None,
+    grades: Sequence[float] = GRADES,
+    samples: int = SAMPLES,
+    points: int = POINTS,
+    quick: bool = False,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> YieldMap:
+    """The yield of question ``number`` of the plan over one or two settings.
+
+    b : the clearance that the question's amplitude stands for. values : of ω or b; by default
+    ``points`` across the nominal circuit's window and the setting in use. samples : boards at each
+    point. quick : a forecast: the boards that ``Ensemble.quick`` leaves open at a setting are lost
+    if none of the first few of them (``DOUBTED``) shows the response once it is settled.
+    progress : called once an attractor.
+
+    Raises
+    ------
+    InputError : over is none of ``OVERS``; no value, no sample, a value that is not positive.
+    """
+    began = time.perf_counter()
+    if over not in OVERS:
+        raise InputError(None, "--map", over, f"one of {', '.join(OVERS)}")
+    _check("samples", [samples])
+    _check("points", [points])
+    _check("grade", grades)
+    if values is not None:
+        _check("b" if over == "b" else "omega", values)
+    question, seed = plan.questions[number], plan.seed + SEED_SHIFT
+    assert question.spec.omega is not None
+    used = b if over == "b" else question.spec.omega
+    walk = _Walk(plan, question, over, used, progress)
+    window, open_ = None, (False, False)
+    settings = [used]
+    if over != "grade":
+        if values is None:
+            (low, high), open_ = walk.window()
+            window = (low, high)
+            settings = sorted({used, *np.linspace(low, high, points).tolist()})
+        else:
+            settings = sorted(set(map(float, values)))
+    orbits = walk.orbits(settings)
+    chosen: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
+    shape = (len(settings), len(chosen))
+    counts = {name: np.zeros(shape, dtype=np.int64) for name in _COUNTS}
+    for column, grade in enumerate(chosen):
+        spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
+        ensemble = Ensemble(draw_many(plan.circuit, spread, seed, range(samples)))
+        drives = [walk.drive(value) for value in settings]
+        tasks = [
+            _Task(i, k, drives[i], o.start)
+            for k in range(samples)
+            for i, o in enumerate(orbits)
+            if o is not None
+        ]
+        found = _answered(ensemble, tasks, quick, question, jobs, progress)
+        for task, verdict in zip(tasks, found, strict=True):
+            counts[str(verdict or Verdict.LOST)][task.setting, column] += 1
+        walk.spent += len(tasks)
+    there = np.tile(np.array([[o is not None] for o in orbits]), (1, len(chosen)))
+    axes: tuple[Axis, ...] = (Axis("b" if over == "b" else "omega", tuple(settings)),)
+    if over == "grade":
+        axes = (Axis("grade", tuple(grades)),)
+    elif over == "omega-grade":
+        axes = (*axes, Axis("grade", tuple(grades)))
+    size = tuple(len(a.values) for a in axes)
+    return YieldMap(
+        over=over,
+        question=number,
+        axes=axes,
+        there=there.reshape(size),
+        ok=counts["ok"].reshape(size),
+        lost=counts["lost"].reshape(size),
+        grazing=counts["grazing"].reshape(size),
+        failed=counts["failed"].reshape(size),
+        samples=samples,
+        seed=seed,
+        used=used,
+        window=window,
+        open=open_,
+        attractors=walk.spent,
+        seconds=time.perf_counter() - began,
+        frequency=question.excitation.frequency,
+    )
+
+
+def _answered(
+    ensemble: Ensemble,
+    tasks: Sequence[_Task],
+    quick: bool,
+    question: Question,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Verdict | None]:
+    """Of each task; None where a forecast left it open to the last."""
+
+    def settle(some: Sequence[int]) -> list[Verdict | None]:
+        return _verdicts(ensemble.settle, [tasks[t] for t in some], question, jobs, progress)
+
+    if not quick:
+        return settle(range(len(tasks)))
+    found = _verdicts(ensemble.quick, tasks, question, jobs, progress)
+    for setting in dict.fromkeys(task.setting for task in tasks):
+        left = [t for t, task in enumerate(tasks) if task.setting == setting and found[t] is None]
+        settle_open(found, left, settle)
+    return found
+
+
+def settle_open(
+    found: list[Verdict | None],
+    left: Sequence[int],
+    settle: Callable[[Sequence[int]], Sequence[Verdict | None]],
+) -> None:
+    """Of the verdicts that a forecast leaves open, at these places, the first `DOUBTED` are put in
+    by ``settle``; the others too if one of those is ok."""
+    for some in (left[:DOUBTED], left[DOUBTED:]):
+        said = settle(some) if some else []
+        for k, verdict in zip(some, said, strict=True):
+            found[k] = verdict
+        if Verdict.OK not in said:
+            break
+
+
+class _Task(NamedTuple):
+    """A board to be asked, at a setting of this number."""
+
+    setting: int
+    board: int
+    drive: Drive
+    start: Array
+
+
+def _verdicts(
+    ask: Callable[..., Sequence[Orbit | None]],
+    tasks: Sequence[_Task],
+    question: Question,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Verdict | None]:
+    """Of each task; None where ``ask`` leaves it open."""
+    found = ask(
+        [t.board for t in tasks],
+        [t.drive for t in tasks],
+        np.array([t.start for t in tasks]),
+        jobs=jobs,
+        progress=progress,
+    )
+    return [None if o is None else judge(o, question.spec, question.start)[0] for o in found]
+
+
+class _Walk:
+    """The nominal circuit's wanted orbit along ω or b. spent : attractors sought."""
+
+    def __init__(
+        self,
+        plan: StudyPlan,
+        question: Question,
+        over: Over,
+        used: float,
+        progress: Callable[[], None],
+    ) -> None:
+        self.question, self.over, self.used = question, over, used
+        self.progress, self.spent = progress, 0
+        self._system: PiecewiseLinearSystem = Reduction(
+            plan.circuit, nominal_board(plan.circuit)
+        ).system()
+        self._known: dict[float, Orbit] = {used: question.start}
+
+    def drive(self, value: float) -> Drive:
+        """The generator at this ω or b."""
+        e, ratio = self.question.excitation, value / self.used
+        if self.over == "b":
+            return Excitation(e.frequency, e.amplitude / ratio, e.offset).drive
+        return Excitation(e.frequency * ratio, e.amplitude, e.offset).drive
+
+    def window(self) -> tuple[tuple[float, float], tuple[bool, bool]]:
+        """Edges of the window around the setting in use; whether each is only the search's end."""
+        (low, below), (high, above) = (self._edge(-1.0), self._edge(1.0))
+        return (low, high), (below, above)
+
+    def orbits(self, settings: Sequence[float]) -> list[Orbit | None]:
+        """The wanted orbit at each setting; None where the nominal circuit does not show it."""
+        found: dict[float, Orbit | None] = {}
+        for value in sorted(settings, key=lambda v: abs(v - self.used)):
+            near = min(self._known, key=lambda known: (abs(known - value), known))
+            found[value] = self._known.get(value) or self._try(value, near)
+        return [found[value] for value in settings]
+
+    def _try(self, value: float, near: float) -> Orbit | None:
+        self.spent += 1
+        self.progress()
+        try:
+            orbit = settle(Flow(self._system, self.drive(value)), self._known[near].start)
+        except ArithmeticError:
+            return None
+        spec = self.question.spec
+        if judge(orbit, spec, self.question.start)[0] is not Verdict.OK:
+            return None
+        if spec.symmetric is False and orbit.asymmetry < NEARLY_SYMMETRIC:
+            return None
+        self._known[value] = orbit
+        return orbit
+
+    def _edge(self, sign: float) -> tuple[float, bool]:
+        inside, pace = self.used, PACE
+        while True:
+            beyond = inside + sign * pace * self.used
+            if abs(beyond - self.used) > REACH * self.used:
+                return inside, True
+            if self._try(beyond, inside) is None:
+                break
+            inside, pace = beyond, min(1.5 * pace, LARGEST_PACE)
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inside + beyond)
+            if self._try(middle, inside) is None:
+                beyond = middle
+            else:
+                inside = middle
+        return inside, False
+
+
+def _check(name: str, values: Sequence[float]) -> None:
+    if not len(values):
+        raise InputError(None, name, list(values), "at least one value")
+    for value in values:
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(None, name, value, "a number > 0")

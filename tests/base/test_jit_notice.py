@@ -1,0 +1,40 @@
+"""What a user reads while a part of the engine is compiled."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from numba.core import event
+
+from designer.base.jit_notice import MOTION, PARTS, announced
+from designer.dynamics import kernel_four_state, kernel_general, kernel_modal
+
+
+def _compile(function: object) -> None:
+    data = {"dispatcher": SimpleNamespace(py_func=function)}
+    with event.trigger_event("numba:compile", data):
+        pass
+
+
+def _of(module: object) -> object:
+    return SimpleNamespace(__module__=getattr(module, "__name__", module))
+
+
+def test_each_part_is_announced_once_and_by_name() -> None:
+    said: list[str] = []
+    with announced(said.append):
+        _compile(_of("somebody.elses"))
+        assert said == []
+        for module in (
+            kernel_general,
+            kernel_modal,
+            kernel_four_state,
+            kernel_four_state,
+            kernel_general,
+        ):
+            _compile(_of(module))
+    _compile(_of("designer.dynamics.kernel_sweep"))
+    assert len(said) == 2
+    assert MOTION in said[0]
+    assert PARTS["circuit_kernel"] in said[1]
+    assert all("first use of this part" in line and "busy machine" in line for line in said)

@@ -1,0 +1,81 @@
+"""What a run says while it works."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+
+from designer.base.progress import EVERY, Lines, Terminal, how_far, progress_for, rate
+
+
+@pytest.mark.parametrize(
+    ("done", "total", "seconds", "said"),
+    [
+        (50, 200, 10.0, "50/200, 5/s, 0:00:30 left"),
+        (10, 100, 100.0, "10/100, 6/min, 0:15:00 left"),
+        (100_000, 1_000_000, 10_000.0, "100000/1000000, 10/s, 25:00:00 left"),
+        # The longest runs of ngspice come first: no word on the rest before a tenth is done.
+        (2, 834, 25.8, "2/834, 4.65/min"),
+        (83, 834, 100.0, "83/834, 49.8/min"),
+        (300, None, 10.0, "300 steps, 30/s"),
+    ],
+)
+def test_rate_and_time_left(done: int, total: int | None, seconds: float, said: str) -> None:
+    assert how_far(done, total, seconds) == said
+
+
+def test_rates() -> None:
+    assert [rate(v) for v in (1234.5, 1.0, 0.5)] == ["1.23e+03/s", "1/s", "30/min"]
+
+
+def test_lines_say_how_far_from_time_to_time(capsys: pytest.CaptureFixture[str]) -> None:
+    now = [0.0]
+    lines = Lines(lambda: now[0])
+    step = lines.stage("boards", 100)
+    for _ in range(100):
+        now[0] += EVERY / 10.0
+        step()
+    out, err = capsys.readouterr()
+    assert out == ""
+    first, *rest = err.splitlines()
+    assert first == "boards …"
+    assert len(rest) == 9  # the tenth would come with the end
+    assert rest[0] == "  10/100, 30/min, 0:03:00 left"
+    lines.stage("one step")()
+    assert capsys.readouterr().err == "one step …\n"
+
+
+def test_a_stage_of_unknown_length_is_not_silent(capsys: pytest.CaptureFixture[str]) -> None:
+    """Blame and yield maps seek as many attractors as it takes."""
+    now = [0.0]
+    step = Lines(lambda: now[0]).stage("blame")
+    for _ in range(60):
+        now[0] += 1.0
+        step()
+    first, *rest = capsys.readouterr().err.splitlines()
+    assert first == "blame …"
+    assert rest == ["  20 steps, 1/s", "  40 steps, 1/s", "  60 steps, 1/s"]
+
+
+def test_a_terminal_shows_a_bar_with_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Tty(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    shown = Tty()
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress_for(quiet=False) as progress:
+        assert isinstance(progress, Terminal)
+        step = progress.stage("boards", 3)
+        for _ in range(3):
+            step()
+        unknown = progress.stage("blame")
+        for _ in range(5):
+            unknown()
+    assert "5/5" in shown.getvalue()
+    assert "3/3" in shown.getvalue()
+    assert " left" in shown.getvalue()

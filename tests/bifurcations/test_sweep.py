@@ -1,0 +1,267 @@
+"""Sweeps, maps and basins: windows, hysteresis, blocks that are taken up again."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from designer.base.errors import InputError
+from designer.bifurcations import basins, parameter_map, sweep, window_ends
+from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.store import GridStore, SweepStore, work_hash
+from designer.bifurcations.sweep import Sweep, SweepPlan
+from designer.circuit.swept_board import BoardSubject
+from designer.dynamics import attractors
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.dynamics.steady_state import Course, Steady, by_flow
+from designer.model.swept_model import ModelSubject
+from designer.report import bifurcation_plots
+from tests.dynamics.test_modal_tables import PAPER
+
+SHORT, QUICK = Course(200, 20, 2000), Course(40, 16, 400)
+
+
+def _flow(omega: float) -> Flow:
+    return Flow(PAPER.second_order().piecewise_linear(), Drive(omega))
+
+
+def _plan(low: float, high: float, steps: int, *tracks: str, course: Course = SHORT) -> SweepPlan:
+    values = np.linspace(low, high, steps)
+    return SweepPlan(ModelSubject(PAPER), "omega", values, tracks, course=course)
+
+
+@pytest.fixture(scope="module")
+def both() -> Sweep:
+    """From below the end of 1-1-2 to above the pitchfork, down and up."""
+    return sweep.run(_plan(1.30, 1.55, 201, "down", "up"), jobs=2)
+
+
+def test_hysteresis(both: Sweep) -> None:
+    """Between 1.351 and 1.368 the asymmetric 1-1-1 and 1-1-2 coexist: which is shown depends on
+    where the sweep comes from. Settling from either end's state says the same."""
+    k = int(np.searchsorted(both.plan.values, 1.36))
+    down, up = both.steps["down"][k], both.steps["up"][k]
+    assert (down.response, down.symmetric) == ("1-1-1", False)
+    assert up.response in ("1-1-2", "1-2-1")
+    flow = _flow(float(both.plan.values[k]))
+    assert attractors.settle(flow, down.end).response == down.response
+    assert attractors.settle(flow, up.end).response == up.response
+
+
+def test_windows_are_what_the_steps_show(both: Sweep) -> None:
+    for track in both.plan.tracks:
+        windows = [w for w in both.windows if w.track == track]
+        assert sum(w.steps for w in windows) == len(both.plan.values)
+        for before, after in itertools.pairwise(windows):
+            assert before.high < after.low
+            assert (before.response, before.symmetric) != (after.response, after.symmetric)
+        for value, step in zip(both.plan.values, both.steps[track], strict=True):
+            (window,) = (w for w in windows if w.low <= value <= w.high)
+            assert (window.response, window.symmetric) == (step.response, step.symmetric)
+    (last,) = (w for w in both.windows if w.track == "down" and w.high > 1.54)
+    assert (last.response, last.symmetric) == ("1-1-1", True)
+    assert last.low == pytest.approx(1.46, abs=0.02)  # the pitchfork
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_windows_by_settling(both: Sweep, seed: int) -> None:
+    k = int(np.random.default_rng(seed).integers(len(both.plan.values)))
+    flow = _flow(float(both.plan.values[k]))
+    for track in both.plan.tracks:
+        step = both.steps[track][k]
+        orbit = attractors.settle(flow, step.end)
+        if step.status is OrbitStatus.PERIODIC:
+            assert (orbit.response, orbit.symmetric) == (step.response, step.symmetric)
+
+
+def test_each_step_starts_where_the_one_before_ended(both: Sweep) -> None:
+    """Against a plain loop over the slow version, where nothing is chaotic."""
+    values = both.plan.values[::-1][:4]
+    x = np.zeros(4)
+    for value, step in zip(values, both.steps["down"][::-1], strict=False):
+        slow = by_flow(_flow(float(value)), x, SHORT)
+        np.testing.assert_allclose(step.minima, slow.minima, atol=1e-9)
+        np.testing.assert_allclose(step.velocities, slow.velocities, atol=1e-9)
+        x = sweep.next_start(slow)
+
+
+def test_any_parameter() -> None:
+    """Over b at one frequency: b scales the response, so b and the drive are one parameter."""
+    subject = ModelSubject(PAPER, omega=0.85)
+    plan = SweepPlan(subject, "b", np.linspace(0.2, 0.3, 5), ("start 0",), course=SHORT)
+    for value, step in zip(plan.values, sweep.run(plan).steps["start 0"], strict=True):
+        system = PAPER.second_order().piecewise_linear()
+        drive = Drive(0.85, amplitude=PAPER.b / float(value))
+        other = by_flow(Flow(system, drive), np.zeros(4), SHORT)
+        assert step.response == other.response
+        if step.status is OrbitStatus.PERIODIC:
+            np.testing.assert_allclose(step.minima, other.minima * value / PAPER.b, atol=1e-7)
+
+
+def test_points_lie_within_the_sweep() -> None:
+    """The pitchfork at 1.46052 is within two steps of the first sweep, and inside the second."""
+    kinds = {}
+    for low in (1.462, 1.458):
+        made = sweep.run(_plan(low, 1.492, 11, "down"))
+        kinds[low] = [(str(p.kind), round(p.value, 5)) for p in window_ends.locate(made)]
+    assert kinds == {1.462: [], 1.458: [("pitchfork", 1.46052)]}
+
+
+def test_marks_are_of_stable_orbits_within_the_sweep() -> None:
+    def point(value: float, *stable: bool) -> Any:
+        return SimpleNamespace(kind="fold", value=value, stable=stable)
+
+    points = [point(1.0, True, False), point(1.1, False, False), point(1.2, True, True)]
+    points.append(point(1.3, True, False))
+    found = bifurcation_plots.marks(points, 1.0, 1.25)
+    assert [m.value for m in found] == [1.0, 1.2]
+
+
+def test_only_a_mirror_image_is_red() -> None:
+    """The twins at 1.43 are black and red. A motion of the same name that is not the mirror image,
+    made by stretching the first, gets another colour."""
+    omega = np.array([1.429, 1.43])
+    orbits = [attractors.settle(_flow(float(w)), np.zeros(4)) for w in omega]
+    twins = [attractors.twin(_flow(float(w)), o) for w, o in zip(omega, orbits, strict=True)]
+    plan = _plan(1.429, 1.43, 2, "start 0", "start 1")
+
+    def steps(starts: list[Any]) -> tuple[Steady, ...]:
+        settings = plan.subject.settings([{"omega": float(w)} for w in omega])
+        return tuple(s.steady(x, SHORT) for s, x in zip(settings, starts, strict=True))
+
+    first, second = steps([o.start for o in orbits]), steps([t.start for t in twins if t])
+    made = Sweep(plan, {"start 0": first, "start 1": second})
+    colours = {c for c, _, _ in bifurcation_plots._coloured(made)}
+    assert colours == {bifurcation_plots.BLACK, bifurcation_plots.RED}
+    other = tuple(replace(s, start=1.01 * s.start, minima=1.01 * s.minima) for s in first)
+    made = Sweep(plan, {"start 0": first, "start 1": other})
+    colours = {c for c, _, _ in bifurcation_plots._coloured(made)}
+    assert colours == {bifurcation_plots.BLACK, bifurcation_plots.DOTS[0]}
+
+
+def test_starts_show_what_coexists() -> None:
+    """At 1.55 the paper's model has 1-1-1 and 3-3-3."""
+    subject = ModelSubject(PAPER)
+    ends = [{"omega": 1.54}, {"omega": 1.56}]
+    plan = SweepPlan(
+        subject,
+        "omega",
+        np.linspace(1.54, 1.56, 5),
+        course=SHORT,
+        **sweep.from_starts(subject, ends, 12),
+    )
+    made = sweep.run(plan, jobs=2)
+    assert {w.response for w in made.windows} == {"1-1-1", "3-3-3"}
+    assert {w.steps for w in made.windows} == {5}
+    assert {w.track for w in made.windows} == {"starts"}
+
+
+def test_one_worker_or_many(tmp_path: Path) -> None:
+    plan = _plan(0.9, 1.1, 150, "down", "up", course=QUICK)
+    some, many = sweep.run(plan, jobs=1), sweep.run(plan, jobs=3)
+    assert _text(some) == _text(many)
+
+
+def _text(made: Sweep) -> str:
+    return repr({t: [s.__dict__ for s in steps] for t, steps in made.steps.items()})
+
+
+@pytest.mark.parametrize("tracks", [("down", "up"), ("start 0",)])
+def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]) -> None:
+    """Chaotic steps: what comes after a block depends on its last digit."""
+    plan = _plan(0.9, 1.1, 150, *tracks, course=QUICK)
+
+    def store(name: str, work: str = "w") -> SweepStore:
+        (tmp_path / name).mkdir(exist_ok=True)
+        return SweepStore(tmp_path / name, "omega", work, {"seed": None})
+
+    whole = sweep.run(plan, store=store("whole"))
+    for track in tracks:
+        for kept in range(3):
+            place = store(f"{track}{kept}")
+            for number in range(kept):
+                name = SweepStore.name(track, number)
+                (place.root / name).parent.mkdir(exist_ok=True)
+                (place.root / name).write_bytes((tmp_path / "whole" / name).read_bytes())
+            assert _text(sweep.run(plan, store=place)) == _text(whole)
+            for path in sorted((tmp_path / "whole").rglob("*.parquet")):
+                if path.is_file():
+                    other = place.root / path.relative_to(tmp_path / "whole")
+                    assert other.read_bytes() == path.read_bytes()
+    foreign = store("whole", "another")
+    assert foreign.read(tracks[0], 0) is None  # of another sweep
+    assert work_hash(plan.as_dict()) != work_hash(_plan(0.9, 1.1, 151, *tracks).as_dict())
+
+
+def test_map_by_settling(tmp_path: Path) -> None:
+    plan = MapPlan(
+        ModelSubject(PAPER), "omega", np.linspace(0.8, 1.6, 12), "b", np.linspace(0.15, 0.4, 6)
+    )
+    store = GridStore(tmp_path, "map", "omega", plan.xs, "b", plan.ys, "w", {})
+    made = parameter_map.run(plan, jobs=2, store=store)
+    assert parameter_map.run(plan, store=store) == made  # read again
+    assert [(c.i, c.j) for c in made.cells] == [(i, j) for i in range(6) for j in range(12)]
+    assert sum(made.counts.values()) == 72
+    for cell in made.cells[::7]:
+        system = (
+            ModelSubject(PAPER)
+            .settings([{"omega": float(plan.xs[cell.j]), "b": float(plan.ys[cell.i])}])[0]
+            .flow()
+        )
+        orbit = attractors.settle(system, np.array(cell.strobe))
+        if cell.status is OrbitStatus.PERIODIC:
+            assert (orbit.response, orbit.symmetric) == (cell.response, cell.symmetric)
+            from_rest = attractors.settle(system, np.zeros(4))
+            assert from_rest.response == cell.response
+
+
+def test_basins_by_settling() -> None:
+    plan = BasinPlan(
+        ModelSubject(PAPER),
+        {"omega": 1.43},
+        "x1",
+        np.linspace(-1.5, 1.5, 9),
+        "x1'",
+        np.linspace(-2.0, 2.0, 8),
+        np.zeros(4),
+    )
+    made = basins.run(plan, jobs=2)
+    first, second = made.attractors[:2]
+    assert (first.response, first.symmetric) == (second.response, second.symmetric)
+    assert (first.twin, second.twin) == (1, 0)  # the two 1-1-1 without symmetry
+    assert sum(a.share for a in made.attractors) == pytest.approx(1.0)
+    flow = _flow(1.43)
+    for cell in made.cells[::5]:
+        orbit = attractors.settle(flow, plan.state(cell.i, cell.j))
+        met = made.attractors[cell.attractor]
+        laps = flow.run(np.array(met.strobe), orbit.n).strobes
+        assert orbit.response == met.response
+        assert np.abs(laps - orbit.start).max(axis=1).min() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "part"),
+    [
+        ("omega", 0.0, "0.001"),
+        ("k0", 1.0, "[0, 1)"),
+        ("b", -1.0, "> 0"),
+        ("beta", 1.0, "one of omega"),
+        ("zeta", float("inf"), "finite"),
+    ],
+)
+def test_values_outside_the_domain(name: str, value: float, part: str) -> None:
+    with pytest.raises(InputError) as caught:
+        ModelSubject(PAPER).check("--from", name, value)
+    assert caught.value.field == "--from"
+    assert part in str(caught.value)
+    with pytest.raises(InputError):
+        BoardSubject.check(BoardSubject.__new__(BoardSubject), "--from", "b", 1.0)

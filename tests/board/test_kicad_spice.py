@@ -1,0 +1,89 @@
+"""KiCad's SPICE netlist of the sheet against our own deck, for every kind of circuit and board."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from designer.board.kicad_project import files
+from designer.catalog.entries import Mounting
+from designer.check.first_responses import FirstRun
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import Drive
+from designer.spice import numerics_gate
+from designer.spice.pool import SpicePool
+from designer.spice.read_orbit import Read
+from tests.board.test_kicad_cli import same, spice
+from tests.shared.kicad_cases import project, written
+from tests.shared.stages import bought, model, one_sided, stage
+from tests.spice.test_rectifier_ngspice import LOW, SCALED
+
+pytestmark = [pytest.mark.kicad, pytest.mark.slow]
+
+RECTIFIER = stage("rectifier", "both", SCALED)
+HALVES = {**{n: v for n, v in SCALED.items() if n != "R50"}, "R50A": 4.64e3, "R50B": 4.64e3}
+# One generator feeds both masses: R12/R6 = (1 - f20)/f20 for equal capacitors.
+DRIVEN = {**SCALED, "R12": 71.5e3}
+
+CASES: dict[str, tuple[Circuit, Sides, float, Mounting, dict[float, str]]] = {
+    "rectifier": (RECTIFIER, "both", 0.0, "mixed",
+                  {1.55: "1-1-1", 0.54: "1-3-3", 0.215: "1-8-8"}),
+    "one-sided": (stage("saturation", "upper", bought(one_sided())), "upper", 0.0, "mixed",
+                  {1.2: "1-1-0"}),
+    "one-sided rectifier": (stage("rectifier", "lower", LOW), "lower", 0.0, "mixed",
+                            {0.54: "1-0-2"}),
+    "f20": (stage("rectifier", "both", DRIVEN, f20=0.2), "both", 0.2, "mixed", {0.85: "1-2-2"}),
+    "composites": (stage("rectifier", "both", HALVES, {"R50": "series"}), "both", 0.0, "mixed",
+                   {1.55: "1-1-1"}),
+    "through-hole": (RECTIFIER, "both", 0.0, "tht", {1.55: "1-1-1"}),
+    "surface": (RECTIFIER, "both", 0.0, "smd", {1.55: "1-1-1"}),
+}  # fmt: skip
+"""Circuit, its stops, f20, mounting, and the response by drive frequency."""
+
+
+def subject(circuit: Circuit, sides: Sides, f20: float, omega: float) -> numerics_gate.Subject:
+    """The nominal board at omega, started on the model's own orbit."""
+    wanted = model(sides, f20).second_order()
+    errors = coefficient_errors(circuit, wanted)
+    orbit = settle(Flow(wanted.piecewise_linear(), Drive(omega)), np.zeros(4))
+    excitation = Excitation(errors.scales.frequency(omega), 1.0 / errors.drive_gain[0])
+    reduction = Reduction(circuit, nominal_board(circuit))
+    flow = Flow(reduction.system(), excitation.drive)
+    return numerics_gate.Subject(
+        reduction, excitation, settle(flow, orbit.start * errors.scales.volts)
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_kicads_own_deck_shows_the_same_responses(name: str, tmp_path: Path) -> None:
+    """The n-p-q of the exact circuit and of our own deck, at the settings that pass the gate."""
+    circuit, sides, f20, mounting, wanted = CASES[name]
+    asked = [subject(circuit, sides, f20, omega) for omega in wanted]
+    assert [s.orbit.response for s in asked] == list(wanted.values())
+    jobs = []
+    with SpicePool(1) as pool:
+        for i, (each, result) in enumerate(
+            zip(asked, numerics_gate.check(pool, asked), strict=True)
+        ):
+            assert result.passed
+            own = numerics_gate.job(each, result.settings)
+            run = FirstRun(each.excitation, result.settings, own.stop_time, each.orbit.start)
+            sheet = replace(project(circuit, mounting), run=run)
+            folder = written(files(sheet), tmp_path / str(i))
+            theirs_text = spice(folder)
+            jobs += [own, replace(own, netlist=theirs_text)]
+        found = dict(pool.map(jobs))
+    for i, each in enumerate(asked):
+        ours, theirs = found[2 * i], found[2 * i + 1]
+        assert isinstance(ours, Read)
+        assert isinstance(theirs, Read), theirs
+        assert theirs.orbit.response == ours.orbit.response == each.orbit.response
+        same(ours.orbit, theirs.orbit)

@@ -1,0 +1,102 @@
+"""Distances: the fit against the law that it assumes, and boards against the study's own rung."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import norm
+
+from designer.centering.distance import LADDER, STREAM, Counts, Stretched
+from designer.centering.memory import Memory
+from designer.centering.windows import Place
+from designer.circuit.ensemble import Ensemble
+from designer.dynamics.attractors import STAGES
+from designer.spread.board_quantities import between
+from designer.spread.spread import draw_many
+from designer.yields.verdict import Verdict, judge
+from tests.shared.search_cases import made, spread
+
+COUNT = 6
+PATIENCE = sum(STAGES[:3])
+"""Drive periods after which the compiled way gives up."""
+
+
+def counts(distance: float, boards: int = 10**7) -> Counts:
+    """What so many boards show where the law holds."""
+    shown = [round(boards * float(norm.cdf(distance / s))) for s in LADDER]
+    return Counts(LADDER, (boards,) * len(LADDER), tuple(shown))
+
+
+@given(st.floats(-3.0, 4.5))
+def test_a_distance_is_found_again(distance: float) -> None:
+    assert counts(distance).distance == pytest.approx(distance, abs=2e-3)
+
+
+@given(st.lists(st.integers(0, 40), min_size=4, max_size=4), st.integers(0, 3), st.integers(1, 5))
+def test_more_boards_that_show_it_are_never_nearer(shown: list[int], rung: int, more: int) -> None:
+    better = list(shown)
+    better[rung] = min(better[rung] + more, 40)
+    asked = (40,) * 4
+    near = Counts(LADDER, asked, tuple(shown)).distance
+    assert Counts(LADDER, asked, tuple(better)).distance >= near - 1e-3
+
+
+def test_without_a_loss_it_is_finite() -> None:
+    found = Counts(LADDER, (64,) * 4, (64,) * 4)
+    # All but half a board at the largest stretch: the law's own answer for that yield.
+    assert 4.0 < found.distance < 12.0
+    assert found.predicted > 0.9999
+
+
+def test_the_boards_are_the_spread_s_stretched() -> None:
+    """The compiled shortcut counts what the study's rung, asked one by one, says."""
+    synthesis, response = made(), made().found[0]
+    bench = Stretched(synthesis.design, spread(), 5, COUNT)
+    place = Place(response.omega, response.b, response.orbit.start)
+    (stand,) = bench.stands([(response.spec, place)])
+    assert stand is not None
+    (found,) = bench.ask([stand], range(COUNT))
+
+    drawn = draw_many(synthesis.design.circuit, spread(), 5, range(COUNT), STREAM)
+    seen = 0
+    for number, stretch in enumerate(LADDER):
+        boards = Ensemble(between(drawn, np.full(COUNT, stretch)), fast=False)
+        orbits = boards.settle(
+            range(COUNT), [stand.drive] * COUNT, np.tile(stand.orbit.start, (COUNT, 1))
+        )
+        ok = [judge(o, response.spec, stand.orbit)[0] is Verdict.OK for o in orbits]
+        answered = Ensemble(boards.boards).quick(
+            range(COUNT), [stand.drive] * COUNT, np.tile(stand.orbit.start, (COUNT, 1))
+        )
+        # A board that takes long, or clips on its way, stays open: lost, in a prediction.
+        soon = sum(good and quick is not None for good, quick in zip(ok, answered, strict=True))
+        assert found.ok[number] == soon
+        assert all(o.periods <= PATIENCE for o in answered if o is not None)
+        seen += soon
+    assert seen > len(LADDER) * COUNT // 2
+
+
+def test_a_place_without_the_response_has_no_stand() -> None:
+    bench = Stretched(made().design, spread(), 5, 1)
+    response = made().found[0]
+    there = Place(0.85, 0.25, response.orbit.start)
+    elsewhere = Place(0.6, 0.25, response.orbit.start)
+    stands = bench.stands([(response.spec, there), (response.spec, elsewhere)])
+    assert stands[0] is not None
+    assert stands[1] is None
+
+
+def test_what_is_known_is_not_asked_again() -> None:
+    memory, response = Memory(), made().found[0]
+    place = Place(response.omega, response.b, response.orbit.start)
+    steps: list[int] = []
+    answers = []
+    for _ in range(2):
+        bench = Stretched(made().design, spread(), 5, COUNT, memory=memory)
+        (stand,) = bench.stands([(response.spec, place)])
+        assert stand is not None
+        answers.append(bench.ask([stand], range(COUNT), progress=lambda: steps.append(1)))
+    assert answers[0] == answers[1]
+    assert len(steps) == 1  # one chunk of questions, once

@@ -1,0 +1,48 @@
+"""What a search remembers, and what of a file it trusts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from designer.centering.memory import Memory
+
+
+def fill(memory: Memory, questions: list[int]) -> list[int]:
+    """Ask; returns which had to be made."""
+    made: list[int] = []
+
+    def make(new: list[int]) -> list[tuple[int, ...]]:
+        made.extend(questions[k] for k in new)
+        return [(questions[k], 2 * questions[k]) for k in new]
+
+    answers = memory.get_all(list(questions), make)
+    assert answers == [(q, 2 * q) for q in questions]
+    return made
+
+
+def test_it_goes_on_where_it_was(tmp_path: Path) -> None:
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    fill(Memory(whole, "a"), [1, 2])
+    fill(Memory(whole, "a"), [3, 4])
+    assert fill(Memory(cut, "a"), [1, 2]) == [1, 2]
+    assert fill(Memory(cut, "a"), [1, 2]) == []
+    assert fill(Memory(cut, "a"), [3, 4]) == [3, 4]
+    assert cut.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize("kept", [0.4, 0.7, 0.95])
+def test_a_file_that_was_cut_short_ends_as_the_whole_one(tmp_path: Path, kept: float) -> None:
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    fill(Memory(whole, "a"), [1, 2, 3, 4, 5])
+    content = whole.read_bytes()
+    cut.write_bytes(content[: int(kept * len(content))])
+    made = fill(Memory(cut, "a"), [1, 2, 3, 4, 5])
+    assert 0 < len(made) <= 5
+    assert cut.read_bytes() == content
+
+
+def test_another_search_s_answers_are_not_taken(tmp_path: Path) -> None:
+    fill(Memory(tmp_path / "file", "a"), [1])
+    assert fill(Memory(tmp_path / "file", "b"), [1]) == [1]

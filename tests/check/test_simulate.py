@@ -1,0 +1,278 @@
+"""``designer simulate``: what its JSON says of an orbit, its pictures, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from designer import parse_model_file
+from designer.check import simulation
+from designer.cli import entry
+from designer.dynamics import flow
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.model import Dimensionless
+from designer.report import simulate_plots
+from tests.shared.model_text import PAPER_TABLE
+
+BASE = "format = 1\n" + PAPER_TABLE
+REQUIRED = (
+    "omega response status symmetric x1_max x1_min impact_velocities multipliers lyapunov others "
+    "cost"
+)
+ADDED = "n p q start asymmetry twin impacts penetration miss extremes reason engine trust"
+Captured = pytest.CaptureFixture[str]
+
+
+def _model(folder: Path, text: str = BASE) -> str:
+    path = folder / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def _answer(arguments: list[str], capfd: Captured, status: int = 0) -> Any:
+    assert entry.status([*arguments, "--json", "-q"]) == status
+    said = capfd.readouterr()
+    assert said.err == ""
+    return json.loads(said.out)
+
+
+def _refused(arguments: list[str], capfd: Captured, *words: str) -> None:
+    assert entry.status(arguments) == 2
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert "Traceback" not in said.err
+    for word in words:
+        assert word in said.err
+
+
+def _flow(omega: float) -> Flow:
+    model = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
+    return Flow(model.second_order().piecewise_linear(), Drive(omega), fast=False)
+
+
+# ---------------------------------------------------------------------------------------------
+# JSON
+
+
+@pytest.mark.parametrize("engine", ["model", "circuit"])
+def test_an_asymmetric_orbit(tmp_path: Path, capfd: Captured, engine: str) -> None:
+    answer = _answer(["simulate", _model(tmp_path), "--omega", "1.43", "--engine", engine], capfd)
+    (r,) = answer["responses"]
+    assert set(REQUIRED.split()) | set(ADDED.split()) <= set(r)
+    assert (r["response"], r["n"], r["p"], r["q"]) == ("1-1-1", 1, 1, 1)
+    assert r["symmetric"] is False
+    assert r["asymmetry"] > 0.1
+    # The orbit, from its start, by the general kernel.
+    run = _flow(1.43).run(np.array(r["start"]), 1, measure=True)
+    near = {"model": 1e-9, "circuit": 3e-3}[engine]
+    assert run.strobes[-1] == pytest.approx(r["start"], abs=near)
+    assert list(r["extremes"]) == ["x1", "x1'", "x2", "x2'"]
+    for extremes, found in zip(r["extremes"].values(), run.extremes, strict=True):
+        assert extremes == pytest.approx(list(found), abs=near)
+    assert r["extremes"]["x1"] == [r["x1_min"], r["x1_max"]]
+    assert [i["side"] for i in r["impacts"]] == ["upper", "lower"]
+    assert [i["velocity"] for i in r["impacts"]] == r["impact_velocities"]
+    assert [i["time"] for i in r["impacts"]] == pytest.approx(list(run.impacts.time), abs=near)
+    if engine == "model":
+        assert r["penetration"] == pytest.approx(run.penetration, abs=near)
+    # The twin: the mirror image, half a period on.
+    half = _flow(1.43).run(np.array(r["start"]), 1, points=2).strobes[1]
+    assert r["twin"]["response"] == "1-1-1"
+    assert r["twin"]["start"] == pytest.approx(list(-half), abs=near)
+    assert set(r["cost"]) == {"periods", "seconds"}
+    assert r["cost"]["periods"] > 20
+    assert r["engine"]["kernel"] in ("modal", "circuit", "general")
+    assert 0.0 < r["engine"]["undecided_below"] < 1e-9
+    assert answer["provenance"]["settings"]["strobe_tolerance"] == 1e-8
+
+
+def test_a_symmetric_orbit_is_its_own_twin(tmp_path: Path, capfd: Captured) -> None:
+    (r,) = _answer(["simulate", _model(tmp_path), "--omega", "0.85"], capfd)["responses"]
+    assert r["symmetric"] is True
+    assert r["twin"] is None
+    (other,) = r["others"]
+    assert other["response"] == "1-1-1"
+    assert {"twin", "impacts", "extremes", "start"} <= set(other)
+    times = [i["time"] for i in r["impacts"]]
+    assert times == sorted(times)
+    assert len(times) == r["p"] + r["q"] == 4
+    assert times[-1] < 2.0 * math.pi / 0.85
+
+
+def test_an_orbit_without_a_period(tmp_path: Path, capfd: Captured) -> None:
+    (r,) = _answer(["simulate", _model(tmp_path), "--omega", "0.45"], capfd)["responses"]
+    assert r["response"] == r["status"] == "aperiodic"
+    assert r["lyapunov"] > 0.0
+    assert r["twin"] is r["penetration"] is None
+    assert r["impacts"] == []
+    assert r["x1_max"] > 0.25
+
+
+def test_without_stops(tmp_path: Path, capfd: Captured) -> None:
+    model = _model(tmp_path, BASE.replace("k0 = 0.95", "k0 = 0.0"))
+    out = tmp_path / "p"
+    (r,) = _answer(["simulate", model, "--omega", "1", "--plots", str(out)], capfd)["responses"]
+    assert (r["response"], r["impacts"], r["miss"]) == ("1-0-0", [], None)
+    assert len(list(out.iterdir())) == 4
+
+
+def test_chattering_ends_with_a_status(
+    tmp_path: Path, capfd: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Flow.run
+
+    def nervous(self: Flow, *arguments: Any, **more: Any) -> flow.FlowResult:
+        return run(self, *arguments, **{**more, "max_events": 2})
+
+    monkeypatch.setattr(Flow, "run", nervous)
+    model, out = _model(tmp_path), tmp_path / "p"
+    answer = _answer(["simulate", model, "--omega", "0.3", "--plots", str(out)], capfd, 1)
+    (r,) = answer["responses"]
+    assert r["response"] == r["status"] == "not settled"
+    assert r["reason"] == "too many events"
+    assert r["x1_max"] is None
+    assert r["found"] is False
+    assert answer["files"] == []
+    assert entry.status(["simulate", model, "--omega", "0.3"]) == 1
+    assert "not settled: too many events" in capfd.readouterr().err
+
+
+# ---------------------------------------------------------------------------------------------
+# Pictures
+
+
+def test_pictures(tmp_path: Path, capfd: Captured) -> None:
+    model, out = _model(tmp_path), tmp_path / "far" / "p"
+    arguments = ["simulate", model, "--omega", "1.43", "--omega", "0.85", "--plots", str(out)]
+    files = _answer(arguments, capfd)["files"]
+    wanted = {
+        f"omega-{w}-{kind}.{form}"
+        for w in ("1.43", "0.85")
+        for kind in ("phase", "time")
+        for form in ("png", "svg")
+    }
+    assert set(files) == wanted == {p.name for p in out.iterdir()}
+    for path in out.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+    # Black and red where there are twins, black alone where there are none.
+    for kind in ("phase", "time"):
+        assert "#d40000" in (out / f"omega-1.43-{kind}.svg").read_text()
+        plain = (out / f"omega-0.85-{kind}.svg").read_text()
+        assert "#d40000" not in plain
+        assert "http" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", plain)
+    # The same again: refused, then replaced by equal ones; nothing else is touched.
+    (out / "mine.svg").write_text("mine")
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    _refused([*arguments, "-q"], capfd, "omega-1.43-phase.png", "--overwrite")
+    _answer([*arguments, "--overwrite"], capfd)
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+
+
+def test_the_drawn_twin_is_the_mirror_image(tmp_path: Path) -> None:
+    (found,) = simulation.simulate(parse_model_file(BASE), [1.43], traces=True)
+    one, two = (t.states for t in found.traces)
+    half = (len(one) - 1) // 2
+    assert np.abs(two[:half] + one[half:-1]).max() < 1e-8
+    figure = simulate_plots.portrait(found)
+    assert len(figure.axes[0].lines) == 2 + 2 + 4  # stops, curves, impacts by side
+
+
+def test_names_of_pictures() -> None:
+    assert simulate_plots.names([1.43, 0.5, 1.43, 1e-3]) == (
+        "omega-1.43",
+        "omega-0.5",
+        "omega-1.43-2",
+        "omega-0.001",
+    )
+
+
+def test_where_pictures_cannot_go(tmp_path: Path, capfd: Captured) -> None:
+    model = _model(tmp_path)
+    file = tmp_path / "file"
+    file.write_text("mine")
+    for out in (file, file / "below", file / "far" / "below"):
+        for more in ([], ["--overwrite"]):
+            arguments = ["simulate", model, "--omega", "1", "--plots", str(out), "-q", *more]
+            _refused(arguments, capfd, "--plots", "expected a directory")
+    assert file.read_text() == "mine"
+    blocked = tmp_path / "blocked"
+    (blocked / "omega-1-time.svg").mkdir(parents=True)
+    arguments = ["simulate", model, "--omega", "1", "--plots", str(blocked), "-q", "--overwrite"]
+    _refused(arguments, capfd, "omega-1-time.svg")
+    assert [p.name for p in blocked.iterdir()] == ["omega-1-time.svg"]
+
+
+def test_a_directory_without_the_right_to_write(
+    tmp_path: Path, capfd: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Rights do not bind the superuser, so the answer of the system is put in its mouth.
+    monkeypatch.setattr(os, "access", lambda _, mode, **__: not mode & os.W_OK)
+    arguments = ["simulate", _model(tmp_path), "--omega", "1", "--plots", str(tmp_path), "-q"]
+    _refused(arguments, capfd, "--plots", "no right to write")
+
+
+def test_a_full_disk_leaves_no_half_picture(
+    tmp_path: Path, capfd: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Path, *_: Any, **__: Any) -> int:
+        self.touch()
+        raise OSError(28, "No space left on device")
+
+    model, out = _model(tmp_path), tmp_path / "p"
+    monkeypatch.setattr(Path, "write_text", full)
+    arguments = ["simulate", model, "--omega", "1.43", "--plots", str(out), "-q"]
+    _refused(arguments, capfd, "--plots", "No space left")
+    assert {p.name for p in out.iterdir()} == {"omega-1.43-phase.png"}
+
+
+# ---------------------------------------------------------------------------------------------
+# Bad input
+
+
+@pytest.mark.parametrize(
+    "omega", ["0", "-1", "nan", "inf", "-inf", "1e-9", "1e9", "fast", "", "1,5"]
+)
+def test_frequencies_that_are_none(tmp_path: Path, capfd: Captured, omega: str) -> None:
+    out = tmp_path / "p"
+    arguments = ["simulate", _model(tmp_path), f"--omega={omega}", "-q", "--plots", str(out)]
+    _refused(arguments, capfd, "--omega")
+    assert not out.exists()
+
+
+def test_a_response_too_slow_to_wait_for(tmp_path: Path, capfd: Captured) -> None:
+    model = _model(tmp_path, BASE + "[[response]]\nomega = 1e-7\n")
+    _refused(["simulate", model, "-q"], capfd, "model.toml", "response[1].omega", "0.001")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("m", "0.0"),
+        ("m", "1.0"),
+        ("k", "0.0"),
+        ("k0", "1.0"),
+        ("k0", "-0.1"),
+        ("c", "1.0"),
+        ("zeta", "0.0"),
+        ("zeta", "nan"),
+        ("zeta", '"much"'),
+        ("f20", "1.5"),
+        ("b", "0.0"),
+        ("b", "-0.25"),
+        ("b", "inf"),
+    ],
+)
+def test_parameters_outside_their_domain(
+    tmp_path: Path, capfd: Captured, key: str, value: str
+) -> None:
+    text = re.sub(rf"^{key} = .*$", f"{key} = {value}", BASE, flags=re.MULTILINE)
+    arguments = ["simulate", _model(tmp_path, text), "--omega", "1", "-q"]
+    _refused(arguments, capfd, "model.toml", f"model.{key}", "expected")

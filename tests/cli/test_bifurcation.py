@@ -1,0 +1,301 @@
+"""The verb ``bifurcation``: what is printed, what is written, and that a kill loses nothing."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from designer.base.design_folder import Folder
+from designer.catalog.catalog import load_catalog
+from designer.circuit.swept_board import BoardSubject
+from designer.cli import entry
+from designer.dynamics import attractors
+from designer.jobs.design_files import load
+from designer.model.model_file import read_model_file
+from tests.cli.test_entry import BASE, WANTED, _process, _strict, _tree
+from tests.shared.model_text import COARSE_CIRCUIT
+from tests.shared.quick_folders import quick_folder
+
+SWEEP = ("--from", "1.40", "--to", "1.52", "--steps", "25")
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("bifurcation") / "small.toml"
+    path.write_text(BASE + WANTED + COARSE_CIRCUIT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def design(model: Path) -> Path:
+    return quick_folder(model.read_text(encoding="utf-8"), model.parent / "design")
+
+
+def _asked(capfd: pytest.CaptureFixture[str], *words: object) -> Any:
+    assert entry.status(["bifurcation", *map(str, words), "--json"]) == 0
+    return _strict(capfd.readouterr().out)
+
+
+def test_prints_windows_and_points(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    answer = _asked(capfd, model, *SWEEP)
+    assert list(model.parent.glob("*.parquet")) == []
+    first, last = answer["windows"][0], answer["windows"][-1]
+    assert {"from", "to", "response", "symmetric"} <= set(first)
+    assert (first["from"], first["response"], first["symmetric"]) == (1.4, "1-1-1", False)
+    assert (last["to"], last["response"], last["symmetric"]) == (1.52, "1-1-1", True)
+    (point,) = answer["points"]
+    assert {"parameter", "kind", "value"} <= set(point)
+    assert (point["parameter"], point["kind"]) == ("omega", "pitchfork")
+    assert first["to"] < point["value"] < last["from"]
+
+
+def test_writes_pictures_and_data_with_their_origin(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = (model, *SWEEP, "--down", "--up", "--no-points", "--out", out)
+    answer = _asked(capfd, *words)
+    written = _tree(out)
+    assert _strict(written["sweep.json"].decode())["windows"] == answer["windows"]
+    assert written["sweep.png"].startswith(b"\x89PNG")
+    assert b"<svg" in written["sweep.svg"]
+    manifest = _strict(written["manifest.json"].decode())
+    assert manifest["complete"] is True
+    assert set(manifest["files"]) == set(written) - {"manifest.json"}
+    for track in ("down", "up"):
+        path = out / "sweep.parquet" / f"{track}-000000.parquet"
+        table = pq.read_table(path, partitioning=None).to_pylist()
+        values = np.linspace(1.40, 1.52, 25)
+        np.testing.assert_array_equal(
+            [row["omega"] for row in table], values if track == "up" else values[::-1]
+        )
+        assert all(len(row["minima"]) == 30 for row in table)
+        said = json.loads(pq.read_schema(path).metadata[b"designer"])
+        assert said["provenance"]["model_sha256"] == answer["provenance"]["model_sha256"]
+        assert said["provenance"]["versions"]["designer"]
+    assert _asked(capfd, *words)["windows"] == answer["windows"]  # what is there
+    assert _tree(out) == written
+    assert entry.status(["bifurcation", *map(str, words), "--periods", "100"]) == 2
+    assert "--overwrite" in capfd.readouterr().err
+    assert _tree(out) == written
+
+
+def test_files_of_others_are_left_alone(
+    model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert entry.status(["bifurcation", str(model), *SWEEP, "--no-points", "--out", str(out)]) == 0
+    (out / "map.png").write_text("mine")
+    before = _tree(out)
+    words = ["--map", "b", "0.2", "0.3", "3", "--out", str(out), "--overwrite"]
+    assert entry.status(["bifurcation", str(model), *SWEEP, *words]) == 2
+    assert "map.png" in capfd.readouterr().err
+    assert _tree(out) == before
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "letter.txt").write_text("mine")
+    assert entry.status(["bifurcation", str(model), *SWEEP, "--out", str(other)]) == 2
+    assert list(_tree(other)) == ["letter.txt"]
+
+
+BAD: list[tuple[str, str, str]] = [
+    ("--from 1 --to 1 --steps 5", "--to", "another value"),
+    ("--from 0 --to 1 --steps 5", "--from", "0.001"),
+    ("--from -1 --to 1 --steps 5", "--from", "0.001"),
+    ("--from 1 --to 2 --steps 1", "--steps", ">= 2"),
+    ("--from 1 --to 2", "--steps", "nothing"),
+    ("--from 1 --to 2 --steps 1000000", "--steps", "at most"),
+    ("--to 2 --steps 3", "--from", "nothing"),
+    ("--over k0 --from 0.5 --to 1 --steps 5", "--to", "[0, 1)"),
+    ("--over beta --from 0.5 --to 1 --steps 5", "--over", "one of omega"),
+    ("--over b --from 0.1 --to 1 --steps 5 --omega 0", "--omega", "0.001"),
+    ("--from 1 --to 2 --steps 3 --omega 1", "--omega", "swept"),
+    ("--from 1 --to 2 --steps 3 --starts 0", "--starts", ">= 1"),
+    ("--from 1 --to 2 --steps 3 --starts 2 --up", "--starts", "without"),
+    ("--from 1 --to 2 --steps 3 --periods -1", "--periods", ">= 0"),
+    ("--from 1 --to 2 --steps 3 --keep 0", "--keep", ">= 1"),
+    ("--from 1 --to 2 --steps 3 --jobs 0", "--jobs", ">= 1"),
+    ("--from 1 --to 2 --steps 3 --map omega 1 2 3", "--map", "another"),
+    ("--from 1 --to 2 --steps 3 --map b 1 1 3", "--map", "another value"),
+    ("--from 1 --to 2 --steps 3 --map b -1 1 3", "--map", "> 0"),
+    ("--from 1 --to 2 --steps 3 --map b 1 2 3 --down", "--down", "none with --map"),
+    ("--from 1 --to 2 --steps 9000 --map b 1 2 9000", "--map", "points in all"),
+    ("--basins --steps 9000 --map x1' -1 1 9000", "--map", "points in all"),
+    ("--basins --over b", "--over", "x1"),
+    ("--basins --map x1 -1 1 3", "--map", "another state"),
+    ("--circuit --from 1 --to 2 --steps 3", "--circuit", "design folder"),
+]
+
+
+@pytest.mark.parametrize(("options", "field", "part"), BAD)
+def test_bad_input(
+    model: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    options: str,
+    field: str,
+    part: str,
+) -> None:
+    out = tmp_path / "out"
+    assert entry.status(["bifurcation", str(model), *options.split(), "--out", str(out)]) == 2
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert field in said.err
+    assert part in said.err
+    assert "Traceback" not in said.err
+    assert not out.exists()
+
+
+def test_needs_a_frequency(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(BASE, encoding="utf-8")
+    words = [
+        "bifurcation",
+        str(path),
+        "--over",
+        "b",
+        "--from",
+        "0.2",
+        "--to",
+        "0.3",
+        "--steps",
+        "3",
+    ]
+    assert entry.status(words) == 2
+    assert "--omega" in capfd.readouterr().err
+    answer = _asked(capfd, *words[1:], "--omega", "1.55", "--no-points")
+    assert answer["parameter"] == "b"
+    assert {w["response"] for w in answer["windows"]} == {"1-1-1"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tracks", [["--down", "--up"], ["--starts", "2"]])
+def test_goes_on_after_a_kill(model: Path, tmp_path: Path, tracks: list[str]) -> None:
+    """And again after a Ctrl-C. What was finished is kept to the byte, and the whole is that of
+    one process: in chaos each step shows every digit of the state handed over to it."""
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    words: list[str | Path] = [
+        "bifurcation",
+        model,
+        "--from",
+        "0.9",
+        "--to",
+        "1.2",
+        "--steps",
+        "450",
+    ]
+    words += ["--periods", "400", "--no-points", *tracks]
+    assert _finished(*words, "--out", whole)[0] == 0
+    blocks = len(list((whole / "sweep.parquet").iterdir()))
+    for number, (count, how) in enumerate(((2, signal.SIGKILL), (9, signal.SIGINT))):
+        process = _process(*words, "--out", out, *(["--resume"] if number else []))
+        while process.poll() is None:
+            if len(list((out / "sweep.parquet").glob("*-0*.parquet"))) >= count:
+                process.send_signal(how)
+                break
+            time.sleep(0.005)
+        process.communicate(timeout=60)
+        assert process.returncode == (130 if how is signal.SIGINT else -9)
+        assert json.loads((out / "manifest.json").read_text())["complete"] is False
+        assert count <= len(list((out / "sweep.parquet").glob("*-0*.parquet"))) < blocks
+    kept = {p: p.read_bytes() for p in (out / "sweep.parquet").glob("*-0*.parquet")}
+    status, said = _finished(*words, "--out", out)
+    assert status == 2
+    assert "--resume" in said
+    assert _finished(*words, "--out", out, "--resume")[0] == 0
+    assert all(path.read_bytes() == content for path, content in kept.items())
+    assert set(_tree(out)) == set(_tree(whole))
+    one, other = (json.loads((f / "sweep.json").read_text()) for f in (out, whole))
+    assert {**one, "cost": 0} == {**other, "cost": 0}
+    for path in sorted((whole / "sweep.parquet").iterdir()):
+        assert (out / "sweep.parquet" / path.name).read_bytes() == path.read_bytes()
+
+
+def _finished(*words: str | Path) -> tuple[int, str]:
+    """Exit status and standard error of a process of its own."""
+    process = _process(*words)
+    _, said = process.communicate(timeout=300)
+    return process.returncode, said
+
+
+def test_map_and_basins(model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    words = ["--from", "0.8", "--to", "0.9", "--steps", "4", "--map", "b", "0.2", "0.3", "3"]
+    answer = _asked(capfd, model, *words, "--out", out)
+    assert sum(answer["counts"].values()) == 12
+    assert answer["y"] == {"name": "b", "from": 0.2, "to": 0.3, "steps": 3}
+    assert len(list((out / "map.parquet").iterdir())) == 3
+    answer = _asked(
+        capfd, model, "--basins", "--omega", "1.43", "--steps", "6", "--map", "x1'", "-1", "1", "5",
+        "--out", out,
+    )  # fmt: skip
+    assert len(answer["cells"]) == 30
+    assert sum(a["share"] for a in answer["attractors"]) == pytest.approx(1.0)
+    table = pq.read_table(out / "basins.parquet" / "row-000002.parquet", partitioning=None)
+    assert {"x1", "x1'", "status"} <= set(table.column_names)
+    assert {"map.png", "map.svg", "map.json", "basins.png", "basins.svg"} <= set(_tree(out))
+
+
+def test_a_model_and_its_circuit_need_a_folder_each(
+    design: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert entry.status(["bifurcation", str(design), *SWEEP, "--no-points", "--out", str(out)]) == 0
+    before = _tree(out)
+    words = ["--circuit", "--from", "300", "--to", "310", "--steps", "3", "--no-points"]
+    capfd.readouterr()
+    assert entry.status(["bifurcation", str(design), *words, "--out", str(out)]) == 2
+    said = capfd.readouterr().err
+    assert "subject model" in said
+    assert "another folder" in said
+    assert _tree(out) == before
+
+
+def test_old_blocks_of_another_circuit_are_not_taken(design: Path) -> None:
+    """The part values are the same; what the catalogue says of the op-amps is not."""
+    modelfile = read_model_file(design / "model.toml")
+    made, again = (load(Folder(design), modelfile, load_catalog()).design for _ in range(2))
+    said = BoardSubject(made).as_dict()
+    assert said == BoardSubject(again).as_dict()
+    changes: tuple[dict[str, Any], ...] = ({"gain": 1e4}, {"bias": 1e-6}, {"saturation": 9.0})
+    for change in changes:
+        circuit = replace(made.circuit, **change)
+        other = BoardSubject(made)
+        other.design = replace(made, circuit=circuit)
+        assert other.as_dict()["parts"] == said["parts"]
+        assert other.as_dict() != said
+
+
+def test_circuit_in_hertz_and_volts(design: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """One step after another is what the board settles on at that frequency of the generator."""
+    modelfile = read_model_file(design / "model.toml")
+    made = load(Folder(design), modelfile, load_catalog()).design
+    low, high = made.errors.scales.frequency(0.80), made.errors.scales.frequency(0.88)
+    ends = ["--from", repr(low), "--to", repr(high), "--steps", "4", "--periods", "150"]
+    answer = _asked(capfd, design, "--circuit", *ends, "--no-points")
+    assert (answer["parameter"], answer["unit"]) == ("frequency", "Hz")
+    shown = {w["response"] for w in answer["windows"]}
+    x = np.zeros(4)
+    settled = set()
+    for setting in BoardSubject(made).settings(
+        [{"frequency": float(f)} for f in np.linspace(low, high, 4)[::-1]]
+    ):
+        orbit = attractors.settle(setting.flow(), x)
+        settled.add(orbit.response)
+        x = orbit.start
+    assert shown == settled == {"1-2-2"}
+    assert answer["windows"][0]["from"] == pytest.approx(low)
+    assert entry.status(["bifurcation", str(design), "--circuit", "--from", "1", "--to", "0"]) == 2
+    assert "Hz" in capfd.readouterr().err
+
+
+def test_reproduce_says_what_there_is_not(capfd: pytest.CaptureFixture[str]) -> None:
+    assert entry.status(["reproduce", "everything"]) == 2

@@ -1,0 +1,247 @@
+"""Steady motions by the compiled engine: against the general flow, and against integration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from designer.base.arrays import Array
+from designer.dynamics import attractors, kernel_classify, kernel_sweep, modal_tables, steady_state
+from designer.dynamics.flow import MAX_EVENTS, Flow
+from designer.dynamics.kernel_modal import CHANGE, WIDTH
+from designer.dynamics.orbit import MAX_PERIOD, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.dynamics.steady_state import Course, Setting, Steady, by_flow
+from designer.model.model import Dimensionless
+from designer.model.swept_model import ModelSubject
+from designer.model.swept_tables import ModalBatch
+from tests.dynamics.test_modal_tables import PAPER, cases
+from tests.shared.oracles import Plain
+
+PLAIN = Plain(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
+PERIODIC = (1.55, 1.43, 0.85, 0.54, 0.41, 0.337, 0.284, 0.24, 0.215, 0.3, 0.1, 1.085, 0.7)
+CHAOTIC = (1.0, 1.2, 0.95, 0.6, 0.66, 0.48)
+
+
+def setting(omega: float, model: Dimensionless = PAPER) -> Setting:
+    (made,) = ModelSubject(model).settings([{"omega": omega}])
+    assert made.tables is not None
+    return made
+
+
+def flow(omega: float, model: Dimensionless = PAPER) -> Flow:
+    return Flow(model.second_order().piecewise_linear(), Drive(omega), fast=False)
+
+
+def exact(omega: float, x: Array) -> tuple[Array, float, float]:
+    """State and least x1 after one period from x, and the growth of a tangent vector, by DOP853."""
+    v = np.array([0.5, -0.3, 0.7, 0.4])
+
+    def rhs(t: float, z: Array) -> list[float]:
+        side = PLAIN.side_of(z[0])
+        dx = PLAIN.rhs(t, z[:4], omega, side)
+        base = PLAIN.rhs(t, np.zeros(4), omega, side)
+        free = PLAIN.rhs(t, z[4:], omega, side)
+        return [*dx, *(np.array(free) - base)]
+
+    period = 2.0 * math.pi / omega
+    found = solve_ivp(
+        rhs,
+        (0.0, period),
+        np.concatenate([x, v]),
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-13,
+        max_step=period / 2000,
+        dense_output=True,
+    )
+    assert found.sol is not None
+    x1 = found.sol(np.linspace(0.0, period, 40001))[0]
+    end = found.y[:, -1]
+    return end[:4], float(x1.min()), float(np.linalg.norm(end[4:]) / np.linalg.norm(v))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(cases(), min_size=2, max_size=4))
+def test_tables_in_batches_equal_those_of_one(
+    chosen: list[tuple[Dimensionless, float, int]],
+) -> None:
+    models, omegas = [c[0] for c in chosen], [c[1] for c in chosen]
+    for model, omega, got in zip(models, omegas, ModalBatch().tables(models, omegas), strict=True):
+        want = modal_tables.tables(model.second_order().piecewise_linear(), Drive(omega))
+        assert (want is None) == (got is None)
+        if want is None or got is None:
+            continue
+        exists = [0] + [1] * (model.sides != "lower") + [2] * (model.sides != "upper")
+        for m in exists:
+            a = want.data[m * WIDTH : (m + 1) * WIDTH]
+            c = got.data[m * WIDTH : (m + 1) * WIDTH]
+            keep = np.isfinite(a)
+            for gone in {0, 1, 2} - set(exists):
+                keep[CHANGE + 28 * gone : CHANGE + 28 * gone + 28] = False
+            np.testing.assert_array_equal(a[~np.isfinite(a)], c[~np.isfinite(a)])
+            size = np.abs(a[keep]) + 1e-9 * np.median(np.abs(a[keep]))
+            assert (np.abs(a[keep] - c[keep]) <= 1e-9 * size + 1e-13).all()
+
+
+def test_rules_are_those_of_the_attractor() -> None:
+    assert kernel_classify.CHAOS == attractors.CHAOS
+    assert kernel_classify.NEAR == attractors.NEAR
+    assert kernel_classify.CLOSING == attractors.CLOSING
+    assert kernel_classify.STROBE == attractors.STROBE_TOLERANCE
+    assert kernel_classify.LONGEST == MAX_PERIOD
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_linear_algebra_of_size_four(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    M, r = rng.standard_normal((4, 4)), rng.standard_normal(4)
+    want = float(np.abs(np.linalg.eigvals(M)).max())
+    assert kernel_classify._radius(M) == pytest.approx(want, rel=1e-7)
+    assert kernel_classify._radius(np.diag([0.5, -0.9, 0.0, 0.1])) == pytest.approx(0.9)
+    x = r.copy()
+    assert kernel_classify._solve(M.copy(), x)
+    np.testing.assert_allclose(M @ x, r, atol=1e-9)
+    assert not kernel_classify._solve(np.ones((4, 4)), r)
+
+
+@pytest.mark.parametrize("omega", [1.55, 0.85, 0.54, 0.215, 1.0, 0.6])
+def test_least_displacement_and_exponent_against_integration(omega: float) -> None:
+    """One period from an arbitrary point of the attractor, chaotic ones too."""
+    x = setting(omega).steady(np.zeros(4), Course(100, 16, 0)).end
+    end, low, growth = exact(omega, x)
+    once = setting(omega).steady(x, Course(0, 1, 0))
+    np.testing.assert_allclose(once.end, end, atol=2e-7)
+    assert once.minima[0] == pytest.approx(low, abs=1e-6)
+    tables = setting(omega).tables
+    assert tables is not None
+    cursor = np.array([kernel_sweep.mode_of(tables.data, x), 0], dtype=np.int64)
+    v = np.array([[0.5], [-0.3], [0.7], [0.4]])
+    carried = flow(omega).run(x, 1, tangent=v).tangent
+    assert carried is not None
+    assert np.linalg.norm(carried) / np.linalg.norm(v) == pytest.approx(growth, rel=1e-4)
+    # and the kernel's own exponent over many periods is the flow's
+    at = x.copy()
+    mine = kernel_sweep.exponent(tables, at, cursor, 2 * np.pi / omega, MAX_EVENTS, 15)
+    start = flow(omega).run(x, 10, tangent=v)
+    assert start.tangent is not None
+    last = flow(omega).run(start.strobes[-1], 5, tangent=start.tangent)
+    assert last.tangent is not None
+    want = math.log(np.linalg.norm(last.tangent) / np.linalg.norm(start.tangent)) / 5
+    assert mine == pytest.approx(want, abs=1e-4)
+
+
+def _alike(a: Steady, b: Steady, tolerance: float) -> None:
+    np.testing.assert_allclose(a.minima, b.minima, atol=tolerance)
+    np.testing.assert_allclose(a.velocities, b.velocities, atol=tolerance)
+    np.testing.assert_allclose(a.end, b.end, atol=tolerance)
+
+
+@pytest.mark.parametrize("omega", PERIODIC)
+def test_periodic_motions_equal_the_slow_version(omega: float) -> None:
+    course = Course(500, 30)
+    fast, slow = (
+        setting(omega).steady(np.zeros(4), course),
+        by_flow(flow(omega), np.zeros(4), course),
+    )
+    assert fast.status is slow.status is OrbitStatus.PERIODIC
+    assert (fast.response, fast.symmetric) == (slow.response, slow.symmetric)
+    assert fast.radius == pytest.approx(slow.radius, abs=1e-6)
+    assert fast.lyapunov == pytest.approx(slow.lyapunov, rel=1e-5, abs=1e-6)
+    assert fast.lyapunov < 0.0
+    _alike(fast, slow, 1e-6)
+
+
+@pytest.mark.parametrize("omega", CHAOTIC)
+def test_chaos_shows_the_slow_version_for_a_while(omega: float) -> None:
+    x = setting(omega).steady(np.zeros(4), Course()).end
+    _alike(
+        setting(omega).steady(x, Course(0, 5, 0)), by_flow(flow(omega), x, Course(0, 5, 0)), 1e-8
+    )
+    motion = setting(omega).steady(x, Course())
+    assert motion.status is OrbitStatus.APERIODIC
+    assert motion.lyapunov * 2 * np.pi / omega > 0.3
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.12, 1.8))
+def test_names_what_settling_names(omega: float) -> None:
+    """Wherever a motion is periodic, settling from where it is says the same; a motion called
+    aperiodic is not periodic by settling either."""
+    seen = setting(omega).steady(np.zeros(4), Course())
+    orbit = attractors.settle(flow(omega), seen.end)
+    if seen.status is OrbitStatus.PERIODIC:
+        assert (orbit.response, orbit.symmetric) == (seen.response, seen.symmetric)
+        assert abs(orbit.radius - seen.radius) < 1e-6
+    elif orbit.status is OrbitStatus.PERIODIC:
+        # It was on a chaotic transient: later it is periodic, and so it is here.
+        assert seen.status in (OrbitStatus.APERIODIC, OrbitStatus.NOT_SETTLED)
+        later = setting(omega).steady(orbit.start, Course(50, 30))
+        assert later.response == orbit.response
+
+
+@pytest.mark.parametrize(
+    ("settled", "shown"),
+    [
+        (OrbitStatus.PERIODIC, "1-1-1"),
+        (OrbitStatus.GRAZING, "1-1-1"),  # as it was run, as in the compiled engine
+        (OrbitStatus.CLIPPED, "clipped"),
+        (OrbitStatus.NOT_SETTLED, "not settled"),
+    ],
+)
+def test_only_periodic_motions_are_counted(
+    settled: OrbitStatus, shown: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    orbit = replace(attractors.settle(flow(1.55), np.zeros(4)), status=settled)
+    monkeypatch.setattr(steady_state, "settle", lambda *_: orbit)
+    got = by_flow(flow(1.55), orbit.start, Course(4, 2))
+    assert got.response == shown
+    if shown == "1-1-1":
+        assert (got.n, got.p, got.q, got.symmetric) == (1, 1, 1, True)
+    else:
+        assert (got.n, got.p, got.q, got.symmetric) == (0, 0, 0, None)
+        assert math.isnan(got.radius)
+
+
+def test_one_sided_and_free_models() -> None:
+    upper = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.1, sides="upper")
+    got = setting(1.2, upper).steady(np.zeros(4), Course())
+    orbit = attractors.settle(flow(1.2, upper), got.end)
+    assert got.response == orbit.response
+    assert got.q == 0
+    free = Dimensionless(m=0.5, k=0.5, k0=0.0, c=0.5, zeta=0.1, f20=0.0, b=0.1)
+    (linear,) = ModelSubject(free).settings([{"omega": 1.2}])
+    assert linear.tables is None  # by the general flow
+    motion = linear.steady(np.zeros(4), Course(200, 16))
+    assert (motion.response, motion.symmetric) == ("1-0-0", True)
+    assert len(motion.velocities) == 0
+    assert np.ptp(motion.minima) < 1e-9
+
+
+def test_all_impacts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Room grows to what is met: chattering has more impacts than are allowed for."""
+    monkeypatch.setattr(steady_state, "ROOM", 1)
+    got = setting(0.215).steady(np.zeros(4), Course(40, 3, 0))
+    run = flow(0.215).run(np.zeros(4), 43, measure=True)
+    shown = (run.impacts.time > 40 * 2 * np.pi / 0.215) & (run.impacts.side > 0)
+    assert len(got.velocities) == shown.sum() > 3
+    np.testing.assert_allclose(got.velocities, run.impacts.state[shown, 1], atol=1e-8)
+
+
+def test_compiled_code_is_keyed_by_the_files_it_calls() -> None:
+    """A function that calls another file's kernel closes over a hash of that file's source."""
+    keyed = ("_dip", "_observe", "exponent", "travel")
+    for module, names in (
+        (kernel_sweep, keyed),
+        (kernel_classify, ("_lap", "_shoot", "_polish", "classify")),
+    ):
+        for name in names:
+            (cell,) = getattr(module, name).py_func.__closure__
+            assert cell.cell_contents == module.STAMP
+    assert kernel_sweep.stamp_of(modal_tables) != kernel_sweep.stamp_of(kernel_sweep)

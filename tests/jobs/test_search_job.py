@@ -1,0 +1,368 @@
+"""A search with its folder: written, reused, interrupted, and taken by every other verb."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from designer.base.design_folder import MODEL, Folder, StageName
+from designer.base.errors import InputError
+from designer.base.plain_json import dumps
+from designer.base.progress import Progress
+from designer.centering.levers import Choice
+from designer.centering.memory import Memory
+from designer.centering.resolved_file import resolved
+from designer.cli import entry as cli
+from designer.fidelity.trade_study import IDEAL, SHARE
+from designer.jobs import rung_choice
+from designer.jobs.options import Options
+from designer.jobs.search_job import confirms, searched_into, to_confirm
+from designer.model.model_file import ModelFile, parse_model_file, read_model_file
+from designer.yields.verdict import Verdict
+from tests.shared.search_cases import asked, made
+
+OPEN = 'omega = "best"\nexpect = "1-2-2"\nb = [0.25, 0.27]'
+MORE = "[spread]\noffset = 0\n"
+
+
+def run(*arguments: object) -> int:
+    return cli.status([str(a) for a in arguments])
+
+
+def read(path: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
+
+
+def files(folder: Path) -> dict[str, str]:
+    """Hashes of the files, those of JSON without their times."""
+    said = read(folder / "manifest.json")["files"]
+    return {name: entry["sha256"] for name, entry in said.items()}
+
+
+def with_trade(path: Path, rung: str, stage: StageName = "design", model: str = "") -> Folder:
+    """A folder with a finished trade that says this rung of its yields.
+
+    stage : what else there is, of the model file with the hash ``model``; as it is if "".
+    """
+    folder = Folder(path)
+    if model:
+        folder.begin({stage: ({"model": model}, ["design.json"])}, {})
+        folder.write("design.json", '{"format": 1}')
+        folder.finish(stage)
+    folder.begin({"trade": ({}, ["trade.json"])}, {})
+    row = {"question": SHARE, "of": IDEAL, "rung": rung, "measured": 0.005, "bound": 0.01}
+    said = {"format": 1, "cheapest": [row], "rungs": [], "truths": []}
+    folder.write("trade.json", dumps(said))
+    folder.finish("trade")
+    return folder
+
+
+class Heard(Progress):
+    """Keeps its notes."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+
+@pytest.mark.parametrize(
+    ("trade", "rung", "word"),
+    [
+        ("ideal", "ngspice", "every board in ngspice"),
+        ("circuit", "exact", "40 boards of each response"),
+        (None, "exact", "no trade of this design"),
+    ],
+)
+def test_the_final_study_takes_its_rung_by_a_trade_and_says_so(
+    tmp_path: Path, trade: str | None, rung: str, word: str
+) -> None:
+    folder = Folder(tmp_path) if trade is None else with_trade(tmp_path, trade)
+    heard = Heard()
+    assert rung_choice.for_search(folder, Options(), heard) == rung
+    assert word in heard.notes[0]
+    for asked_for in ("exact", "ngspice"):
+        options = Options(rung=asked_for)
+        assert rung_choice.for_search(folder, options, heard) == asked_for
+    assert len(heard.notes) == 1
+
+
+def test_a_rung_that_is_asked_for_stands_in_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = Options(rung="ngspice").command("search", Path("m.toml"), Path("out"))
+    assert "--rung ngspice" in said
+    assert "--rung" not in Options().command("search", Path("m.toml"), Path("out"))
+    assert run("search", tmp_path, "--yield", 0.9, "--rung", "exact", "-q") == 2
+    assert "--rung" in capsys.readouterr().err  # a cure is decided on the exact circuit
+
+
+@pytest.mark.parametrize("stage", ["design", "search"])
+def test_a_trade_counts_for_a_search_of_the_same_model_file(tmp_path: Path, stage: Any) -> None:
+    folder = with_trade(tmp_path, "ideal", stage, "this")
+    word = rung_choice.before_search(folder, "this")
+    assert word is not None
+    assert word.rung == "ngspice"
+    assert rung_choice.before_search(folder, "another") is None
+    assert rung_choice.before_search(Folder(tmp_path / "free"), "this") is None
+
+
+def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through interruptions, and until the design that was found has a trade of its own."""
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(asked(OPEN), encoding="utf-8")
+    with_trade(out, "ideal", "design", read_model_file(model).sha256)
+
+    def interrupted(*_: object, **__: object) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("designer.jobs.search_job.look", lambda *_: ())
+    monkeypatch.setattr("designer.jobs.search_job.design_search", interrupted)
+    words = ("search", model, "--out", out, "-q")
+    assert run(*words) == 2  # the design is one that no search made
+    assert run(*words, "--overwrite") == 130
+    kept = read(out / "manifest.json")["stages"]["search"]["kept"]["trade"]
+    assert kept["rung"] == "ngspice"
+    (out / "trade.json").unlink()  # as when the found design is written
+    assert run(*words, "--resume") == 130
+    assert read(out / "manifest.json")["stages"]["search"]["kept"]["trade"] == kept
+
+    found = Folder(tmp_path / "found")
+    stages: dict[StageName, Any] = {
+        "search": ({}, ["search.json"]),
+        "design": ({"model": "found"}, []),
+    }
+    found.begin(stages, {})
+    found.write("search.json", dumps({"format": 1, "trade": {**kept, "model": "found"}}))
+    found.finish("search")
+    choice = rung_choice.choose(found)
+    assert choice.rung == "ngspice"
+    assert "stood here before" in choice.reason
+    again = {**asdict(choice), "model": "found"}
+    found.write("search.json", dumps({"format": 1, "trade": again}))
+    assert rung_choice.choose(found) == choice  # said once, however often it is handed on
+    found.write("search.json", dumps({"format": 1, "trade": {**again, "model": "another"}}))
+    assert rung_choice.choose(found) == rung_choice.Choice("auto", "")  # of another design
+    with_trade(tmp_path / "found", "circuit")
+    assert rung_choice.choose(Folder(tmp_path / "found")).rung == "auto"
+    found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
+    with pytest.raises(InputError, match="what search wrote"):
+        rung_choice.choose(found)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What stands for a design that was found."""
+
+    modelfile: ModelFile
+    seconds: float = 0.0
+
+
+@pytest.mark.parametrize("earlier", [None, "auto"])
+def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
+    earlier: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Right after the manifest says that it has begun, with and without the file of an earlier
+    search that says another thing; resumed, the found design has the word."""
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    model.write_text(asked(OPEN), encoding="utf-8")
+    folder = with_trade(out, "ideal", "design", read_model_file(model).sha256)
+    if earlier is not None:
+        folder.begin({"search": ({}, ["search.json"])}, {})
+        said = {"rung": earlier, "reason": "another", "model": "another"}
+        folder.write("search.json", dumps({"format": 1, "trade": said}))
+        folder.finish("search")
+    begin = Folder.begin
+
+    def killed(self: Folder, wanted: Any, *rest: Any) -> None:
+        begin(self, wanted, *rest)
+        if "search" in wanted:
+            raise KeyboardInterrupt
+
+    file = read_model_file(model)
+    found = SimpleNamespace(made=Found(file), final=SimpleNamespace(choice=None))
+    for name, value in (
+        ("look", ()),
+        ("search", found),
+        ("search_json", {"format": 1}),
+        ("resolved", file),
+    ):
+        monkeypatch.setattr(f"designer.jobs.search_job.{name}", lambda *_, value=value, **__: value)
+    design = "designer.jobs.design_files"
+    monkeypatch.setattr(f"{design}.design_provenance", lambda _: {})
+    monkeypatch.setattr(f"{design}.texts", lambda _: {MODEL: file.text})
+    monkeypatch.setattr(f"{design}.write", lambda out, _, files: out.write(MODEL, files[MODEL]))
+    monkeypatch.setattr(Folder, "begin", killed)
+    with pytest.raises(KeyboardInterrupt):
+        searched_into(file, out, Options(jobs=1, overwrite=True), Progress())
+    monkeypatch.setattr(Folder, "begin", begin)
+    final = searched_into(file, out, Options(jobs=1, resume=True), Progress())
+    trade = read(out / "search.json")["trade"]
+    assert (trade["rung"], trade["model"]) == ("ngspice", final.sha256)
+    assert rung_choice.choose(Folder(out)).rung == "ngspice"
+    assert "kept" not in read(out / "manifest.json")["stages"]["search"]
+
+
+def test_forty_boards_of_each_response_confirm_even_where_some_have_no_answer() -> None:
+    answers: Any = [
+        SimpleNamespace(sample=i, question=q, verdict=Verdict.FAILED if i % 3 == q else Verdict.OK)
+        for i in range(100)
+        for q in (0, 1)
+    ]
+    asks = to_confirm(answers)
+    assert Counter(a.question for a in asks) == {0: 40, 1: 40}
+    assert all(a.sample % 3 != a.question for a in asks)
+    assert [a.sample for a in asks if a.question == 0][:3] == [1, 2, 4]
+    assert Counter(a.question for a in to_confirm(answers[:20])) == {0: 6, 1: 7}
+
+
+def test_a_resolved_file_says_what_was_open() -> None:
+    asked_file = parse_model_file(asked(OPEN, more=MORE))
+    synthesis = made()
+    found = resolved(asked_file, synthesis, Choice.of(asked_file.circuit), Path("model.toml"))
+    (response,) = found.responses
+    assert response.omega == synthesis.found[0].omega
+    assert response.b == synthesis.found[0].b
+    assert response.expect == asked_file.responses[0].expect
+    assert found.circuit == asked_file.circuit
+    assert found.spread == asked_file.spread
+    assert found.search == asked_file.search
+    assert (found.model, found.title) == (asked_file.model, asked_file.title)
+    assert found.sha256 == parse_model_file(found.text).sha256
+
+
+@pytest.mark.slow
+def test_a_search_from_end_to_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        "designer.centering.design_search.LEVERS", ("opamp", "dead zone", "amplitude")
+    )
+    model, whole, cut = (
+        tmp_path / "model.toml",
+        tmp_path / "whole" / "found",
+        tmp_path / "cut" / "found",
+    )
+    model.write_text(asked(OPEN, band=(0.75, 0.95)), encoding="utf-8")
+    # The folders have one name: the report states the command.
+    options = ("--samples", 60, "--jobs", 2, "-q")
+    assert run("search", model, "--out", whole, *options, "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+
+    # The keys of ``synthesise``, yields of fresh boards, and what the search did.
+    assert {"parts", "errors", "max_error", "certificate", "scales", "knobs"} <= set(answer)
+    (response,) = answer["responses"]
+    assert response["yield"]["samples"] == 60
+    assert response["yield"]["ok"] >= 58
+    assert response["limited_by"]["line"]
+    (confirmed,) = answer["confirmation"]["responses"]
+    assert answer["confirmation"]["rung"] == "dynamic"
+    assert confirmed["asked"] >= 40
+    assert confirmed["agreed"] >= 38
+    search = answer["search"]
+    assert search["final"]["smallest_distance"] >= search["start"]["smallest_distance"]
+    assert search["steps"]
+
+    # The chosen place stands wherever a verb looks for it.
+    (place,) = search["final"]["responses"]
+    assert 0.25 <= place["b"] <= 0.27
+    assert 0.75 <= place["omega"] <= 0.95
+    assert answer["knobs"][0]["omega"] == place["omega"]
+    with (whole / "setup.csv").open(encoding="utf-8", newline="") as stream:
+        assert float(next(csv.DictReader(stream))["omega"]) == place["omega"]
+    assert (whole / "asked.toml").read_bytes() == model.read_bytes()
+    written = parse_model_file((whole / "model.toml").read_text(encoding="utf-8"))
+    assert written.responses[0].omega == place["omega"]
+
+    # Again: nothing is done. With other inputs: refused.
+    before = files(whole)
+    assert run("search", model, "--out", whole, *options) == 0
+    assert files(whole) == before
+    assert run("search", model, "--out", whole, "--samples", 60, "--seed", 2, "-q") == 2
+    assert files(whole) == before
+
+    # Interrupted and resumed, it ends with the same files.
+    write, left = Memory._write, [3]
+
+    def interrupted(self: Memory, rows: dict[str, tuple[int, ...]]) -> None:
+        write(self, rows)
+        left[0] -= 1
+        if not left[0]:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Memory, "_write", interrupted)
+    assert run("search", model, "--out", cut, *options) == 130
+    monkeypatch.setattr(Memory, "_write", write)
+    assert not read(cut / "manifest.json")["complete"]
+    assert run("search", model, "--out", cut, *options) == 2
+    assert run("search", model, "--out", cut, *options, "--resume") == 0
+    assert files(cut) == before
+
+    # A trade of the found design that its final study does not suffice: the same search extends it.
+    trade = whole / "trade.json"
+    with_trade(whole, "ideal")
+    capsys.readouterr()
+    assert run("search", model, "--out", whole, *options, "--rung", "exact") == 0
+    assert not (whole / "ngspice.parquet").exists()
+    assert run("search", model, "--out", whole, *options[:-1], "--json") == 0
+    said = capsys.readouterr()
+    assert "every board in ngspice" in said.err
+    (response,) = json.loads(said.out)["responses"]
+    assert response["agreement"]["nominal_start"]["asked"] == 60
+    assert trade.exists()
+
+    # The folder is a design folder like any other.
+    capsys.readouterr()
+    assert run("simulate", whole, "--engine", "circuit", "-q", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["responses"][0]["response"] == "1-2-2"
+    moved = whole.rename(tmp_path / "moved")
+    assert run("tolerance", moved, "--samples", 60, "--rung", "exact", "--jobs", 2, "-q") == 0
+
+
+@pytest.mark.parametrize("verb", ["search", "synthesise", "run", "tolerance"])
+def test_what_cannot_be_sought_writes_nothing(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(asked('omega = "best"'), encoding="utf-8")
+    assert run(verb, model, "--out", tmp_path / "out", "-q") == 2
+    said = capsys.readouterr().err
+    assert str(model) in said
+    assert "response[1].expect" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_match_leaves_no_place_open(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(asked(OPEN, objective="match"), encoding="utf-8")
+    assert run("synthesise", model, "--out", tmp_path / "out", "-q") == 2
+    assert 'circuit.objective = "yield"' in capsys.readouterr().err
+    assert run("search", model, "--yield", 0.9, "--out", tmp_path / "out", "-q") == 2
+    assert "--yield" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("passed", "asked", "agreed", "held"),
+    [
+        (True, 40, 40, True),
+        (True, 40, 38, True),
+        (True, 40, 37, False),
+        (True, 0, 0, False),
+        (False, 40, 40, False),
+        (None, 40, 40, False),
+    ],
+)
+def test_what_ngspice_bears_out(passed: bool | None, asked: int, agreed: int, held: bool) -> None:
+    gate = None if passed is None else {"passed": passed}
+    assert confirms({"gate": gate, "asked": asked, "agreed": agreed}) is held

@@ -1,0 +1,253 @@
+"""The report's part on tolerance: it says what the layers hold, and nothing where they are not."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from designer.check import checked_design
+from designer.report import words
+from designer.report.data import ReportData
+from designer.report.design_tables import condition_table
+from designer.report.layers import Layers
+from designer.report.tables import provenance_table
+from designer.report.tolerance import facts
+from designer.report.write import render_html, render_markdown
+from designer.yields import study_plan
+from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame, Subject
+from designer.yields.corners import Corner
+from designer.yields.exact_rung import block
+from designer.yields.margins import Prediction
+from designer.yields.sobol import Index
+from designer.yields.verdict import Verdict
+from designer.yields.yield_maps import Axis, YieldMap
+from tests.report.test_write import Page
+from tests.shared.paper_cases import synthesised
+
+HOSTILE = "<b>x</b> | `y`"
+
+
+@dataclass(frozen=True)
+class Row:
+    sample: int
+    question: int
+    verdict: Verdict
+    bench_verdict: Verdict = Verdict.OK
+
+
+@dataclass(frozen=True)
+class Share:
+    count: int = 1
+    of: int = 40
+    interval: tuple[float, float] = (0.004, 0.13)
+
+
+@dataclass(frozen=True)
+class Other:
+    sample: int = 7
+    kind: str = "own"
+    exact: str = "1-1-1"
+    ngspice: str = "3-3-3"
+    explanation: str = "grazing margin"
+
+
+@dataclass(frozen=True)
+class Together:
+    estimate: float = 0.875
+    undecided: int = 2
+    if_lost: float = 0.86
+    if_ok: float = 0.885
+    low: float = 0.8
+    high: float = 0.925
+    disagreement: Share = Share()
+    differences: tuple[Other, ...] = (Other(),)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    text: str = f"switch on at 500 Hz {HOSTILE}"
+
+
+@pytest.fixture(scope="module")
+def plain() -> ReportData:
+    """Two responses, three boards, no layers."""
+    made = synthesised()
+    design, found = made.design, made.found[0:3:2]
+    modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
+    checked = checked_design.check(design, found, None)
+    plan = study_plan.plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
+    answers = tuple(block(plan, range(3), 2))
+    return ReportData(
+        modelfile,
+        design,
+        checked,
+        study_plan.yields(plan, answers),
+        answers,
+        plan,
+        [],
+        {},
+        "designer",
+    )
+
+
+def blamed(question: int, lost: int) -> ResponseBlame:
+    subjects = (
+        Subject("all offsets", "group", 9, 10, 1, 4),
+        Subject("U3C", "op-amp", 6, 10, 0, 4),
+        Subject("R204", "resistor", 0, 10, 0, 4),
+    )
+    return ResponseBlame(
+        question,
+        lost,
+        subjects if lost else (),
+        (Index("U3C.offset", "U3C", 0.2, 0.6), Index("R204", "R204", 0.1, 0.3)),
+        (NearLimit("stability: a fold", 1.5),),
+        Prediction(80, 20, 2, 3),
+        8,
+        1,
+        Corner(("U3C.offset",), ("high",), -1.0, Verdict.LOST, "2-2-2", 1, 2),
+        f"question {question} sentence {HOSTILE}",
+    )
+
+
+def mapped(question: int) -> YieldMap:
+    ok = np.array([0, 80, 100])
+    nothing = np.zeros_like(ok)
+    return YieldMap(
+        "omega", question, (Axis("omega", (0.8, 0.85, 0.9)),), np.array([False, True, True]), ok,
+        np.array([0, 20, 0]), nothing, nothing, 100, 1, 0.85, (0.82, 0.9), (False, True), 30, 0.1,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def full(plain: ReportData) -> ReportData:
+    tuned = [
+        Row(s, q, Verdict.LOST if (s, q) == (0, 1) else Verdict.OK)
+        for s in range(4)
+        for q in (0, 1)
+    ]
+    reached = [Row(s, 0, Verdict.OK) for s in range(4)] + [Row(9, 1, Verdict.FAILED)]
+    return replace(
+        plain,
+        layers=Layers(
+            tuned=tuned,
+            reached=reached,
+            combined=(Together(), None),
+            recipes=(Recipe(), Recipe("dwell for 2 s")),
+            blame=Blame((blamed(0, 10), blamed(1, 0)), 100, 1, 500, 300, 1.0),
+            maps=(mapped(1),),
+        ),
+    )
+
+
+def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
+    assert {k: v for k, v in facts(plain).items() if v} == {}
+    page = Page(render_html(plain))
+    text = page.text + render_markdown(plain)
+    for heading in ("Which part is to blame", "Where to sit", "As built, tuned", "How to reach"):
+        assert heading not in text
+    assert "#blame" not in {a.get("href") for a in page.named("a")}
+
+
+def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
+    table = facts(full)["kinds_table"]
+    assert table.columns == (
+        "response", "as built", "tuned", "tuned on the bench", "reached", "both engines together",
+    )  # fmt: skip
+    first, second, whole = table.rows
+    assert first[2].startswith("100 % (51 to 100)")  # Wilson's of 4 of 4
+    assert second[2].startswith("75 %")
+    assert first[5] == (
+        "87.5 % (80 to 92.5), 2 without an answer in ngspice: 86 % if these are lost, 88.5 % if ok"
+    )
+    assert second[4:] == ("–", "–")
+    assert whole[0] == "all on one board"
+    assert whole[2].startswith("75 %")
+
+
+def test_a_difference_says_where_ngspice_started(full: ReportData) -> None:
+    row = facts(full)["difference_table"].rows[0]
+    assert row[2] == (
+        "board 7 from its own orbit: exact circuit 1-1-1, ngspice 3-3-3 (grazing margin)"
+    )
+
+
+def test_every_response_has_its_start_recipe_without_power_ups(plain: ReportData) -> None:
+    assert facts(plain)["recipe_table"] is None
+    text = render_markdown(replace(plain, starts=("sweep down to 500 Hz", "switch on there")))
+    assert "How to reach a response" in text
+    assert "sweep down to 500 Hz" in text
+    assert "switch on there" in text
+
+
+def test_conditions_have_words_and_units(plain: ReportData) -> None:
+    rows = condition_table(plain.design).rows
+    assert rows
+    assert not {name for name, _ in rows} & {k.replace("_", " ") for k in plain.design.conditions}
+
+
+def test_the_provenance_has_the_spread_in_words(plain: ReportData) -> None:
+    assert plain.plan is not None
+    data = replace(plain, provenance={"seed": 1, "spread": plain.plan.spread.as_dict()})
+    rows = {row[0]: row[1] for row in provenance_table(data).rows}
+    assert set(rows) == {"seed", "spread"}
+    assert rows["spread"].startswith("bench-1: resistors uniform within ± 1 %")
+
+
+def test_an_interval_near_the_end_keeps_its_ends_apart() -> None:
+    assert words.span(0.99904, 1.0) == ("99.9", "100")
+    assert words.span(0.51, 1.0) == ("51", "100")
+    assert words.span(0.0, 0.0001) == ("0.00", "0.01")
+
+
+def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
+    said = facts(full)
+    assert len(said["avoided_table"].rows) == 1
+    (_, lost, groups, parts) = said["avoided_table"].rows[0]
+    assert lost == "10"
+    assert groups == "all offsets: 9 of 10 (60 to 98 %), 1 of 4 ok boards lost"
+    assert parts == "U3C: 6 of 10 (31 to 83 %)"
+    assert said["limit_table"].rows[0][2] == "95 of 100 (lost boards missed: 2, false alarms: 3)"
+    assert said["corner_table"].rows[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
+    assert "500 attractors" in said["blame_note"]
+
+
+def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:
+    row = facts(full)["map_table"].rows[0]
+    assert row[1] == "ω"
+    assert row[2] == "0.82 to 0.9 (as far as was looked)"
+    assert row[3].startswith("0.85: 80 %")
+    assert row[4].startswith("0.9: 100 %")
+
+
+def test_a_response_that_survives_nowhere_has_no_recommended_setting(full: ReportData) -> None:
+    none = replace(mapped(1), ok=np.zeros(3, dtype=np.int64), lost=np.array([0, 10, 10]))
+    data = replace(full, layers=replace(full.layers, maps=(none,)))
+    row = facts(data)["map_table"].rows[0]
+    assert row[-1] == "nowhere"
+    assert row[-2].startswith("0.85: 0")
+    assert "nowhere" in render_markdown(data)
+
+
+def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: ReportData) -> None:
+    html, markdown = render_html(full), render_markdown(full)
+    page = Page(html)
+    assert html == render_html(full)
+    for heading in (
+        "As built, tuned, trimmed, reached", "Where the engines differ", "How to reach a response",
+        "Which part is to blame", "Losses avoided", "Worst corners", "Where to sit",
+    ):  # fmt: skip
+        assert len(re.findall(rf"<h[23]>{heading}</h[23]>", html)) == 1
+        assert len(re.findall(rf"^##+ {heading}$", markdown, re.M)) == 1
+    assert {"#blame", "#maps"} <= {a.get("href") for a in page.named("a")}
+    assert "<b>x</b>" not in html
+    assert HOSTILE in page.text
+    assert "<b>" not in markdown.replace("\\<", "")
+    alts = [str(a["alt"]) for a in page.named("img")]
+    assert sum("losses" in a for a in alts) == 1
+    assert sum("Sobol" in a for a in alts) == 1
+    assert sum(a.startswith("Yield over omega") for a in alts) == 1
+    assert "exact circuit 1-1-1, ngspice 3-3-3 (grazing margin)" in page.text

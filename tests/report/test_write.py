@@ -1,0 +1,396 @@
+"""The report: complete, inert, self-contained, the same twice, and plain about what is missing."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from designer.base.errors import InputError
+from designer.board.board_parts import board_circuit
+from designer.board.bom import bill
+from designer.board.component import components
+from designer.catalog.catalog import Catalog, load_catalog
+from designer.check import checked_design
+from designer.check.synthesis_result import Synthesis
+from designer.dynamics.orbit import Orbit, OrbitStatus, failed
+from designer.jobs.origin import provenance
+from designer.model.model_file import Expect, parse_model_file
+from designer.report.data import ReportData
+from designer.report.tables import ngspice_table
+from designer.report.write import render_html, render_markdown, write_report
+from designer.spice.pool import SpicePool
+from designer.spice.simulator import SimulationFailed
+from designer.yields import study_plan
+from designer.yields.layers import Samples
+from designer.yields.ngspice_runs import hear
+from designer.yields.ngspice_sampling import Hearing, Kind, ask_random
+from designer.yields.run_result import RunResult
+from designer.yields.study import Study
+from designer.yields.verdict import Verdict
+from tests.shared.paper_cases import PAPER as EXAMPLE
+from tests.shared.paper_cases import synthesised
+
+HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
+VOID = {"meta", "img", "link", "br", "hr", "input"}
+
+
+@pytest.fixture(scope="session")
+def catalog() -> Catalog:
+    return load_catalog()
+
+
+@pytest.fixture(scope="session")
+def whole(catalog: Catalog) -> ReportData:
+    """A small run in which everything works: 1-1-1, its asymmetric kind, 1-2-2."""
+    made = synthesised()
+    modelfile = replace(made.modelfile, responses=made.modelfile.responses[:3])
+    found, design = made.found[:3], made.design
+    with SpicePool(2) as pool:
+        checked = checked_design.check(design, found, pool)
+        plan = study_plan.plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
+        answers = Samples(plan, range(4))(2, lambda: None)
+        heard = hear(plan, ask_random(answers), pool, 2)
+    circuit, choice = board_circuit(Synthesis(modelfile, catalog, found, design))
+    return ReportData(
+        modelfile=modelfile,
+        design=design,
+        checked=checked,
+        yields=study_plan.yields(plan, answers),
+        answers=tuple(answers),
+        plan=plan,
+        bom=[line.cells() for line in bill(components(circuit, catalog, choice))],
+        provenance=provenance(modelfile, catalog.hash, seed=1, spread=plan.spread.as_dict()),
+        command="designer run model.toml --samples 4 --seed 1 --out out",
+        heard=tuple(heard),
+    )
+
+
+@pytest.fixture(scope="session")
+def html(whole: ReportData) -> str:
+    return render_html(whole)
+
+
+class Page(HTMLParser):
+    """Tags, attributes and text of a page; fails on tags that do not balance."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, tag
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.text += data
+
+    def named(self, tag: str) -> list[dict[str, str | None]]:
+        return [attrs for name, attrs in self.tags if name == tag]
+
+    def images(self) -> Iterator[str]:
+        """Content of every image, which has to be an SVG inside the page."""
+        for attrs in self.named("img"):
+            kind, _, content = str(attrs["src"]).partition(",")
+            assert kind == "data:image/svg+xml;base64"
+            yield base64.b64decode(content, validate=True).decode("utf-8")
+
+
+def _broken(data: ReportData) -> ReportData:
+    """ngspice fails for the first, the second is not found, the third is lost in the circuit."""
+    first, second, third = data.checked
+    assert first.gate is not None
+    read = SimulationFailed("timestep too small <at> 1 ms")
+    first = replace(first, gate=replace(first.gate, read=read, passed=False))
+    spec = replace(second.model.spec, expect=Expect(3, 4, 5))
+    second = replace(second, model=replace(second.model, spec=spec, found=False))
+    third = replace(third, circuit=Orbit(OrbitStatus.APERIODIC, start=third.circuit.start))
+    assert data.plan is not None
+    plan = replace(data.plan, questions=data.plan.questions[:1])
+    answers = tuple(a for a in data.answers if a.question == 0)
+    return replace(
+        data,
+        checked=(first, second, third),
+        plan=plan,
+        answers=answers,
+        yields=study_plan.yields(plan, answers),
+    )
+
+
+def test_page_is_balanced_and_loads_nothing(html: str) -> None:
+    page = Page(html)
+    assert not re.search(r"https?:|//\w|@import|url\(", re.sub(r"base64,[\w+/=]+", "", html))
+    assert {tag for tag, _ in page.tags}.isdisjoint({"script", "link", "iframe", "object", "base"})
+    for tag, attrs in page.tags:
+        assert not any(name.startswith("on") for name in attrs), tag
+        assert (attrs.get("href") or "#").startswith("#")
+        assert (attrs.get("src") or "data:").startswith("data:")
+        assert "srcset" not in attrs
+    policy = {m.get("http-equiv"): m.get("content") for m in page.named("meta")}
+    assert str(policy["Content-Security-Policy"]).startswith("default-src 'none'; img-src data:;")
+    for svg in page.images():
+        assert set(re.findall(r"https?://([^/\"]+)", svg)) <= {"www.w3.org"}
+        assert "<script" not in svg
+
+
+def test_links_lead_to_sections_and_ids_are_unique(html: str) -> None:
+    page = Page(html)
+    ids = [attrs["id"] for _, attrs in page.tags if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    assert {str(a["href"])[1:] for a in page.named("a")} == set(ids)
+
+
+def test_every_image_says_what_it_shows(whole: ReportData, html: str) -> None:
+    page = Page(html)
+    assert all(len(str(attrs["alt"])) > 20 for attrs in page.named("img"))
+    assert len(page.named("img")) == 2 * len(whole.checked) + 3  # legend, yields, margins
+
+
+@pytest.mark.parametrize("kind", ["html", "markdown"])
+def test_every_response_appears_with_its_facts(whole: ReportData, html: str, kind: str) -> None:
+    text = html.replace("\u00a0", " ") if kind == "html" else render_markdown(whole)
+    for c in whole.checked:
+        assert f"ω = {c.model.omega:.4g} ({c.model.expected})" in text
+        assert f"{c.excitation.frequency:.4g} Hz" in text
+    for wanted in (
+        "All 3 responses were found",
+        "1-1-1, asymmetric",
+        "3-3-3",  # met beside 1-1-1 at 1.55
+        "TL074C",
+        "RC0603FR-0710KL",
+        "exact (&lt; 1e-12)",
+        "Proved optimal",
+        "4 simulated boards",
+        "all on one board",
+        whole.modelfile.sha256,
+        whole.command,
+    ):
+        assert wanted in text, wanted
+
+
+def test_markdown_tables_line_up(whole: ReportData) -> None:
+    rows = [line for line in render_markdown(whole).splitlines() if line.startswith("|")]
+    assert len(rows) > 60
+    for above, below in pairwise(rows):
+        if below.startswith(("| --", "| -:")):
+            assert len(above) == len(below)
+
+
+def test_the_same_data_give_the_same_bytes(whole: ReportData, html: str, tmp_path: Path) -> None:
+    write_report(whole, tmp_path / "report.html", tmp_path / "report.md")
+    assert (tmp_path / "report.html").read_bytes() == html.encode("utf-8")
+    assert (tmp_path / "report.md").read_bytes() == render_markdown(whole).encode("utf-8")
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_no_time_and_no_path_of_this_machine_stands_in_it(whole: ReportData, html: str) -> None:
+    slow = replace(whole, design=replace(whole.design, seconds=123456.0))
+    told = dict(whole.provenance) | {"cost": {"seconds": 99.5}}
+    assert render_markdown(replace(slow, provenance=told)) == render_markdown(whole)
+    assert str(EXAMPLE.parent) not in html + render_markdown(whole)
+
+
+def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
+    bom = [{**whole.bom[0], "manufacturer": HOSTILE, "part_number": "x" * 70}]
+    modelfile = replace(whole.modelfile, title=HOSTILE)
+    data = replace(whole, modelfile=modelfile, bom=bom, command=f"run\n{HOSTILE}")
+    plain, hostile = Page(html), Page(render_html(data))
+    assert hostile.text.count(HOSTILE) == 5  # title, heading, summary, BOM, command
+    assert {tag for tag, _ in plain.tags} == {tag for tag, _ in hostile.tags}
+    assert "49" not in hostile.text[: hostile.text.index("Portraits")]
+    markdown = render_markdown(data)
+    shown = [line for line in markdown.splitlines() if not line.startswith("    ")]
+    assert not any("<" in line or "`x`" in line for line in shown)
+    assert "{{7\\*7}}" in shown[0]
+    # As code, where nothing is markup, and on one line.
+    assert f"    run {' '.join(HOSTILE.split())}" in markdown.splitlines()
+
+
+def test_the_result_of_a_run_gives_the_data(whole: ReportData, catalog: Catalog) -> None:
+    assert whole.plan is not None
+    plan = replace(whole.plan, questions=whole.plan.questions[:2])
+    answers = tuple(a for a in whole.answers if a.question < 2)
+    study = Study(whole.checked, plan, (0, 1), {2: "the nominal circuit is aperiodic"}, answers)
+    found = tuple(c.model for c in whole.checked)
+    result = RunResult(whole.modelfile, catalog, found, whole.design, whole.checked, study)
+    data = ReportData.of(result, whole.command)
+    assert [y is None for y in data.yields or ()] == [False, False, True]
+    assert data.question_of == (0, 1, None)
+    assert data.bom == whole.bom
+    assert data.board is not None
+    assert 'alt="Schematic: ' in render_html(data)
+    assert data.command == whole.command
+    assert "1 response could not be studied" in render_markdown(data)
+
+
+def test_what_went_wrong_is_said_with_its_reason(whole: ReportData) -> None:
+    data = _broken(whole)
+    page = Page(render_html(data))
+    for wanted in (
+        "0 of 3 responses were found",
+        "ngspice gave no answer: timestep too small <at> 1 ms",
+        "ω = 1.43 (3-4-5): the model shows 1-1-1 instead",
+        "model 1-2-2 and exact circuit aperiodic differ",
+        "left out: the model does not show it",
+        "left out: the nominal circuit is aperiodic",
+        "2 responses could not be studied",
+        "trap (not passed)",
+    ):
+        assert wanted in page.text, wanted
+    assert "all on one board" not in page.text
+    assert "timestep too small &lt;at> 1 ms" in render_markdown(data)
+
+
+def test_yields_may_be_given_for_each_response(whole: ReportData) -> None:
+    data = _broken(whole)
+    assert data.yields is not None
+    padded = replace(data, yields=(data.yields[0], None, None))
+    assert render_markdown(padded) == render_markdown(data)
+
+
+def test_lost_boards_are_counted_by_reason(whole: ReportData) -> None:
+    kinds = [("to 1-3-3", "1-3-3"), ("asymmetric by 0.01 of the peak", "1-2-2")]
+    answers = []
+    for a in whole.answers:
+        lost = a.question == 2
+        reason, met = kinds[a.sample % 2]
+        answers.append(replace(a, verdict=Verdict.LOST, reason=reason, response=met) if lost else a)
+    assert whole.plan is not None
+    heard = [replace(h, response="1-9-9") if h.question == 2 else h for h in whole.heard]
+    data = replace(
+        whole,
+        answers=tuple(answers),
+        yields=study_plan.yields(whole.plan, answers),
+        heard=tuple(heard),
+    )
+    text = render_markdown(data)
+    assert "lost asymmetric (2), lost to 1-3-3 (2)" in text
+    assert "1-2-2 but 1-9-9 (2), 1-3-3 but 1-9-9 (2)" in text
+    assert "2 of 3 responses survive on every one" in text
+    assert "shown by 0 of 4: of a thousand boards, about 0 (95 % interval 0 to 490)" in text
+    assert data.all_on_one_board is not None
+    assert (data.all_on_one_board.ok, data.all_on_one_board.lost) == (0, 4)
+
+
+def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
+    answers = [replace(a, verdict=Verdict.FAILED, reason="no mode holds") for a in whole.answers]
+    assert whole.plan is not None
+    data = replace(whole, answers=tuple(answers), yields=study_plan.yields(whole.plan, answers))
+    text = Page(render_html(data)).text
+    assert "failed no mode holds (4)" in text
+    assert "4 simulated boards: not one gave an answer" in text
+    assert not re.search(r"\b(nan|inf)\b", text)
+    some = [replace(a, verdict=Verdict.FAILED) if a.sample == 3 else a for a in whole.answers]
+    data = replace(whole, answers=tuple(some), yields=study_plan.yields(whole.plan, some))
+    text = render_markdown(data)
+    assert "All 3 responses on one and the same board: 3 of 3; of a thousand, about 1000" in text
+    assert "3 runs gave no answer, which the yields leave out" in text
+
+
+def test_without_a_study(whole: ReportData) -> None:
+    data = replace(whole, yields=None, answers=(), plan=None, bom=[], provenance={})
+    for text in (Page(render_html(data)).text, render_markdown(data)):
+        assert "There is no tolerance study: none was made." in text
+        assert "No bill of materials was made." in text
+
+
+def test_without_ngspice(whole: ReportData) -> None:
+    checked = tuple(replace(c, gate=None) for c in whole.checked)
+    text = Page(render_html(replace(whole, checked=checked, heard=()))).text
+    assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
+    assert "ngspice was not asked about any board." in text
+    assert "responses found, ngspice was not asked" in text
+    assert "all engines agree" not in text
+
+
+def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportData) -> None:
+    def said(h: Hearing) -> Hearing:
+        word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(h.sample, h.response)
+        return replace(h, response=word, reason=f"why {word}")
+
+    data = replace(whole, heard=tuple(said(h) for h in whole.heard if h.kind is Kind.OWN))
+    table = ngspice_table(data)
+    assert table is not None
+    for row in table.rows:
+        boards, agreed, *others = map(int, row[2:7])
+        assert (agreed, others) == (boards - 3, [1, 1, 1])
+        assert "but 9-9-9 (1), why failed (1), why undecided (1)" in row[7]
+
+
+def test_without_responses(whole: ReportData) -> None:
+    data = replace(whole, checked=(), yields=(), answers=(), plan=None)
+    for text in (Page(render_html(data)).text, render_markdown(data)):
+        assert "no response is named" in text
+        assert "None was asked for." in text
+
+
+def test_engine_that_has_no_orbit_at_all(whole: ReportData) -> None:
+    first = whole.checked[0]
+    broken = replace(first, model=replace(first.model, orbit=failed("diverged"), found=False))
+    text = Page(render_html(replace(whole, checked=(broken, *whole.checked[1:])))).text
+    assert "the model shows failed (diverged) instead" in text
+
+
+def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) -> None:
+    errors = {**whole.design.errors.errors, "stop slope": 0.0123}
+    changed = replace(whole.design.errors, errors=errors, max_error=0.0123)
+    certificate = replace(whole.design.certificate, status="bound", lower_bound=0.004)
+    design = replace(whole.design, errors=changed, certificate=certificate)
+    page = Page(render_html(replace(whole, design=design)))
+    assert len(page.named("img")) == 2 * len(whole.checked) + 4
+    assert "this design reaches 1.23 %" in page.text
+    assert "stays below 0.4 %" in page.text
+
+
+def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
+    text = """
+        format = 1
+        title = "No stops"
+        [mechanical]
+        M1 = 2.0
+        M2 = 2.0
+        C1 = 40.0
+        C2 = 40.0
+        K0 = 0.0
+        K1 = 20000.0
+        K2 = 20000.0
+        B = 0.001
+        P1 = 50.0
+        P2 = 0.0
+        [[response]]
+        omega = 0.8
+        expect = "1-0-0"
+    """
+    modelfile = parse_model_file(text)
+    found, design = checked_design.design_for(modelfile, catalog)
+    checked = checked_design.check(design, found, None)
+    data = ReportData(modelfile, design, checked, None, (), None, [], {}, "designer run x")
+    page = Page(render_html(data))
+    assert "The response was found" in page.text
+    assert "contact begins" not in page.text
+    assert "20\u00a0kN/m" in page.text
+    assert "m/s" in page.text
+    assert "2\u00a0kg" in page.text
+
+
+def test_a_place_that_cannot_be_written(whole: ReportData, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a place that can be written"):
+        write_report(whole, tmp_path / "no" / "report.html", tmp_path / "no" / "report.md")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,33 @@
+"""Design folders for tests that ask nothing of the ways to start a response, which take longer to
+find than everything else that such a folder holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from designer.base.progress import Progress
+from designer.check.synthesis_result import Synthesis
+from designer.jobs import design_files
+from designer.jobs.options import Options
+from designer.jobs.synthesise_job import synthesise_into
+from designer.model.model_file import parse_model_file
+from designer.yields.start_recipe import Recipe
+
+
+def without_starts(patched: pytest.MonkeyPatch) -> None:
+    """No way to start any response is sought; ``setup.csv`` says so."""
+
+    def none(made: Synthesis, jobs: int) -> list[Recipe | None]:
+        return [None] * len(made.found)
+
+    patched.setattr(design_files, "start_recipes", none)
+
+
+def quick_folder(text: str, out: Path) -> Path:
+    """The design folder of this model file."""
+    with pytest.MonkeyPatch.context() as patched:
+        without_starts(patched)
+        synthesise_into(parse_model_file(text), out, Options(), Progress())
+    return out

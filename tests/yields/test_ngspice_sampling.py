@@ -1,0 +1,158 @@
+"""Who is asked in ngspice, and how its word is taken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from designer.circuit.netlist import Excitation
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.model_file import Expect, Response
+from designer.yields.ngspice_sampling import (
+    BOUNDARY_SAMPLES,
+    NOMINAL_SAMPLES,
+    OWN_SAMPLES,
+    SUBSET,
+    Ask,
+    Hearing,
+    Kind,
+    Why,
+    ask_all,
+    ask_boundary,
+    ask_differing,
+    ask_random,
+    distance,
+)
+from designer.yields.verdict import Answer, Question, Verdict
+
+BLANK = Answer(0, 0, Verdict.OK, "1-2-2", "", 0.5, 1.0, 1.0, 0.0, 40)
+HEARD = Hearing(0, 0, Kind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
+NOMINAL = Orbit(
+    OrbitStatus.PERIODIC, n=1, p=2, q=2, multipliers=np.array([0.5 + 0j]), penetration=2.0, miss=4.0
+)
+
+
+def question(expect: str | None = "1-2-2", nominal: Orbit = NOMINAL, **more: object) -> Question:
+    wanted = None if expect is None else Expect.parse(expect)
+    spec = Response(1.0, wanted, **more)  # type: ignore[arg-type]
+    return Question(spec, Excitation(300.0, 2.0), nominal, None)
+
+
+def test_the_random_subset_and_every_slow_one() -> None:
+    """Fifty at least from the nominal orbit; of two hundred, those above 0.9 too."""
+    radii = {i: 0.95 if i % 3 == 0 else math.nan if i % 3 == 1 else 0.9 for i in range(300)}
+    answers = [replace(BLANK, sample=i, radius=r) for i, r in radii.items()]
+    asks = ask_random(answers)
+    own = [a for a in asks if a.kind is Kind.OWN]
+    assert [a.sample for a in own] == list(range(OWN_SAMPLES))
+    nominal = {a.sample: a.why for a in asks if a.kind is Kind.NOMINAL}
+    assert NOMINAL_SAMPLES >= 50
+    assert nominal == {
+        i: Why.RANDOM if i < NOMINAL_SAMPLES else Why.SLOW
+        for i in range(SUBSET)
+        if i < NOMINAL_SAMPLES or i % 3 == 0
+    }
+    assert ask_random(answers[:60]) == [a for a in asks if a.sample < 60]
+    assert ask_random([replace(BLANK, verdict=Verdict.FAILED)]) == []
+
+
+def test_all_are_asked_where_all_are_wanted() -> None:
+    asks = ask_all(replace(BLANK, sample=i) for i in range(300))
+    assert [a.sample for a in asks if a.kind is Kind.NOMINAL] == list(range(300))
+    assert sum(a.kind is Kind.OWN for a in asks) == OWN_SAMPLES
+
+
+@pytest.mark.parametrize(
+    ("radius", "penetration", "miss", "expected"),
+    [
+        (0.5, 2.0, 4.0, 1.0),
+        (0.9, 2.0, 4.0, 0.2),
+        (0.5, 0.2, 4.0, 0.1),
+        (0.5, 2.0, 0.4, 0.1),
+        (0.5, math.inf, math.inf, 1.0),
+        (0.1, 20.0, 40.0, 1.8),
+        (1.0, 2.0, 4.0, 0.0),
+        (math.nan, math.inf, math.inf, math.inf),
+    ],
+)
+def test_the_distance_is_the_least_margin_over_the_nominal_one(
+    radius: float, penetration: float, miss: float, expected: float
+) -> None:
+    answer = replace(BLANK, radius=radius, penetration=penetration, miss=miss)
+    assert distance(answer, NOMINAL) == pytest.approx(expected)
+
+
+def test_the_nearest_to_a_boundary_are_asked_once() -> None:
+    rng = np.random.default_rng(3)
+    gaps = rng.permutation(400) / 400.0
+    answers = [
+        replace(BLANK, sample=i // 2, question=i % 2, penetration=float(gaps[i]))
+        for i in range(400)
+    ]
+    known = [Ask(i, 0, Kind.OWN, Why.RANDOM) for i in range(200)]
+    asks = ask_boundary(answers, [question(), question()], known)
+    for number in (0, 1):
+        mine = np.argsort(gaps[number::2])[:BOUNDARY_SAMPLES].tolist()
+        for kind in Kind:
+            met = {a.sample for a in asks if a.question == number and a.kind is kind}
+            assert met == (set() if (number, kind) == (0, Kind.OWN) else set(mine))
+    assert {a.why for a in asks} == {Why.BOUNDARY}
+
+
+def test_boards_that_differ_are_asked_from_their_own_orbit() -> None:
+    """Boards 0 and 1 agree, 2 has no answer, 3 to 5 differ and 3 is asked anyway; 6 differs from
+    its own orbit alone."""
+    answers = [replace(BLANK, sample=i) for i in range(7)]
+    said = ["1-2-2", "1-2-2", "undecided", "1-1-1", "1-1-1", "aperiodic"]
+    heard = [
+        replace(HEARD, sample=i, kind=Kind.NOMINAL, response=response)
+        for i, response in enumerate(said)
+    ]
+    heard.append(replace(HEARD, sample=6, response="1-1-1"))
+    asks = ask_differing(answers, heard, [Ask(3, 0, Kind.OWN, Why.RANDOM)])
+    assert asks == [Ask(i, 0, Kind.OWN, Why.DIFFERS) for i in (4, 5)]
+
+
+def test_agreement_and_survival() -> None:
+    assert HEARD.agrees(BLANK) is True
+    assert HEARD.survives(question()) is True
+    for said in ("failed", "undecided", "not settled", ""):
+        assert replace(HEARD, response=said).agrees(BLANK) is None
+        assert replace(HEARD, response=said).survives(question()) is None
+    for said in ("1-1-1", "aperiodic"):
+        assert replace(HEARD, response=said).agrees(BLANK) is False
+        assert replace(HEARD, response=said).survives(question()) is False
+    near = replace(HEARD, response="grazing")
+    assert near.agrees(BLANK) is False
+    assert near.survives(question()) is None
+    for either, shown in (
+        ("1-1-1 or aperiodic", False),
+        ("1-1-1 or 1-2-2", None),
+        ("1-1-1 or grazing", None),
+        ("", None),
+    ):
+        open_ = replace(HEARD, response="undecided", either=either)
+        assert open_.survives(question()) is shown
+        assert open_.agrees(BLANK) is shown  # which is what is wanted
+    for said, outcome in (
+        ("1-2-2", "agreed"),
+        ("1-1-1", "differed"),
+        ("undecided", "undecided"),
+        ("failed", "failed"),
+        ("not settled", "failed"),
+    ):
+        assert replace(HEARD, response=said).outcome(BLANK) == outcome
+    third = replace(HEARD, response="undecided", either="1-1-1 or 1-2-2")
+    assert third.agrees(replace(BLANK, response="1-3-3")) is False
+    assert third.survives(question()) is None
+    twin = replace(HEARD, response="1-2-1")
+    assert twin.survives(question("1-1-2")) is True
+    assert twin.survives(question("1-1-2", twin="exact")) is False
+    assert twin.survives(question(None, replace(NOMINAL, p=1))) is True
+    assert twin.survives(question(None)) is False
+    wanted = question(symmetric=True)
+    assert HEARD.survives(wanted) is False
+    assert replace(HEARD, symmetric=True).survives(wanted) is True

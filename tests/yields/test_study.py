@@ -1,0 +1,577 @@
+"""A study as a whole: how it grows, what it keeps, and that nothing stops it for good."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from designer.base.design_folder import Folder
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.check import checked_design
+from designer.cli import entry
+from designer.jobs import study_json
+from designer.jobs.study_folder import NGSPICE
+from designer.model.distributions import Uniform
+from designer.spice import equation_check, numerics_gate
+from designer.yields import layers, ngspice_runs, study_layers
+from designer.yields.blame_analysis import blame
+from designer.yields.layers import CHUNK, Here, Samples
+from designer.yields.ngspice_sampling import Hearing, Kind, Why, ask_random
+from designer.yields.row_store import BlockStore
+from designer.yields.study import Stores, Study
+from designer.yields.study_layers import Work
+from designer.yields.tolerance_study import tolerance
+from designer.yields.verdict import BLOCK, Answer, Verdict
+from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
+from tests.shared.quick_folders import without_starts
+from tests.yields.test_verdict import plan
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = (
+    "format = 1\n"
+    + PAPER_TABLE
+    + """\
+[[response]]
+omega = 0.85
+expect = "1-2-2"
+"""
+    + COARSE_CIRCUIT
+)
+
+
+# ---------------------------------------------------------------------------------------------
+# Margins in numbers
+
+
+def test_quantiles_of_a_margin_say_how_many_boards_have_it() -> None:
+    """A board without a miss, and one whose waveform was not compared, count in the others only."""
+    ok = Answer(0, 0, Verdict.OK, "1-1-1", "", 0.5, 1.0, 1.0, 0.0, 40, 0.1)
+    answers = [
+        ok,
+        replace(ok, sample=1, miss=math.inf),
+        replace(ok, sample=2, miss=math.inf, waveform=math.nan),
+        replace(ok, sample=3, verdict=Verdict.LOST),
+    ]
+    said = study_json.margins(answers)
+    assert said["boards"] == 3
+    assert said["counted"] == {
+        "radius": 3, "penetration": 3, "miss": 1, "asymmetry": 3, "waveform": 2,
+    }  # fmt: skip
+    none = study_json.margins([replace(a, miss=math.inf) for a in answers])
+    assert (none["miss"], none["counted"]["miss"]) == (None, 0)
+
+
+# ---------------------------------------------------------------------------------------------
+# Until the intervals are narrow
+
+
+class Fixed:
+    """Stands for `Samples`: board i is ok but for every ``lost``-th."""
+
+    def __init__(self, lost: int) -> None:
+        self.lost = lost
+
+    def __call__(self, _plan: Any, indices: range) -> Any:
+        return lambda jobs, step: [
+            Answer(
+                i, number, Verdict.LOST if i % self.lost == 0 else Verdict.OK,
+                "1-1-1", "", 0.5, 1.0, 1.0, 0.0, 40,
+            )
+            for i in indices
+            for number in range(2)
+        ]  # fmt: skip
+
+
+def grown(until: float, monkeypatch: pytest.MonkeyPatch, lost: int = 10) -> Study:
+    monkeypatch.setattr(layers, "Samples", Fixed(lost))
+    work = Work(1, None, Stores(), Here(1), Progress(), "exact")
+    checked: Any = (None, None)
+    return work.grown(Study(checked, plan(200), (0, 1), {}, (), until=until))
+
+
+@pytest.mark.parametrize("until", [0.2, 0.05, 0.03])
+def test_a_study_grows_to_the_first_edge_that_is_narrow(
+    until: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = grown(until, monkeypatch)
+    assert study.narrow is True
+    assert study.plan.samples % BLOCK == 0
+    assert len(study.answers) == 2 * study.plan.samples
+    assert [a.sample for a in study.answers[::2]] == list(range(study.plan.samples))
+
+    def width(n: int) -> float:
+        """Wilson's, by its closed formula."""
+        p, z = 1.0 - math.ceil(n / 10) / n, 1.959963984540054
+        half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+        return 2.0 * half / (1 + z * z / n)
+
+    assert width(study.plan.samples) < until
+    assert study.plan.samples == BLOCK or width(study.plan.samples - BLOCK) >= until
+
+
+def test_a_study_that_stays_wide_ends_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_layers, "MOST_UNTIL", 3 * BLOCK)
+    study = grown(1e-3, monkeypatch)
+    assert study.narrow is False
+    assert study.plan.samples == 3 * BLOCK
+
+
+def test_a_response_without_an_answer_does_not_drive_the_study(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its interval is everything, however many boards there are; the other one's still counts."""
+
+    class Silent(Fixed):
+        def __call__(self, plan: Any, indices: range) -> Any:
+            made = super().__call__(plan, indices)
+            return lambda jobs, step: [
+                replace(a, verdict=Verdict.FAILED) if a.question == 1 else a
+                for a in made(jobs, step)
+            ]
+
+    monkeypatch.setattr(layers, "Samples", Silent(10))
+    monkeypatch.setattr(study_layers, "MOST_UNTIL", 6 * BLOCK)
+    notes: list[str] = []
+    said = Progress()
+    monkeypatch.setattr(said, "note", notes.append)
+    work = Work(1, None, Stores(), Here(1), said, "exact")
+    checked: Any = (None, None)
+    study = work.grown(Study(checked, plan(200), (0, 1), {}, (), until=0.06))
+    assert study.narrow is False
+    assert study.plan.samples == 2 * BLOCK  # 0.06 is wider than Wilson's at 450 of 500
+    assert [note for note in notes if "response 2" in note]
+    assert not [note for note in notes if "wider" in note]
+
+
+@pytest.mark.parametrize("until", [0.064, 0.07, 0.076])
+def test_boards_at_a_boundary_count_before_a_study_ends(
+    until: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ngspice loses just the boards that are next to a boundary: asked after the last sample alone
+    they would make the interval wider again, and the study would end wide."""
+
+    class Near(Fixed):
+        def __call__(self, plan: Any, indices: range) -> Any:
+            made = super().__call__(plan, indices)
+            return lambda jobs, step: [
+                replace(a, penetration=0.01 * (a.sample - 99)) if 100 <= a.sample < 110 else a
+                for a in made(jobs, step)
+            ]
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        return [
+            Hearing(
+                a.sample, a.question, a.kind, a.why,
+                "1-1-2" if 100 <= a.sample < 110 else "1-1-1", "", "", 9, False,
+            )
+            for a in asks
+        ]  # fmt: skip
+
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(200)
+    nominal = replace(p.questions[0].start, penetration=1.0, miss=1.0)
+    spec = replace(p.questions[0].spec, expect=None)
+    one = replace(p.questions[0], spec=spec, start=nominal, settings=object())  # type: ignore[arg-type]
+    pool: Any = object()
+    work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
+    checked: Any = (None,)
+    study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=until)
+    monkeypatch.setattr(layers, "Samples", _first(Near(10**9)))
+    study = work.grown(study)
+    (both,) = study.combined
+    assert both is not None
+    assert study.narrow is True
+    assert both.width < until
+    assert "boundary" in [s.name for s in both.strata]
+
+
+@pytest.mark.parametrize("rung", ["auto", "ngspice"])
+def test_boards_that_differ_are_explained_by_their_own_orbit(
+    rung: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Board 45 is beyond those that are asked from their own orbit, and differs from the nominal
+    one."""
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        return [
+            Hearing(
+                a.sample, a.question, a.kind, a.why,
+                "3-3-3" if a.sample == 45 and a.kind is Kind.NOMINAL else "1-1-1",
+                "", "", 9, False,
+            )
+            for a in asks
+        ]  # fmt: skip
+
+    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(60)
+    spec = replace(p.questions[0].spec, expect=None)
+    questions = tuple(replace(p.questions[0], spec=spec, settings=object()) for _ in range(2))  # type: ignore[arg-type]
+    pool: Any = object()
+    checked: Any = (None, None)
+    study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
+    study = Work(1, pool, Stores(), Here(1), Progress(), rung).made(study)
+    for both in study.combined:
+        assert both is not None
+        (difference,) = both.differences
+        assert difference.sample == 45
+        assert difference.explanation == "another attractor from the nominal orbit"
+
+
+def _first(made: Fixed) -> Any:
+    """Of the first question alone."""
+    return lambda plan, indices: (
+        lambda jobs, step: [a for a in made(plan, indices)(jobs, step) if a.question == 0]
+    )
+
+
+def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The combined interval counts: exact samples alone cannot make it narrow."""
+    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
+    asked: list[int] = []
+
+    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+        asked.append(sum(a.kind is Kind.NOMINAL and a.why is Why.RANDOM for a in asks))
+        return [
+            Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
+        ]
+
+    monkeypatch.setattr(layers, "listen", listen)
+    p = plan(200)
+    questions = tuple(
+        replace(q, spec=replace(q.spec, expect=None), settings=object())  # type: ignore[arg-type]
+        for q in (p.questions[0], p.questions[0])
+    )
+    pool: Any = object()
+    work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
+    checked: Any = (None, None)
+    study = Study(checked, replace(p, questions=questions), (0, 1), {}, (), until=0.05)
+    study = work.grown(study)
+    assert study.narrow is True
+    assert asked[0] == 100
+    assert asked == sorted(asked)
+    assert asked[-1] > 100
+    assert all(both is not None and both.width < 0.05 for both in study.combined)
+
+
+@pytest.mark.parametrize("spread", [None, Uniform(2e6, 4e6)])
+def test_a_study_says_that_the_bandwidth_does_not_enter(
+    spread: Uniform | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    p = plan(3)
+    p = replace(p, spread=replace(p.spread, gain_bandwidth=spread))
+    monkeypatch.setattr(checked_design, "plan_study", lambda *_, **__: p)
+    notes: list[str] = []
+    said = Progress()
+    monkeypatch.setattr(said, "note", notes.append)
+    made: Any = SimpleNamespace(
+        modelfile=SimpleNamespace(responses=(None,)), design=None, catalog=None
+    )
+    tolerance(made, samples=3, rung="exact", checked=(), progress=said)
+    assert len(notes) == (spread is not None)
+    assert all("gain-bandwidth does not enter the yield" in note for note in notes)
+
+
+class Listener(Progress):
+    """Keeps what is said."""
+
+    def __init__(self) -> None:
+        self.stages: list[str] = []
+
+    def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
+        self.stages.append(text)
+        return lambda: None
+
+
+@pytest.mark.parametrize(
+    ("there", "said"),
+    [(0, ["ngspice, 180 runs"]), (20, ["ngspice, 100 runs, 80 more are there"]), (50, [])],
+)
+def test_only_runs_that_are_not_on_disk_are_announced(
+    there: int, said: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """90 boards a response: 40 from their own orbit, 50 from the nominal one."""
+    p = plan(200)
+    setting: Any = object()
+    p = replace(p, questions=tuple(replace(q, settings=setting) for q in p.questions))
+    store = BlockStore(
+        tmp_path, NGSPICE, Hearing, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
+    )
+
+    def hear(_plan: Any, asks: Any, *_: Any) -> list[Hearing]:
+        return [
+            Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
+        ]
+
+    monkeypatch.setattr(ngspice_runs, "hear", hear)
+    answers = Fixed(10**9)(None, range(200))(1, None)
+    asks = ask_random(answers)
+    layers.listen(p, [a for a in asks if a.sample < there], store, None, 1, lambda: None)  # type: ignore[arg-type]
+
+    class Kept(Stores):
+        def ngspice(self, plan: Any) -> BlockStore[Hearing]:
+            return store
+
+    progress, pool = Listener(), object()
+    work = Work(1, pool, Kept(), Here(1), progress, "auto")  # type: ignore[arg-type]
+    checked: Any = (None, None)
+    study = Study(checked, p, (0, 1), {}, tuple(answers))
+    assert len(work._heard(study, asks)) == len(asks) == 180
+    assert progress.stages == said
+
+
+# ---------------------------------------------------------------------------------------------
+# On disk
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("study")
+    (path / "small.toml").write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def exact(home: Path) -> Path:
+    """A design folder with a study on the exact rung."""
+    out = home / "exact"
+    assert entry.status([*_words(home, out), "-q"]) == 0
+    return out
+
+
+def _words(home: Path, out: Path, *more: str) -> list[str]:
+    model = str(home / "small.toml")
+    return ["tolerance", model, "--out", str(out), "--samples", "12", "--rung", "exact", *more]
+
+
+def _files(folder: Path) -> dict[str, object]:
+    """Everything, JSON without its object ``cost``."""
+    out: dict[str, object] = {}
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        name, content = path.relative_to(folder).as_posix(), path.read_bytes()
+        out[name] = content
+        if name.endswith(".json"):
+            out[name] = {k: v for k, v in json.loads(content).items() if k != "cost"}
+    return out
+
+
+def test_the_exact_rung_needs_no_ngspice(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """No program on the path, and a library that is not there."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("NGSPICE_LIBRARY_PATH", str(tmp_path / "none.so"))
+    assert entry.status([*_words(home, tmp_path / "out"), "--json", "-q"]) == 0
+    answer = json.loads(capfd.readouterr().out)
+    (response,) = answer["responses"]
+    assert response["yield"]["samples"] == 12
+    assert response["ngspice"] is None
+    assert response["combined"] is None
+    assert answer["equation_check"] is None
+    fine = {"trusted": True, "reasons": []}
+    assert response["trust"] == {"model": fine, "circuit": fine, "yield": fine}
+    assert answer["provenance"]["versions"]["ngspice"] is None
+    words = _words(home, tmp_path / "other")
+    assert entry.status([*words[:-1], "auto", "-q"]) == 3
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.slow
+def test_layers_are_added_and_stay(
+    exact: Path, home: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Another layer needs no --overwrite; asked with fewer, the study shows what it has."""
+    out = tmp_path / "exact"
+    shutil.copytree(exact, out)
+    block = out / "samples.parquet" / "block-000000.parquet"
+    before = block.stat().st_mtime_ns
+    words = _words(home, out)
+    assert entry.status([*words, "--reached", "--json", "-q"]) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["responses"][0]["reached"]["samples"] == 12
+    assert answer["responses"][0]["tuned"] is None
+    assert block.stat().st_mtime_ns == before
+    whole = _files(out)
+    assert "reached.parquet/block-000000.parquet" in whole
+    assert entry.status([*words, "--json", "-q"]) == 0
+    assert json.loads(capfd.readouterr().out) == answer
+    assert _files(out) == whole
+    # At once or one after the other: the same files.
+    once = tmp_path / "once" / "exact"
+    assert entry.status([*_words(home, once), "--reached", "-q"]) == 0
+    assert _files(once) == whole
+
+
+def _refused(*_: Any, **__: Any) -> Any:
+    raise AssertionError("this was known")
+
+
+def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
+    exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "exact"
+    shutil.copytree(exact, out)
+    known = json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"]
+    asked: list[int] = []
+
+    def counted(*args: Any, **options: Any) -> Any:
+        asked.append(len(args[1]))
+        return blame(*args, **options)
+
+    monkeypatch.setattr(study_layers, "blame", counted)
+    monkeypatch.setattr(Work, "reached", lambda _, study: study)
+    assert entry.status([*_words(home, out), "--reached", "-q"]) == 0
+    assert asked == []
+    assert json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"] == known
+    # Other samples, another seed: other boards are to blame.
+    assert entry.status([*_words(home, out), "--samples", "14", "--overwrite", "-q"]) == 0
+    assert entry.status([*_words(home, out), "--seed", "2", "--overwrite", "-q"]) == 0
+    assert asked == [14, 12]
+
+
+@pytest.mark.slow
+def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "auto"
+    words = [*_words(home, out)[:-1], "auto", "-q"]
+    words[words.index("--samples") + 1] = "3"
+    assert entry.status(words) == 0
+    whole = _files(out)
+    with monkeypatch.context() as patched:
+        patched.setattr(numerics_gate, "check", _refused)
+        patched.setattr(equation_check, "check", _refused)
+        patched.setattr(study_layers, "blame", _refused)
+        assert entry.status([*words, "--reached"]) == 0
+    added = _files(out)
+    once = tmp_path / "once" / "auto"
+    assert entry.status([w if w != str(out) else str(once) for w in words] + ["--reached"]) == 0
+    assert _files(once) == added
+    assert added["kept.npz"] == whole["kept.npz"]
+    model = tmp_path / "other.toml"
+    model.write_text(SMALL.replace("zeta = 0.1", "zeta = 0.11"))
+    other = [w if w != str(home / "small.toml") else str(model) for w in words]
+    asked: list[int] = []
+    check = numerics_gate.check
+
+    def counted(pool: Any, subjects: Any) -> Any:
+        asked.append(len(subjects))
+        return check(pool, subjects)
+
+    monkeypatch.setattr(numerics_gate, "check", counted)
+    assert entry.status([*other, "--overwrite"]) in (0, 1)
+    assert asked == [1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--samples", "0"], "--samples"),
+        (["--until", "0"], "--until"),
+        (["--until", "nan"], "--until"),
+        (["--rung", "ideal"], "--rung"),
+        (["--map", "zeta"], "--map"),
+        (["--cluster", "localhost:8786"], "--cluster"),
+        (["--seed", "2"], "seed 1"),
+        (["--samples", "13"], "samples 12"),
+        (["--until", "0.5"], "until None"),
+    ],
+)
+def test_bad_input_writes_nothing(
+    exact: Path, home: Path, words: list[str], said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = _files(exact)
+    assert entry.status([*_words(home, exact), *words, "-q"]) == 2
+    assert said in capfd.readouterr().err
+    assert _files(exact) == before
+
+
+@pytest.mark.parametrize("change", ["gone", "design", "model", "manifest"])
+def test_a_folder_that_changes_under_a_study_is_noticed(
+    exact: Path, tmp_path: Path, change: str
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(exact, out)
+    look = Folder(out).watch()
+    look()
+    if change == "gone":
+        out.rename(tmp_path / "elsewhere")
+    elif change == "manifest":
+        said = json.loads((out / "manifest.json").read_text())
+        said["stages"]["study"]["inputs"]["seed"] = 7
+        (out / "manifest.json").write_text(json.dumps(said))
+    else:
+        path = out / {"design": "design.json", "model": "model.toml"}[change]
+        path.write_text(path.read_text().replace("0.95", "0.96"))
+    expected = {"gone": "No such file", "design": r"design\.json", "model": r"model\.toml"}
+    with pytest.raises(InputError, match=expected.get(change, r"manifest\.json")):
+        look()
+
+
+def test_a_deleted_folder_is_said_at_the_next_block(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    call = Samples.__call__
+
+    def deleted(self: Samples, jobs: int, progress: Any) -> Any:
+        rows = call(self, jobs, progress)
+        shutil.rmtree(out)
+        return rows
+
+    monkeypatch.setattr(Samples, "__call__", deleted)
+    without_starts(monkeypatch)
+    assert entry.status([*_words(home, out), "-q"]) == 2
+    assert "the folder" in capfd.readouterr().err
+    assert not out.exists()
+
+
+# ---------------------------------------------------------------------------------------------
+# Killed
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_a_study_ends_the_same(home: Path, tmp_path: Path) -> None:
+    """All layers, killed six times at random moments, resumed; beside one that nobody disturbed."""
+    more = ["--rung", "auto", "--tuned", "--reached", "--map", "grade", "--jobs", "1"]
+    whole, out = tmp_path / "whole" / "out", tmp_path / "killed" / "out"
+    began = time.monotonic()
+    assert _process(home, whole, *more).wait() == 0
+    took = time.monotonic() - began
+    chance = random.Random(11)
+    kills = 0
+    for _ in range(6):
+        process = _process(home, out, *more, "--resume")
+        try:
+            process.wait(chance.uniform(0.1, 0.5) * took)
+        except subprocess.TimeoutExpired:
+            kills += 1
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    assert kills >= 2
+    assert _process(home, out, *more, "--resume").wait() == 0
+    assert _files(out) == _files(whole)
+    assert not list(out.rglob("*.part"))
+
+
+def _process(home: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "designer", *_words(home, out), *more, "-q"],
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )

@@ -1,0 +1,195 @@
+"""Verdicts, yields, blocks: the logic of the study against closed formulas and by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.netlist import Excitation, Resistor, nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.model import Dimensionless
+from designer.model.model_file import Expect, Response
+from designer.spread.spread import Spread, draw
+from designer.yields.layers import Samples
+from designer.yields.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield, count, judge
+from tests.circuit.test_coefficients import exact_for_paper
+from tests.circuit.test_reduction import circuit_of
+
+PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
+
+
+def periodic(n: int, p: int, q: int, asymmetry: float = 0.0) -> Orbit:
+    return Orbit(OrbitStatus.PERIODIC, n=n, p=p, q=q, asymmetry=asymmetry)
+
+
+def wanted(text: str | None, **more: object) -> Response:
+    expect = None if text is None else Expect.parse(text)
+    return Response(omega=1.0, expect=expect, **more)  # type: ignore[arg-type]
+
+
+def nothing() -> None:
+    return None
+
+
+NOMINAL = periodic(1, 1, 2, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("orbit", "spec", "verdict"),
+    [
+        (periodic(1, 2, 2), wanted("1-2-2"), Verdict.OK),
+        (periodic(1, 1, 2), wanted("1-1-2"), Verdict.OK),
+        (periodic(1, 2, 1), wanted("1-1-2"), Verdict.OK),
+        (periodic(1, 2, 1), wanted("1-1-2", twin="exact"), Verdict.LOST),
+        (periodic(1, 1, 2), wanted("1-1-2", twin="exact"), Verdict.OK),
+        (periodic(2, 2, 2), wanted("1-1-1"), Verdict.LOST),
+        (periodic(1, 1, 1), wanted("1-2-2"), Verdict.LOST),
+        (periodic(1, 1, 1, 0.2), wanted("1-1-1"), Verdict.OK),
+        (periodic(1, 1, 1, 0.2), wanted("1-1-1", symmetric=True), Verdict.LOST),
+        (periodic(1, 1, 1, 1e-4), wanted("1-1-1", symmetric=True), Verdict.OK),
+        (periodic(1, 1, 1, 1e-4), wanted("1-1-1", symmetric=False), Verdict.OK),
+        (periodic(1, 1, 2), wanted(None), Verdict.OK),
+        (periodic(1, 2, 1), wanted(None), Verdict.OK),
+        (periodic(1, 2, 2), wanted(None), Verdict.LOST),
+        (Orbit(OrbitStatus.APERIODIC), wanted("1-1-1"), Verdict.LOST),
+        (Orbit(OrbitStatus.CLIPPED, n=1, p=1, q=1), wanted("1-1-1"), Verdict.LOST),
+        (Orbit(OrbitStatus.GRAZING, n=1, p=1, q=1), wanted("1-1-1"), Verdict.GRAZING),
+        (Orbit(OrbitStatus.NOT_SETTLED), wanted("1-1-1"), Verdict.FAILED),
+        (Orbit(OrbitStatus.DIVERGED), wanted("1-1-1"), Verdict.FAILED),
+        (Orbit(OrbitStatus.FAILED, reason="why"), wanted("1-1-1"), Verdict.FAILED),
+    ],
+)
+def test_verdicts(orbit: Orbit, spec: Response, verdict: Verdict) -> None:
+    got, reason = judge(orbit, spec, NOMINAL)
+    assert got is verdict
+    if verdict in (Verdict.LOST, Verdict.FAILED):
+        assert reason
+
+
+def test_lost_says_to_what() -> None:
+    assert judge(periodic(3, 4, 4), wanted("1-1-1"), NOMINAL)[1] == "to 3-4-4"
+    clipped = Orbit(OrbitStatus.CLIPPED, n=1, p=1, q=1)
+    assert judge(clipped, wanted("1-1-1"), NOMINAL)[1] == "clipped"
+
+
+def test_symmetry_of_even_periods() -> None:
+    assert periodic(2, 2, 2, math.nan).symmetric is False
+    assert judge(periodic(2, 2, 2, math.nan), wanted("2-2-2", symmetric=True), NOMINAL)[0] is (
+        Verdict.LOST
+    )
+
+
+# Yields.
+
+
+@given(
+    ok=st.integers(0, 300), lost=st.integers(0, 300), grazing=st.integers(0, 50),
+    failed=st.integers(0, 50),
+)  # fmt: skip
+def test_wilson_interval_is_the_closed_formula(
+    ok: int, lost: int, grazing: int, failed: int
+) -> None:
+    y = Yield(ok, lost, grazing, failed)
+    n = ok + lost + grazing
+    assert y.samples == n + failed
+    if n == 0:
+        assert math.isnan(y.rate)
+        assert y.interval == (0.0, 1.0)
+        return
+    p, z = ok / n, 1.959963984540054
+    assert y.rate == pytest.approx(p)
+    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    low, high = y.interval
+    assert low == pytest.approx(max(centre - half, 0.0), abs=1e-12)
+    assert high == pytest.approx(min(centre + half, 1.0), abs=1e-12)
+    assert low - 1e-12 <= p <= high + 1e-12
+
+
+def test_count_sorts_verdicts() -> None:
+    blank = Answer(0, 0, Verdict.OK, "", "", 0.0, 0.0, 0.0, 0.0, 0)
+    order = [Verdict.OK] * 4 + [Verdict.LOST] * 3 + [Verdict.GRAZING] * 2 + [Verdict.FAILED]
+    got = count([replace(blank, verdict=v) for v in order])
+    assert (got.ok, got.lost, got.grazing, got.failed) == (4, 3, 2, 1)
+
+
+# A small study on the exact rung.
+
+
+@cache
+def plan(samples: int = 30) -> StudyPlan:
+    circuit = circuit_of(exact_for_paper())
+    errors = coefficient_errors(circuit, PAPER.second_order())
+    system = Reduction(circuit, nominal_board(circuit)).system()
+    questions = []
+    for omega, expect in ((1.55, "1-1-1"), (0.85, "1-2-2")):
+        model = Flow(PAPER.second_order().piecewise_linear(), Drive(omega))
+        orbit = settle(model, np.zeros(4))
+        volts = 1.0 / errors.drive_gain[0]
+        excitation = Excitation(errors.scales.frequency(omega), volts)
+        drive = Drive(2 * np.pi * excitation.frequency, -volts)
+        start = settle(Flow(system, drive), orbit.start * errors.scales.volts)
+        assert start.response == expect, (omega, start.response)
+        questions.append(Question(replace(wanted(expect), omega=omega), excitation, start, None))
+    return StudyPlan(circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 11, samples, tuple(questions))
+
+
+@pytest.mark.parametrize("samples", [1, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK, 3 * BLOCK - 2])
+def test_blocks_cover_every_sample_once(samples: int) -> None:
+    blocks = list(replace(plan(), samples=samples).blocks())
+    assert [i for block in blocks for i in block] == list(range(samples))
+    assert all(block.start % BLOCK == 0 for block in blocks)
+
+
+def test_jobs_do_not_change_the_answers() -> None:
+    one = [a for block in plan().blocks() for a in Samples(plan(), block)(1, nothing)]
+    two = [a for block in plan().blocks() for a in Samples(plan(), block)(2, nothing)]
+    assert [repr(a) for a in one] == [repr(a) for a in two]
+    assert [(a.sample, a.question) for a in one] == [(i, q) for i in range(30) for q in range(2)]
+    longer = Samples(replace(plan(), samples=60), range(25))(2, nothing)
+    assert [repr(a) for a in longer] == [repr(a) for a in one[:50]]
+
+
+def test_answers_are_those_of_the_boards_one_by_one() -> None:
+    p = plan()
+    answers = Samples(p, range(5, 9))(2, nothing)
+    for a in answers:
+        question = p.questions[a.question]
+        board = draw(p.circuit, p.spread, p.seed, a.sample)
+        flow = Flow(
+            Reduction(p.circuit, board).system(),
+            Drive(2 * np.pi * question.excitation.frequency, -question.excitation.amplitude),
+        )
+        orbit = settle(flow, question.start.start)
+        assert a.response == orbit.response
+        assert a.verdict is judge(orbit, question.spec, question.start)[0]
+        # Independently of settling: a long plain run ends on the same strobe and counts.
+        if orbit.status is OrbitStatus.PERIODIC:
+            run = flow.run(question.start.start, 600)
+            lap = run.counts[-orbit.n :].sum(axis=(0, 1))
+            assert lap.tolist() == [orbit.q, orbit.p]
+
+
+def test_progress_is_called_once_an_answer() -> None:
+    calls: list[int] = []
+    answers = Samples(plan(), range(4))(2, lambda: calls.append(1))
+    assert len(calls) == len(answers) == 8
+
+
+def test_a_board_that_cannot_be_reduced_is_failed_with_its_reason() -> None:
+    p = plan()
+    broken = replace(p.circuit, parts=(*p.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
+    answers = Samples(replace(p, circuit=broken), range(2))(1, nothing)
+    assert {a.verdict for a in answers} <= {Verdict.FAILED}
+    assert all(a.reason for a in answers)
