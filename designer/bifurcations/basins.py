@@ -11,7 +11,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.bifurcations.parameter_map import COURSE, Cell, CellStore, cell_of
-from designer.circuit.swept_board import Subject
+from designer.bifurcations.subject import Subject
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course, Setting

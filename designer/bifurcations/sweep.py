@@ -16,7 +16,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
-from designer.circuit.swept_board import Subject
+from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
 from designer.dynamics.steady_state import Course, Steady
 

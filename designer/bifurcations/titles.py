@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
-from designer.circuit.swept_board import Subject
-from designer.model.swept_model import ModelSubject
 
 NAMES = {
     "omega": "ω",
@@ -36,7 +34,7 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
 
     name : the model's title, or "". width : characters of a line.
     """
-    whose = "model" if isinstance(plan.subject, ModelSubject) else "nominal board"
+    whose = plan.subject.whose
     if isinstance(plan, SweepPlan):
         what = f"bifurcation diagram of the {whose} over {_name(plan.parameter)}, {_way(plan)}"
         changed: Mapping[str, float | None] = {plan.parameter: None}
@@ -63,19 +61,8 @@ def _way(plan: SweepPlan) -> str:
 
 def _held(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[str]:
     """The parameters that stand still, with their values. changed : None where one is swept."""
-    if isinstance(subject, ModelSubject):
-        model = subject.model
-        known = {"omega": subject.omega}
-        known |= {f.name: getattr(model, f.name) for f in fields(model) if f.name != "sides"}
-        if model.sides != "both":
-            yield f"{model.sides} stop only"
-    else:
-        known = {
-            "frequency": None if "omega" in changed else subject.frequency,
-            "amplitude": subject.amplitude,
-            "offset": subject.offset,
-        }
-    for name, value in {**known, **changed}.items():
+    yield from subject.remarks()
+    for name, value in {**subject.held(changed), **changed}.items():
         if value is not None:
             unit = subject.units.get(name, "")
             yield f"{_name(name)} = {value:.6g}" + (f" {unit}" if unit else "")

@@ -14,11 +14,7 @@ from designer.bifurcations import branch_survey
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.sweep import Sweep, Window
-from designer.circuit import swept_board
-from designer.circuit.swept_board import Subject
 from designer.dynamics import attractors
-from designer.model import swept_model
-from designer.model.swept_model import ModelSubject
 
 LEAST_STEPS, LONGEST = 4, 4
 """Of a window whose ends are looked for: steps, and period."""
@@ -46,7 +42,7 @@ def locate(
     """The points, ascending; ``progress`` is called once a window."""
 
     def one(window: Window) -> list[Bifurcation]:
-        found = _ends(sweep, window, of_subject(sweep.plan.subject, sweep.plan.parameter))
+        found = _ends(sweep, window, sweep.plan.subject.family(sweep.plan.parameter))
         progress()
         return found
 
@@ -57,20 +53,6 @@ def locate(
         if not any(abs(p.value - point.value) <= SAME * abs(point.value) for p in known):
             out.append(point)
     return out
-
-
-def of_subject(subject: Subject, parameter: str) -> Family:
-    """The family of flows that a sweep of this subject is made over."""
-    if isinstance(subject, ModelSubject):
-        omega = 1.0 if subject.omega is None else subject.omega
-        return swept_model.of_model(subject.model, omega, parameter)
-    if parameter == "omega":
-        made = swept_board.of_board(subject.system, subject.excitation({"omega": 1.0}), "frequency")
-        frequency = subject.design.errors.scales.frequency
-        return Family("omega", 0.0, made.high, lambda w: made.build(frequency(w)))
-    one = {"frequency": subject.design.errors.scales.frequency(1.0)}
-    start = one if subject.frequency is None else {}
-    return swept_board.of_board(subject.system, subject.excitation(start), parameter)
 
 
 def _ends(sweep: Sweep, window: Window, over: Family) -> list[Bifurcation]:

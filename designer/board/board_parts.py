@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from designer.base.errors import Unreachable
 from designer.base.views import View
@@ -33,10 +33,6 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
 from designer.spread.part_grades import arrays, bought
 
-if TYPE_CHECKING:
-    from designer.check.synthesis_result import Synthesis
-    from designer.yields.run_result import RunResult
-
 LEAST_TRIM = 0.01
 """Least reach of the DC trim, as a share of the generator's amplitude."""
 TRIMMER = 10e3
@@ -47,6 +43,22 @@ MOST_SERIES = 10e6
 """Most resistance [Ω] after the wiper: beyond it a board's own leakage counts."""
 GENERATOR_MOST = 10.0
 """Most [V peak] that a usual function generator gives without a load."""
+
+
+class Designed(Protocol):
+    """A model file with the design that was made for it."""
+
+    @property
+    def modelfile(self) -> ModelFile: ...
+
+    @property
+    def catalog(self) -> Catalog: ...
+
+    @property
+    def found(self) -> tuple[ModelResponse, ...]: ...
+
+    @property
+    def design(self) -> Design: ...
 
 
 def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
@@ -83,7 +95,7 @@ def board_choice(
     return replace(BoardChoice.of(modelfile.circuit, modelfile.board), trim=reach)
 
 
-def board_circuit(made: Synthesis | RunResult) -> tuple[Circuit, BoardChoice]:
+def board_circuit(made: Designed) -> tuple[Circuit, BoardChoice]:
     """The circuit of a design with its fittings, and the choices that they were made by."""
     choice = board_choice(made.modelfile, made.design, made.found)
     grades = bought(made.modelfile, made.design.circuit, made.catalog)

@@ -27,6 +27,7 @@ from designer.centering.cure_upgrade import PartNetwork, Upgrades, rebuilt, upgr
 from designer.centering.cure_ways import SAMPLES, Looker, Way, foretold
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
+from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.yields import margins
 from designer.yields.margins import Margin
@@ -114,7 +115,7 @@ class Picture:
         circuit = made.design.circuit
         if upgrades.reference is not None:
             circuit = rebuilt(made.design, modelfile, made.catalog)
-        return circuit, Spread.of(modelfile, circuit, made.catalog)
+        return circuit, spread_of(modelfile, circuit, made.catalog)
 
     def boards(self, pick: Sequence[int]) -> Boards:
         """Boards of this choice, for its linear forms."""
@@ -316,7 +317,7 @@ def pictured(
     """The same with margins of these ways (response, way)."""
     made = seen.branch.made
     circuit = made.design.circuit
-    spread = Spread.of(made.modelfile, circuit, made.catalog)
+    spread = spread_of(made.modelfile, circuit, made.catalog)
     known = dict[tuple[int, int], Margin]()
     trimmed = [(r, w) for r, w in which if seen.ways[r][w].kind == TRIMMER]
     for some in ([key for key in which if key not in trimmed], trimmed):

@@ -14,7 +14,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.find_responses import ModelResponse
 from designer.model.tuning_bands import Bands
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 from designer.yields import exact_rung
 from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, trimmed_answers
@@ -52,7 +52,7 @@ def asked(made: Synthesis, responses: Sequence[ModelResponse]) -> list[Question 
 def plan_of(made: Synthesis, question: Question, seed: int, samples: int = MOST) -> StudyPlan:
     """The study of one response of a design, boards as its model file says."""
     circuit = made.design.circuit
-    spread = Spread.of(made.modelfile, circuit, made.catalog)
+    spread = spread_of(made.modelfile, circuit, made.catalog)
     return StudyPlan(circuit, spread, seed, samples, (question,))
 
 

@@ -36,7 +36,7 @@ from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
 from designer.model.model_file import need_responses
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 from designer.yields.limiting_parts import limiting, together
 from designer.yields.trimmed_yield import DcTrim
 from designer.yields.verdict import StudyPlan
@@ -375,7 +375,7 @@ class _Search:
         if seen is None or margin is None:
             return ""
         made = seen.branch.made
-        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
         return limiting(margin, together(made.design.circuit, spread, seen.seed)).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:

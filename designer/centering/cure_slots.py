@@ -14,7 +14,7 @@ from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Capacitor, Resistor
 from designer.spread.part_grades import bought
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 from designer.yields.trimmed_yield import DcTrim, dc_trim
 
 TRIMMED = 5.0
@@ -78,7 +78,7 @@ def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tup
     if NETWORK in without:
         return ()
     spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
-    spread = Spread.of(made.modelfile, circuit, catalog)
+    spread = spread_of(made.modelfile, circuit, catalog)
     measured = made.modelfile.measured
     taken = {name for g in spread.groups if not g.reel for name in g.parts}
     taken |= {*spread.grades, *spread.shapes, *(() if measured is None else measured.values)}

@@ -21,7 +21,8 @@ from designer.centering.cure_measure import Book, asked, measure, plan_of
 from designer.centering.cure_upgrade import Place, Upgrades, upgraded_file, with_parts_kept
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
-from designer.spread.spread import Spread, draw_many
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import draw_many
 from designer.yields.margins import Margin
 from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, count, judge
 from designer.yields.yield_maps import YieldMap, settle_open, yield_map
@@ -125,7 +126,7 @@ class Looker:
     def plan(self) -> StudyPlan:
         """The study of boards with the parts as they are, of no question yet."""
         made = self.branch.made
-        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
         return StudyPlan(made.design.circuit, spread, self.seed, SAMPLES, ())
 
     def seen(self, way: Way, boards: Boards | None = None) -> Way:

@@ -34,8 +34,7 @@ from designer.circuit.design import Design
 from designer.model import find_responses
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, Response, naming, need_responses
-from designer.spread.part_rules import check_names
-from designer.spread.spread import Spread
+from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
 from designer.synthesis.attempt import zone_of_spec
 from designer.synthesis.part_names import parts_of
@@ -180,7 +179,7 @@ class _Hunt:
 
     def _placed(self, best: Candidate) -> Candidate:
         """The same choice with every open response at its best place."""
-        spread = Spread.of(self.modelfile, best.design.circuit, self.catalog)
+        spread = spread_of(self.modelfile, best.design.circuit, self.catalog)
         bench = Stretched(best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory)
         chosen = []
         for number, spec in enumerate(self.modelfile.responses):
@@ -240,7 +239,7 @@ class _Hunt:
     def _bench(
         self, choice: Choice, found: Sequence[ModelResponse], design: Design, boards: int
     ) -> Stretched:
-        spread = Spread.of(self._resolved(choice, found), design.circuit, self.catalog)
+        spread = spread_of(self._resolved(choice, found), design.circuit, self.catalog)
         return Stretched(design, spread, self.seed, boards, jobs=self.jobs, memory=self.memory)
 
     def _candidate(

@@ -33,8 +33,7 @@ from designer.spice import numerics_gate as gate
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.spread.part_rules import check_names
-from designer.spread.spread import Spread
+from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis.attempt import zone_of_spec
 from designer.synthesis.part_names import parts_of
 from designer.synthesis.parts_choice import check_choices, synthesise
@@ -122,7 +121,7 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     design = synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found
     )
-    Spread.of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
+    spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return found, design
 
 

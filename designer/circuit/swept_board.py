@@ -19,7 +19,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.steady_state import Setting
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
-from designer.model.swept_model import GREATEST, SMALLEST, ModelSubject
+from designer.model.swept_model import GREATEST, SMALLEST
 
 BOARD_SETTINGS = ("frequency", "omega", "amplitude", "offset")
 """Of the generator: Hz, dimensionless by the design's time scale, V peak, V."""
@@ -34,6 +34,7 @@ class BoardSubject:
     model's clearance by default. frequency [Hz] may be None where it is among the changes.
     """
 
+    whose = "nominal board"
     parameters = BOARD_SETTINGS
 
     def __init__(
@@ -90,6 +91,27 @@ class BoardSubject:
             out = np.maximum(out, scale_of(model, omega) * self.design.volts(b))
         return out
 
+    def family(self, parameter: str) -> Family:
+        """One flow for each value of a setting, the others as they stand."""
+        scales = self.design.errors.scales
+        if parameter == "omega":
+            over = of_board(self.system, self.excitation({"omega": 1.0}), "frequency")
+            return Family("omega", 0.0, over.high, lambda w: over.build(scales.frequency(w)))
+        start = {"frequency": scales.frequency(1.0)} if self.frequency is None else {}
+        return of_board(self.system, self.excitation(start), parameter)
+
+    def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
+        """The generator's settings; no frequency where ω is swept."""
+        return {
+            "frequency": None if "omega" in swept else self.frequency,
+            "amplitude": self.amplitude,
+            "offset": self.offset,
+        }
+
+    def remarks(self) -> tuple[str, ...]:
+        """Nothing: the design's own files say what it is."""
+        return ()
+
     def as_dict(self) -> dict[str, object]:
         """What decides the flow, for hashes and provenance. The hash is of the whole circuit: of
         the op-amps' gain, bias currents and limits and the diodes' curves too."""
@@ -114,9 +136,6 @@ class BoardSubject:
             float(change.get("amplitude", self.amplitude)),
             offset=float(change.get("offset", self.offset)),
         )
-
-
-Subject = ModelSubject | BoardSubject
 
 
 SETTINGS = {

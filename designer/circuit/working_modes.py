@@ -11,7 +11,7 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import NodalEquations, stacked
 from designer.dynamics import kernel_four_state as kernel
 from designer.dynamics.piecewise_linear import ModeKey
-from designer.dynamics.working_modes import STATES, _empty
+from designer.dynamics.working_modes import STATES, empty_modes
 
 
 def working_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
@@ -46,7 +46,7 @@ def of_boards(boards: Boards) -> tuple[kernel.Modes | None, Mask]:
         good &= bad == 0
         solved = equations.solution(y)
         parts.append((equations.rates(solved), equations.exits(key, solved)))
-    out = _empty(len(boards), len(keys), max(len(exits) for _, exits in parts))
+    out = empty_modes(len(boards), len(keys), max(len(exits) for _, exits in parts))
     beyond = {}  # how far past a stop: what rest says of it
     for way in parts[0][1]:
         if way.clearance == 0:

@@ -96,7 +96,7 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on with unfinished wo
 
 
 @contextmanager
-def _session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]:
+def session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]:
     """Logging as asked, progress on standard error."""
     logger = logging.getLogger("designer")
     logger.handlers.clear()
@@ -130,7 +130,7 @@ def _session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]
 
 
 @contextmanager
-def _compiling(progress: Progress) -> Iterator[None]:
+def compiling(progress: Progress) -> Iterator[None]:
     """Says it when the engine has to be compiled."""
     from designer.base.jit_notice import announced
 
@@ -138,7 +138,7 @@ def _compiling(progress: Progress) -> Iterator[None]:
         yield
 
 
-def _print_json(answer: object) -> None:
+def print_json(answer: object) -> None:
     from designer.base.plain_json import dumps
 
     sys.stdout.write(dumps(answer))

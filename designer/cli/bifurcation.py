@@ -16,10 +16,10 @@ from designer.cli.app import (
     Resume,
     Source,
     Verbose,
-    _compiling,
-    _print_json,
-    _session,
     app,
+    compiling,
+    print_json,
+    session,
 )
 
 
@@ -84,7 +84,7 @@ def bifurcation(
     log: Log = None,
 ) -> int:
     """Bifurcation diagrams, maps of n-p-q over two parameters, basins of attraction."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import bifurcation_job
         from designer.jobs.bifurcation_request import Request
 
@@ -109,7 +109,7 @@ def bifurcation(
         )
         answer, reused = bifurcation_job.answer(model, request, out, progress)
     if json:
-        _print_json(answer)
+        print_json(answer)
     elif not quiet:
         from designer.cli import bifurcation_tables
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from designer.cli.tables import _console, _line, _row, _table, files
+from designer.cli.tables import add_row, files, new_console, new_table, print_line
 
 LONGEST = 40
 """Lines of a table; the JSON object has them all."""
@@ -20,40 +20,42 @@ def show(answer: Mapping[str, Any], out: Path | None, reused: bool) -> None:
 
 
 def _sweep(answer: Mapping[str, Any]) -> None:
-    console, name = _console(), answer["parameter"]
+    console, name = new_console(), answer["parameter"]
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     wide = answer["windows"]
     widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
-    table = _table("Windows", "track", f"from{unit}", "to", "response", "symmetric", "steps")
+    table = new_table("Windows", "track", f"from{unit}", "to", "response", "symmetric", "steps")
     for w in sorted(widest, key=lambda w: (w["track"], w["from"])):
         symmetric = {True: "yes", False: "no", None: "-"}[w["symmetric"]]
         ends = (f"{w['from']:.6g}", f"{w['to']:.6g}")
-        _row(table, w["track"], *ends, w["response"], symmetric, str(w["steps"]))
+        add_row(table, w["track"], *ends, w["response"], symmetric, str(w["steps"]))
     console.print(table)
     if len(wide) > len(widest):
-        _line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
+        print_line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        table = _table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
+        table = new_table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
         for p in answer["points"][:LONGEST]:
             branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
             for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
                 first = ("", "") if k else (p["kind"], f"{p['value']:.9g}")
-                _row(table, *first, c["track"] or "-", c["text"])
+                add_row(table, *first, c["track"] or "-", c["text"])
         console.print(table)
 
 
 def _map(answer: Mapping[str, Any]) -> None:
-    table = _table(f"Map over {answer['x']['name']} and {answer['y']['name']}", "response", "share")
+    table = new_table(
+        f"Map over {answer['x']['name']} and {answer['y']['name']}", "response", "share"
+    )
     total = answer["x"]["steps"] * answer["y"]["steps"]
     for response, count in list(answer["counts"].items())[:LONGEST]:
-        _row(table, response, f"{count / total:.2%}")
-    _console().print(table)
+        add_row(table, response, f"{count / total:.2%}")
+    new_console().print(table)
 
 
 def _basins(answer: Mapping[str, Any]) -> None:
-    table = _table("Attractors", "number", "response", "symmetric", "twin", "share of starts")
+    table = new_table("Attractors", "number", "response", "symmetric", "twin", "share of starts")
     for a in answer["attractors"][:LONGEST]:
         symmetric = {True: "yes", False: "no", None: "-"}[a["symmetric"]]
         twin = "-" if a["twin"] is None else str(a["twin"])
-        _row(table, str(a["number"]), a["response"], symmetric, twin, f"{a['share']:.2%}")
-    _console().print(table)
+        add_row(table, str(a["number"]), a["response"], symmetric, twin, f"{a['share']:.2%}")
+    new_console().print(table)

@@ -63,13 +63,13 @@ def _unexpected(error: Exception, arguments: Sequence[str]) -> int:
         _say(_INTERRUPTED)
         return INTERRUPTED
     kind = type(error).__name__
-    _say(f"internal error: {kind}: {_line(str(error))}; please report it (-v shows where)")
+    _say(f"internal error: {kind}: {print_line(str(error))}; please report it (-v shows where)")
     if "-v" in arguments or "--verbose" in arguments:
         traceback.print_exception(error, file=sys.stderr)
     return 1
 
 
-def _line(text: str) -> str:
+def print_line(text: str) -> str:
     return " ".join(text.split())[:300]
 
 

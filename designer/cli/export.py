@@ -11,10 +11,10 @@ from designer.cli.app import (
     Resume,
     Source,
     Verbose,
-    _compiling,
-    _print_json,
-    _session,
     app,
+    compiling,
+    print_json,
+    session,
 )
 
 
@@ -30,7 +30,7 @@ def export(
     log: Log = None,
 ) -> int:
     """The KiCad project: schematic, placed board, netlist; into the design folder."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import synthesise_job
         from designer.jobs.export_job import export_into
         from designer.jobs.options import Options
@@ -39,7 +39,7 @@ def export(
         modelfile, folder = synthesise_job.source(model, out)
         answer, reused = export_into(modelfile, folder, options, progress)
     if json:
-        _print_json(answer)
+        print_json(answer)
     elif not quiet:
         from designer.cli import tables
 

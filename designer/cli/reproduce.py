@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from designer.base.errors import InputError
-from designer.cli.app import Jobs, Log, Quiet, Resume, Verbose, _compiling, _session, app
+from designer.cli.app import Jobs, Log, Quiet, Resume, Verbose, app, compiling, session
 
 
 class Subject(StrEnum):
@@ -58,7 +58,7 @@ def reproduce(
     log: Log = None,
 ) -> int:
     """The paper's figures and statements, measured again."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.base.checks import at_least, cores
 
         if jobs is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from designer.cli.app import Json, Log, Quiet, Verbose, _compiling, _print_json, _session, app
+from designer.cli.app import Json, Log, Quiet, Verbose, app, compiling, print_json, session
 
 
 @app.command()
@@ -27,12 +27,12 @@ def rules(
     log: Log = None,
 ) -> int:
     """Design rules on a circuit and its board; exit status 1 where one fails."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import rules_job
 
         answer, passed = rules_job.into_folder(folder, board, junit, progress)
     if json:
-        _print_json(answer)
+        print_json(answer)
     elif not quiet:
         from designer.cli import rules_table
 

@@ -6,22 +6,22 @@ from collections.abc import Mapping
 from typing import Any
 
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
-from designer.cli.tables import _console, _line, _row, _table
+from designer.cli.tables import add_row, new_console, new_table, print_line
 
 
 def show(answer: Mapping[str, Any]) -> None:
     """Every rule with what was found; then what to do about those that fail."""
-    console = _console()
-    table = _table("Design rules", "rule", "status", "found", "limit")
+    console = new_console()
+    table = new_table("Design rules", "rule", "status", "found", "limit")
     for rule in answer["rules"]:
         limit = rule["limit"] + (" (model file)" if rule["reason"] else "")
-        _row(table, rule["id"], rule["status"], rule["found"], limit)
+        add_row(table, rule["id"], rule["status"], rule["found"], limit)
     console.print(table)
     for rule in answer["rules"]:
         if rule["reason"]:
-            _line(console, f"{rule['id']}: the model file's limit, because: {rule['reason']}")
+            print_line(console, f"{rule['id']}: the model file's limit, because: {rule['reason']}")
     for rule in answer["rules"]:
         if rule["status"] == FAIL:
-            _line(console, f"{rule['id']} fails: {rule['do']}")
+            print_line(console, f"{rule['id']} fails: {rule['do']}")
     count = answer["counts"]
-    _line(console, f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")
+    print_line(console, f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")

@@ -22,10 +22,10 @@ from designer.cli.app import (
     Seed,
     Source,
     Verbose,
-    _compiling,
-    _print_json,
-    _session,
     app,
+    compiling,
+    print_json,
+    session,
 )
 from designer.cli.tolerance import StudyRung
 
@@ -78,7 +78,7 @@ def search(
     log: Log = None,
 ) -> int:
     """The design of the highest yield for a model file; with --yield the cure of a folder."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs.options import Options
 
         count = SAMPLES if samples is None else samples
@@ -93,7 +93,7 @@ def search(
                     raise InputError(None, name, given, "no such option with a design folder")
             result = _cured(model, out, wanted, budget, without or [], options, progress)
             if json:
-                _print_json(result.answer)
+                print_json(result.answer)
             elif not quiet:
                 from designer.centering import cure_table
 
@@ -109,7 +109,7 @@ def search(
         command = partial(Options.command, verb="search", model=model, out=out)
         outcome = search_job.search_into(modelfile, folder, options, progress, command)
     if json:
-        _print_json(outcome.answer)
+        print_json(outcome.answer)
     elif not quiet:
         from designer.cli import search_tables, tables
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from designer.cli.tables import _console, _line, _row, _table
+from designer.cli.tables import add_row, new_console, new_table, print_line
 
 
 def searched(answer: Mapping[str, Any]) -> None:
     """Places, what limits them, what ngspice confirmed, what each lever is worth."""
-    console, search = _console(), answer["search"]
+    console, search = new_console(), answer["search"]
     places = search["final"]["responses"]
     confirmed = answer["confirmation"]["responses"]
-    table = _table("Places", "response", "ω", "b", "distance", "predicted", "confirmed", gap=1)
+    table = new_table("Places", "response", "ω", "b", "distance", "predicted", "confirmed", gap=1)
     for place, heard in zip(places, confirmed, strict=True):
         distance = place["distance"]
-        _row(
+        add_row(
             table,
             place["expected"] or "any",
             f"{place['omega']:.5g}",
@@ -29,12 +29,12 @@ def searched(answer: Mapping[str, Any]) -> None:
     for place, heard in zip(places, confirmed, strict=True):
         if heard["limited_by"]:
             name = place["expected"] or "any"
-            _line(console, f"{name} is limited by {heard['limited_by']['line']}")
+            print_line(console, f"{name} is limited by {heard['limited_by']['line']}")
     if not search["contributions"]:
         return
-    table = _table("Levers: smallest distance", "lever", "from", "to", "alone", "without", gap=1)
+    table = new_table("Levers: smallest distance", "lever", "from", "to", "alone", "without", gap=1)
     for lever in search["contributions"]:
         ends = [lever[k]["smallest_distance"] for k in ("alone", "without")]
         shown = ["-" if d is None else f"{d:.2f} σ" for d in ends]
-        _row(table, lever["lever"], lever["from"], lever["to"], *shown)
+        add_row(table, lever["lever"], lever["from"], lever["to"], *shown)
     console.print(table)

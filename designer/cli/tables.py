@@ -27,25 +27,25 @@ def run(answer: Mapping[str, Any]) -> None:
 
 def synthesised(answer: Mapping[str, Any]) -> None:
     """The chosen parts, their error and the generator's settings."""
-    console = _console()
-    table = _table("Parts", "value", "parts")
+    console = new_console()
+    table = new_table("Parts", "value", "parts")
     kinds: dict[tuple[str, float], list[str]] = {}
     for name, value in answer["parts"].items():
         kinds.setdefault((name[0], value), []).append(name)
     for (kind, value), names in sorted(kinds.items()):
-        _row(table, format_quantity(value, "F" if kind == "C" else "Ω"), " ".join(names))
+        add_row(table, format_quantity(value, "F" if kind == "C" else "Ω"), " ".join(names))
     console.print(table)
     certificate = answer["certificate"]
-    _line(
+    print_line(
         console,
         f"Largest coefficient error {_error(answer['max_error'])} "
         f"({certificate['status']}, lower bound {_error(certificate['lower_bound'])}); "
         f"{answer['distinct_values']} distinct values",
     )
     if answer["knobs"]:
-        table = _table("Generator", "ω", "expected", "frequency", "amplitude (peak, high-Z)")
+        table = new_table("Generator", "ω", "expected", "frequency", "amplitude (peak, high-Z)")
         for knob in answer["knobs"]:
-            _row(
+            add_row(
                 table,
                 f"{knob['omega']:g}",
                 knob["expected"] or "-",
@@ -57,9 +57,9 @@ def synthesised(answer: Mapping[str, Any]) -> None:
 
 def tolerance(answer: Mapping[str, Any]) -> None:
     """The responses on each engine, and their yields."""
-    console = _console()
+    console = new_console()
     spread = (answer.get("provenance", {}).get("spread") or {}).get("name", "")
-    table = _table(
+    table = new_table(
         f"Responses, {answer['samples']} samples"
         + (f", spread of the {spread}" if spread == "model file" else ""),
         "ω",
@@ -87,7 +87,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
                 str(y["failed"]),
             ]
         found = r["model"] if r["found"] else f"{r['model']} (not what is wanted)"
-        _row(
+        add_row(
             table,
             f"{r['omega']:g}",
             r["expected"] or "-",
@@ -99,16 +99,18 @@ def tolerance(answer: Mapping[str, Any]) -> None:
     console.print(table)
     for r in answer["responses"]:
         for doubt in doubts(_with_its_figures(r)):
-            _line(console, f"ω = {r['omega']:g}: {doubt}")
+            print_line(console, f"ω = {r['omega']:g}: {doubt}")
     if answer.get("equation_check") is not None:
         from designer.spice.equation_check import EquationCheck  # only here is it needed
 
         problem = EquationCheck.read(answer["equation_check"]).problem
         if problem:
-            _line(console, problem)
+            print_line(console, problem)
     if answer.get("until") is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
-        _line(console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
+        print_line(
+            console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}"
+        )
     _further(console, answer)
 
 
@@ -125,7 +127,7 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
     if not shown and not both:
         return
     heads = [*(f"{kind} %" for kind in shown), *(["both engines %", "95 %", "differ"] * both)]
-    table = _table("Further yields", "ω", "expected", *heads, gap=1)
+    table = new_table("Further yields", "ω", "expected", *heads, gap=1)
     for r in answer["responses"]:
         cells = [_percent((kinds[kind](r) or {}).get("rate")) for kind in shown]
         c = r.get("combined")
@@ -138,7 +140,7 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
                 f"{100 * c['low']:.0f}–{100 * c['high']:.0f}",
                 f"{differ['count']} of {differ['asked']}",
             ]
-        _row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
+        add_row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
     console.print(table)
     whole = answer.get("all_on_one_board") or {}
     said = [
@@ -147,7 +149,7 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
         if y is not None
     ]
     if said:
-        _line(console, f"All on one board: {', '.join(said)}")
+        print_line(console, f"All on one board: {', '.join(said)}")
 
 
 def _percent(rate: float | None) -> str:
@@ -156,7 +158,7 @@ def _percent(rate: float | None) -> str:
 
 def simulated(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
-    table = _table(
+    table = new_table(
         f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice",
         "ω",
         "expected",
@@ -169,7 +171,7 @@ def simulated(answer: Mapping[str, Any]) -> None:
         gap=1,
     )
     for r in answer["responses"]:
-        _row(
+        add_row(
             table,
             f"{r['omega']:g}",
             r["expected"] or "-",
@@ -180,55 +182,55 @@ def simulated(answer: Mapping[str, Any]) -> None:
             "-" if r["twin"] is None else r["twin"]["response"],
             ", ".join(o["response"] for o in r["others"]) or "-",
         )
-    console = _console()
+    console = new_console()
     console.print(table)
     for r in answer["responses"]:
         if r["reason"]:
-            _line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+            print_line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
         for doubt in doubts({"this response": r.get("trust")}):
-            _line(console, f"ω = {r['omega']:g}: {doubt}")
+            print_line(console, f"ω = {r['omega']:g}: {doubt}")
 
 
 def compared(answer: Mapping[str, Any]) -> None:
     """The design beside the paper's."""
-    console = _console()
+    console = new_console()
     head, *rest = compare_table.rows(answer)
-    table = _table("Side by side", *head)
+    table = new_table("Side by side", *head)
     for cells in rest:
-        _row(table, *cells)
+        add_row(table, *cells)
     console.print(table)
     for note in compare_table.notes(answer):
-        _line(console, note)
+        print_line(console, note)
 
 
 def pictures(folder: Path, names: Sequence[str]) -> None:
     """Where the pictures are."""
     said = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
-    _line(_console(), f"{folder}: {said}")
+    print_line(new_console(), f"{folder}: {said}")
 
 
 def checks(name: str, measured: Sequence[Check]) -> None:
     """An op-amp's figures, by the catalogue and by its model in ngspice."""
-    table = _table(f"{name} in ngspice", "figure", "catalogue", "measured", "")
+    table = new_table(f"{name} in ngspice", "figure", "catalogue", "measured", "")
     for row in measured:
-        _row(
+        add_row(
             table,
             row.figure + (" (assumed)" if row.assumed else ""),
             format_quantity(row.expected, row.unit),
             format_quantity(row.measured, row.unit),
             "" if row.agrees else f"differ by more than {100 * row.tolerance:g} %",
         )
-    _console().print(table)
+    new_console().print(table)
 
 
 def catalog(held: Catalog) -> None:
     """What can be bought."""
-    console = _console()
-    table = _table("Families", "name", "kind", "series", "range", "grade", "price class")
+    console = new_console()
+    table = new_table("Families", "name", "kind", "series", "range", "grade", "price class")
     for family in held.families:
         unit = "Ω" if family.kind == "resistor" else "F"
         low, high = (format_quantity(end, unit) for end in family.range)
-        _row(
+        add_row(
             table,
             family.name,
             family.kind,
@@ -238,9 +240,9 @@ def catalog(held: Catalog) -> None:
             str(family.price),
         )
     console.print(table)
-    table = _table("Op-amps", "name", "sections", "saturation", "gain-bandwidth", "price class")
+    table = new_table("Op-amps", "name", "sections", "saturation", "gain-bandwidth", "price class")
     for opamp in held.opamps:
-        _row(
+        add_row(
             table,
             opamp.name,
             str(opamp.sections),
@@ -255,13 +257,13 @@ def catalog(held: Catalog) -> None:
         ("Trimmers", [entry.name for entry in held.trimmers]),
         ("Headers", [entry.name for entry in held.headers]),
     ):
-        _line(console, f"{what}: {', '.join(names) or 'none'}")
+        print_line(console, f"{what}: {', '.join(names) or 'none'}")
 
 
 def files(folder: Path, reused: bool) -> None:
     """Where the results are."""
     how = "was there already, from the same inputs" if reused else "written"
-    _line(_console(), f"{folder}: {how}")
+    print_line(new_console(), f"{folder}: {how}")
 
 
 def doubts(trust: Mapping[str, Any]) -> list[str]:
@@ -285,12 +287,12 @@ def _with_its_figures(row: Mapping[str, Any]) -> dict[str, Any]:
     return said
 
 
-def _console() -> Console:
+def new_console() -> Console:
     """On standard error; wide enough for a row where there is no terminal to ask."""
     return Console(stderr=True, width=None if sys.stderr.isatty() else 120)
 
 
-def _table(title: str, *columns: str, gap: int = 2) -> Table:
+def new_table(title: str, *columns: str, gap: int = 2) -> Table:
     """No lines, so that the longest fits into 80 columns."""
     table = Table(title=f"\n{title}", title_justify="left", box=None, padding=(0, gap, 0, 0))
     for column in columns:
@@ -298,11 +300,11 @@ def _table(title: str, *columns: str, gap: int = 2) -> Table:
     return table
 
 
-def _row(table: Table, *cells: str) -> None:
+def add_row(table: Table, *cells: str) -> None:
     table.add_row(*(Text(cell) for cell in cells))
 
 
-def _line(console: Console, text: str) -> None:
+def print_line(console: Console, text: str) -> None:
     console.print(Text(text), soft_wrap=True)
 
 

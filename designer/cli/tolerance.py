@@ -20,11 +20,11 @@ from designer.cli.app import (
     Seed,
     Source,
     Verbose,
-    _compiling,
-    _session,
     app,
+    compiling,
+    session,
 )
-from designer.cli.verbs import _answer
+from designer.cli.verbs import print_answer
 
 
 class MapOver(StrEnum):
@@ -81,7 +81,7 @@ def tolerance(
     log: Log = None,
 ) -> int:
     """How many boards will work; writes into the design folder (a model file needs --out)."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import search_job, study_job, synthesise_job
         from designer.jobs.options import Options
 
@@ -103,4 +103,4 @@ def tolerance(
         modelfile = search_job.chosen(modelfile, folder, options, progress)
         command = partial(Options.command, verb="tolerance", model=model, out=out)
         outcome = study_job.run_into(modelfile, folder, options, progress, command)
-    return _answer(outcome, json, quiet, "tolerance")
+    return print_answer(outcome, json, quiet, "tolerance")

@@ -18,10 +18,10 @@ from designer.cli.app import (
     Seed,
     Source,
     Verbose,
-    _compiling,
-    _print_json,
-    _session,
     app,
+    compiling,
+    print_json,
+    session,
 )
 
 
@@ -45,7 +45,7 @@ def trade(
     log: Log = None,
 ) -> int:
     """Time and error of every rung on this design, and the cheapest for each question."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.base.checks import at_least
         from designer.jobs import synthesise_job, trade_job
         from designer.model.model_file import read_model_file
@@ -60,7 +60,7 @@ def trade(
         extent = trade_job.Extent(boards=boards)
         answer, _ = trade_job.answer(modelfile, folder, options, extent, progress)
     if json:
-        _print_json(answer)
+        print_json(answer)
     elif not quiet:
         from designer.fidelity.trade_files import sheet
 

@@ -28,10 +28,10 @@ from designer.cli.app import (
     Seed,
     Source,
     Verbose,
-    _compiling,
-    _print_json,
-    _session,
     app,
+    compiling,
+    print_json,
+    session,
 )
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def run(
     log: Log = None,
 ) -> int:
     """Everything: parts, circuit, check in ngspice, yield, report."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import search_job, study_job, synthesise_job
         from designer.jobs.options import Options
 
@@ -95,7 +95,7 @@ def run(
         modelfile = search_job.chosen(modelfile, folder, options, progress)
         command = partial(Options.command, verb="run", model=model, out=out)
         outcome = study_job.run_into(modelfile, folder, options, progress, command)
-    return _answer(outcome, json, quiet, "run")
+    return print_answer(outcome, json, quiet, "run")
 
 
 @app.command()
@@ -115,7 +115,7 @@ def synthesise(
     log: Log = None,
 ) -> int:
     """Choose the parts and write the design folder."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import search_job, synthesise_job
         from designer.model.model_file import read_model_file
 
@@ -129,7 +129,7 @@ def synthesise(
             outcome = synthesise_job.synthesise_into(
                 modelfile, folder, options, progress, compare=compare
             )
-    return _answer(outcome, json, quiet, "synthesise")
+    return print_answer(outcome, json, quiet, "synthesise")
 
 
 app.command("synthesize", hidden=True)(synthesise)
@@ -163,7 +163,7 @@ def simulate(
     log: Log = None,
 ) -> int:
     """The responses: those that the model file wants, or what is reached from rest at --omega."""
-    with _session(verbose, quiet, log) as progress, _compiling(progress):
+    with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import synthesise_job
 
         synthesise_job.Options(seed, jobs).check()
@@ -171,7 +171,7 @@ def simulate(
             model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
         )
     if json:
-        _print_json(answer)
+        print_json(answer)
     elif not quiet:
         from designer.cli import tables
 
@@ -193,7 +193,7 @@ def catalog(
     log: Log = None,
 ) -> int:
     """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
-    with _session(verbose, quiet, log):
+    with session(verbose, quiet, log):
         from designer.catalog.catalog import load_catalog
 
         held = load_catalog()
@@ -204,14 +204,14 @@ def catalog(
     if check is not None:
         if json:
             rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
-            _print_json({"format": 1, "opamp": check, "checks": rows, "hash": held.hash})
+            print_json({"format": 1, "opamp": check, "checks": rows, "hash": held.hash})
         elif not quiet:
             from designer.cli import tables
 
             tables.checks(check, measured)
         return 0 if all(row.agrees for row in measured) else 1
     if json:
-        _print_json(
+        print_json(
             {
                 "format": 1,
                 "opamps": [entry.name for entry in held.opamps],
@@ -241,7 +241,7 @@ def new(
     log: Log = None,
 ) -> int:
     """Write a commented model file to start from; an existing file is left alone."""
-    with _session(verbose, quiet, log):
+    with session(verbose, quiet, log):
         from designer.model.template import TEXT
 
         try:
@@ -254,18 +254,18 @@ def new(
                 path, "PATH", error.strerror or str(error), "a file that can be written"
             ) from None
     if json:
-        _print_json({"format": 1, "files": [str(path)]})
+        print_json({"format": 1, "files": [str(path)]})
     elif not quiet:
         print(f"written: {path}", file=sys.stderr)
     return 0
 
 
-def _answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
+def print_answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
     answer = outcome.answer
     if verb == "tolerance":
         answer = {**{k: answer[k] for k in STUDY_KEYS}, "cost": answer["cost"]["study"]}
     if json:
-        _print_json(answer)
+        print_json(answer)
     elif not quiet:
         from designer.cli import tables
 

@@ -83,7 +83,7 @@ class ModalTables(NamedTuple):
 
 
 @compiled
-def _jump(data: Float, m: int, part: int, work: Float) -> None:
+def jump_stretch(data: Float, m: int, part: int, work: Float) -> None:
     """POINT = state ``part`` parts after G."""
     o = (m & 3) * WIDTH + JUMP + 10 * (part & 127)
     a, b, c, d = work[G], work[G + 1], work[G + 2], work[G + 3]
@@ -97,11 +97,11 @@ def _jump(data: Float, m: int, part: int, work: Float) -> None:
 
 
 @compiled
-def _expand(data: Float, m: int, t: float, work: Float) -> float:
+def expand_series(data: Float, m: int, t: float, work: Float) -> float:
     """Time of the part nearest to t; COEF = Taylor series of displacement - CENTRE about it."""
     o = (m & 3) * WIDTH
     part = int(t * data[o + STEP + 2] + 0.5)
-    _jump(data, m, part, work)
+    jump_stretch(data, m, part, work)
     for k in range(TERMS):
         total = 0.0
         for j in range(6):
@@ -111,7 +111,7 @@ def _expand(data: Float, m: int, t: float, work: Float) -> float:
 
 
 @compiled
-def _value(work: Float, s: float) -> tuple[float, float, float]:
+def series_value(work: Float, s: float) -> tuple[float, float, float]:
     """Displacement, rate and half the acceleration a time s from the expanded part."""
     f = work[COEF + TERMS - 1]
     d = e = 0.0
@@ -144,11 +144,11 @@ def _turn(data: Float, o: int, phi: Float) -> None:
 
 
 @compiled
-def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
+def move_map(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
     """G ← the state a time t on, 0 <= t <= STEPS · h; phi ← its tangent vectors."""
     o = (m & 3) * WIDTH
     part = int(t * data[o + STEP + 2] + 0.5)
-    _jump(data, m, part, work)
+    jump_stretch(data, m, part, work)
     s = t - part * data[o + STEP + 1]
     for i in range(8):
         total = data[o + NEAR + 8 * (TERMS - 1) + i]
@@ -171,7 +171,7 @@ def _move(data: Float, m: int, t: float, work: Float, phi: Float) -> None:
 
 
 @compiled
-def _apply(data: Float, o: int, work: Float, place: int) -> None:
+def apply_change(data: Float, o: int, work: Float, place: int) -> None:
     """work[place : place + 4] ← the (4, 7) matrix that stands at o, by columns, times (G, 1)."""
     o &= 0xFFFF
     place &= 0xFF
@@ -183,7 +183,7 @@ def _apply(data: Float, o: int, work: Float, place: int) -> None:
 
 
 @compiled
-def _fourth(data: Float, m: int, work: Float) -> float:
+def fourth_derivative(data: Float, m: int, work: Float) -> float:
     """A bound of |d⁴ displacement/dt⁴| from here on: a mode's motion cannot grow."""
     o = (m & 3) * WIDTH + BOUND
     a, b, c, d = work[G], work[G + 1], work[G + 2], work[G + 3]
@@ -193,7 +193,7 @@ def _fourth(data: Float, m: int, work: Float) -> float:
 
 
 @compiled
-def _scan(data: Float, m: int, work: Float) -> None:
+def scan_nodes(data: Float, m: int, work: Float) -> None:
     """F, D = displacement and rate at the nodes."""
     o = (m & 3) * WIDTH + SCAN
     a, b, c, d, sn, cs = work[G], work[G + 1], work[G + 2], work[G + 3], work[G + 4], work[G + 5]
@@ -206,7 +206,7 @@ def _scan(data: Float, m: int, work: Float) -> None:
 
 
 @compiled
-def _suspect(data: Float, m: int, m4: float, count: int, work: Float, k: int) -> int:
+def suspect_node(data: Float, m: int, m4: float, count: int, work: Float, k: int) -> int:
     """First step from k on, below count, that is not proved to stay within the limits.
 
     With end values at or within a limit and both middle Bernstein coefficients at least r within,
@@ -227,7 +227,7 @@ def _suspect(data: Float, m: int, m4: float, count: int, work: Float, k: int) ->
 
 
 @compiled
-def _crossing(
+def find_crossing(
     data: Float, m: int, k: int, m4: float, target: float, sign: float, work: Float
 ) -> float:
     """First time in step k at which sign · (displacement - target) rises through 0, or -1."""
@@ -264,7 +264,7 @@ def _crossing(
         if w < FINEST * h or top + 2 >= ROOM:
             continue
         t = 0.5 * (a + b)
-        f, d, _ = _value(work, t - _expand(data, m, t, work))
+        f, d, _ = series_value(work, t - expand_series(data, m, t, work))
         f, d = sign * (f - target), sign * d
         work[o], work[o + 1] = t, b
         work[o + 2], work[o + 3], work[o + 4], work[o + 5] = f, d, fb, db
@@ -289,7 +289,7 @@ def _newton(data: Float, m: int, o: int, target: float, sign: float, work: Float
         s -= (fa + s * (w * da + s * (c2 + s * c3))) / (w * da + s * (2.0 * c2 + 3.0 * s * c3))
     t = a + min(max(s, 0.0), 1.0) * w
     for _ in range(60):
-        f, d, e = _value(work, t - _expand(data, m, t, work))
+        f, d, e = series_value(work, t - expand_series(data, m, t, work))
         f, d, e = sign * (f - target), sign * d, sign * e
         a, b = (a, t) if f > 0.0 else (t, b)
         step = f / d
@@ -326,7 +326,7 @@ def advance(
     for i in range(4):
         work[G + i] = x[i]
     work[G + 5] = 1.0
-    _apply(data, m * WIDTH + MODAL, work, G)
+    apply_change(data, m * WIDTH + MODAL, work, G)
     if phi.shape[0] > 0:
         _turn(data, m * WIDTH + MODAL, phi)
     t, events, done, code = 0.0, 0, 0, DONE
@@ -334,29 +334,29 @@ def advance(
         o = (m & 3) * WIDTH
         h, low, high = data[o + STEP], data[o + LIMIT], data[o + LIMIT + 1]
         left = period - t
-        m4 = _fourth(data, m, work)
-        _scan(data, m, work)
+        m4 = fourth_derivative(data, m, work)
+        scan_nodes(data, m, work)
         count = min(STEPS, int(left / h) + 1)
         first, side = -1.0, 0
-        k = _suspect(data, m, m4, count, work, 0)
+        k = suspect_node(data, m, m4, count, work, 0)
         while k < count:
             if high < np.inf:
-                first, side = _crossing(data, m, k, m4, high, 1.0, work), 1
+                first, side = find_crossing(data, m, k, m4, high, 1.0, work), 1
             if low > -np.inf:
-                other = _crossing(data, m, k, m4, low, -1.0, work)
+                other = find_crossing(data, m, k, m4, low, -1.0, work)
                 if other >= 0.0 and (first < 0.0 or other < first):
                     first, side = other, -1
             if first >= 0.0:
                 break
-            k = _suspect(data, m, m4, count, work, k + 1)
+            k = suspect_node(data, m, m4, count, work, k + 1)
         if 0.0 <= first <= left:
-            _move(data, m, first, work, phi)
+            move_map(data, m, first, work, phi)
             t += first
             n = 0
             if m == 0:
                 n = 1 if side > 0 else 2
                 impacts[done, 1 if side > 0 else 0] += 1
-            _apply(data, o + CHANGE + 28 * n, work, G)
+            apply_change(data, o + CHANGE + 28 * n, work, G)
             if phi.shape[0] > 0:
                 _turn(data, o + CHANGE + 28 * n, phi)
             m = n
@@ -364,18 +364,18 @@ def advance(
             if events > max_events:
                 code = TOO_MANY_EVENTS
         elif first < 0.0 and STEPS * h < left:
-            _jump(data, m, LAST, work)
+            jump_stretch(data, m, LAST, work)
             for i in range(6):
                 work[G + i] = work[POINT + i]
             if phi.shape[0] > 0:
                 _carry(data, m, LAST, phi)
             t += STEPS * h
         else:
-            _move(data, m, left, work, phi)
+            move_map(data, m, left, work, phi)
             t, events = 0.0, 0
             done += 1
             work[G + 4], work[G + 5] = 0.0, 1.0
-            _apply(data, o + STATE, work, POINT)
+            apply_change(data, o + STATE, work, POINT)
             for i in range(4):
                 strobes[done, i] = work[POINT + i]
             if not (abs(strobes[done, 0]) < 1e12):

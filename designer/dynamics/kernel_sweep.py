@@ -38,16 +38,16 @@ from designer.dynamics.kernel_modal import (
     F,
     G,
     ModalTables,
-    _apply,
-    _crossing,
-    _expand,
-    _fourth,
-    _jump,
-    _move,
-    _scan,
-    _suspect,
-    _value,
     advance,
+    apply_change,
+    expand_series,
+    find_crossing,
+    fourth_derivative,
+    jump_stretch,
+    move_map,
+    scan_nodes,
+    series_value,
+    suspect_node,
 )
 
 Float = NDArray[np.float64]
@@ -89,7 +89,7 @@ def _dips(stamp: int) -> Callable[..., Any]:
             fa, da = work[i], work[i + NODES]
             if b > end:
                 b = end
-                fb, db, _ = _value(work, b - _expand(data, m, b, work))
+                fb, db, _ = series_value(work, b - expand_series(data, m, b, work))
             work[STACK], work[STACK + 1] = a, b
             work[STACK + 2], work[STACK + 3] = fa, da
             work[STACK + 4], work[STACK + 5] = fb, db
@@ -114,7 +114,7 @@ def _dips(stamp: int) -> Callable[..., Any]:
                 if da < 0.0 < db and w < 0.2 * h:
                     low, high, t = a, b, a + w * da / (da - db)
                     for _ in range(40):
-                        f, d, e = _value(work, t - _expand(data, m, t, work))
+                        f, d, e = series_value(work, t - expand_series(data, m, t, work))
                         best = min(best, f)
                         low, high = (low, t) if d > 0.0 else (t, high)
                         u = t - 0.5 * d / e if e > 0.0 else low
@@ -127,7 +127,7 @@ def _dips(stamp: int) -> Callable[..., Any]:
                 if top + 2 >= ROOM or w < 1e-3 * h:
                     continue
                 t = 0.5 * (a + b)
-                f, d, _ = _value(work, t - _expand(data, m, t, work))
+                f, d, _ = series_value(work, t - expand_series(data, m, t, work))
                 work[s], work[s + 1] = t, b
                 work[s + 2], work[s + 3], work[s + 4], work[s + 5] = f, d, fb, db
                 work[s + 6], work[s + 7] = a, t
@@ -168,28 +168,28 @@ def _observes(stamp: int) -> Callable[..., Any]:
         for i in range(4):
             work[G + i] = strobes[0, i]
         work[G + 5] = 1.0
-        _apply(data, m * WIDTH + MODAL, work, G)
+        apply_change(data, m * WIDTH + MODAL, work, G)
         t, events, done, met, code = 0.0, 0, 0, 0, DONE
         minima[0] = np.inf
         while done < minima.shape[0] and code == DONE:
             o = (m & 3) * WIDTH
             h, low, high = data[o + STEP], data[o + LIMIT], data[o + LIMIT + 1]
             left = period - t
-            m4 = _fourth(data, m, work)
-            _scan(data, m, work)
+            m4 = fourth_derivative(data, m, work)
+            scan_nodes(data, m, work)
             count = min(STEPS, int(left / h) + 1)
             first, side = -1.0, 0
-            k = _suspect(data, m, m4, count, work, 0)
+            k = suspect_node(data, m, m4, count, work, 0)
             while k < count:
                 if high < np.inf:
-                    first, side = _crossing(data, m, k, m4, high, 1.0, work), 1
+                    first, side = find_crossing(data, m, k, m4, high, 1.0, work), 1
                 if low > -np.inf:
-                    other = _crossing(data, m, k, m4, low, -1.0, work)
+                    other = find_crossing(data, m, k, m4, low, -1.0, work)
                     if other >= 0.0 and (first < 0.0 or other < first):
                         first, side = other, -1
                 if first >= 0.0:
                     break
-                k = _suspect(data, m, m4, count, work, k + 1)
+                k = suspect_node(data, m, m4, count, work, k + 1)
             crosses = 0.0 <= first <= left
             end = first if crosses else min(STEPS * h, left)
             minima[done] = _dip(data, m, m4, end, work, minima[done])
@@ -199,32 +199,34 @@ def _observes(stamp: int) -> Callable[..., Any]:
                     n = 1 if side > 0 else 2
                     if side > 0:
                         if met < velocities.shape[0]:
-                            _, rate, _ = _value(work, first - _expand(data, m, first, work))
+                            _, rate, _ = series_value(
+                                work, first - expand_series(data, m, first, work)
+                            )
                             velocities[met] = rate
                         met += 1
-                _move(data, m, first, work, phi)
+                move_map(data, m, first, work, phi)
                 t += first
-                _apply(data, o + CHANGE + 28 * n, work, G)
+                apply_change(data, o + CHANGE + 28 * n, work, G)
                 m = n
                 events += 1
                 if events > max_events:
                     code = TOO_MANY_EVENTS
             elif STEPS * h < left:
-                _jump(data, m, LAST, work)
+                jump_stretch(data, m, LAST, work)
                 for i in range(6):
                     work[G + i] = work[POINT + i]
                 t += STEPS * h
             else:
-                _move(data, m, left, work, phi)
+                move_map(data, m, left, work, phi)
                 t, events = 0.0, 0
                 done += 1
                 if done < minima.shape[0]:
                     minima[done] = np.inf
                 work[G + 4], work[G + 5] = 0.0, 1.0
-                _apply(data, o + STATE, work, POINT)
+                apply_change(data, o + STATE, work, POINT)
                 for i in range(4):
                     strobes[done, i] = work[POINT + i]
-            _apply(data, (m & 3) * WIDTH + STATE, work, POINT)
+            apply_change(data, (m & 3) * WIDTH + STATE, work, POINT)
             for i in range(4):
                 peak[i] = max(peak[i], abs(work[POINT + i]))
         cursor[0], cursor[1] = m, met

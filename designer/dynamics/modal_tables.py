@@ -44,7 +44,7 @@ def tables(system: PiecewiseLinearSystem, drive: Drive) -> ModalTables | None:
     known: dict[bytes, Oscillators | None] = {}  # both contacts have the same A
     for i, mode in modes.items():
         key = mode.A.tobytes()
-        parts = known[key] if key in known else known.setdefault(key, _oscillators(mode.A))
+        parts = known[key] if key in known else known.setdefault(key, oscillators_of(mode.A))
         forced = _forced(mode, drive)
         if parts is None or forced is None:
             return None
@@ -119,7 +119,7 @@ class Oscillators:
     rate: float
 
 
-def _oscillators(A: Array) -> Oscillators | None:
+def oscillators_of(A: Array) -> Oscillators | None:
     """None where the modal form cannot be trusted."""
     roots: Complex = np.linalg.eigvals(A).astype(complex)
     factors = _quadratics(roots)

@@ -21,7 +21,7 @@ def of_system(system: PiecewiseLinearSystem) -> kernel.Modes | None:
     except ArithmeticError:  # with ideal op-amps nothing closes the loop between two diodes
         return None
     most = max(len(mode.guards) for mode in modes)
-    out = _empty(1, len(keys), most)
+    out = empty_modes(1, len(keys), most)
     for k, mode in enumerate(modes):
         out.A[0, k], out.B[0, k], out.d[0, k] = mode.A, mode.B, mode.d
         out.guards[k], out.side[k] = len(mode.guards), mode.sides[0]
@@ -73,7 +73,7 @@ def trail(room: int) -> kernel.Trail:
     )
 
 
-def _empty(boards: int, modes: int, guards: int) -> kernel.Modes:
+def empty_modes(boards: int, modes: int, guards: int) -> kernel.Modes:
     return kernel.Modes(
         A=np.zeros((boards, modes, STATES, STATES)),
         B=np.zeros((boards, modes, STATES)),

@@ -19,8 +19,8 @@ from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.store import GridStore, SweepStore, work_hash
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
-from designer.circuit.swept_board import BoardSubject, Subject
-from designer.jobs.bifurcation_request import Plan, Request, plan_of
+from designer.circuit.swept_board import BoardSubject
+from designer.jobs.bifurcation_request import Plan, Request, Swept, plan_of
 from designer.jobs.origin import provenance
 from designer.jobs.synthesise_job import read_design, source
 from designer.model.model_file import ModelFile, read_model_file
@@ -73,7 +73,7 @@ def answer(
 # ---------------------------------------------------------------------------------------------
 
 
-def _subject(path: Path, request: Request, progress: Progress) -> tuple[ModelFile, Subject]:
+def _subject(path: Path, request: Request, progress: Progress) -> tuple[ModelFile, Swept]:
     if path.is_dir():
         if request.circuit:
             made = read_design(path, progress=progress)

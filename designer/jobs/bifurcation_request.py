@@ -16,7 +16,7 @@ from designer.bifurcations import parameter_map, sweep
 from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
-from designer.circuit.swept_board import BoardSubject, Subject
+from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.steady_state import Course
 from designer.model.find_responses import check_omega
 from designer.model.model_file import ModelFile
@@ -27,6 +27,8 @@ MOST_CELLS = 4_000_000
 """Of a map or a basin."""
 BASIN_STEPS = 200
 """Of each axis of a basin where nothing is said."""
+
+Swept = ModelSubject | BoardSubject
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class Request:
 Plan = SweepPlan | MapPlan | BasinPlan
 
 
-def plan_of(request: Request, subject: Subject, modelfile: ModelFile) -> Plan:
+def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     """What is to be made.
 
     Raises
@@ -166,7 +168,7 @@ def _course(request: Request, usual: Course) -> Course:
     return replace(usual, settle=settle, keep=keep)
 
 
-def _basin_plan(request: Request, subject: Subject, modelfile: ModelFile) -> BasinPlan:
+def _basin_plan(request: Request, subject: Swept, modelfile: ModelFile) -> BasinPlan:
     states = subject.states
     name, start, stop, count = request.second or (states[1], None, None, None)
     over = request.over or states[0]
@@ -207,7 +209,7 @@ def _basin_plan(request: Request, subject: Subject, modelfile: ModelFile) -> Bas
     )
 
 
-def _changes(subject: Subject) -> dict[str, float]:
+def _changes(subject: Swept) -> dict[str, float]:
     if isinstance(subject, BoardSubject):
         assert subject.frequency is not None
         return {"frequency": subject.frequency}
@@ -216,8 +218,8 @@ def _changes(subject: Subject) -> dict[str, float]:
 
 
 def _at_frequency(
-    request: Request, subject: Subject, modelfile: ModelFile, swept: list[str]
-) -> Subject:
+    request: Request, subject: Swept, modelfile: ModelFile, swept: list[str]
+) -> Swept:
     """With the drive's frequency fixed, where it is not swept: --omega, or the first response's."""
     if "omega" in swept or "frequency" in swept:
         if request.omega is not None:

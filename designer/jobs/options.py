@@ -9,7 +9,8 @@ from pathlib import Path
 
 from designer.base.checks import at_least
 from designer.base.errors import InputError
-from designer.yields.study import SAMPLES, SEED, RungName
+from designer.yields.study import SAMPLES, SEED
+from designer.yields.study_layers import RungName
 from designer.yields.yield_maps import Over
 
 MOST_SAMPLES = 1_000_000

@@ -23,7 +23,7 @@ from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
 from designer.jobs.options import Options
 from designer.yields.ngspice_sampling import NOMINAL_SAMPLES, OWN_SAMPLES
-from designer.yields.study import RUNGS, RungName
+from designer.yields.study_layers import RUNGS, RungName
 
 TRADE = "trade.json"
 """What ``jobs.trade_job`` writes."""

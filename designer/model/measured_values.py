@@ -15,22 +15,19 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
 from designer.base.errors import InputError
-from designer.base.schema import did_you_mean, one_of
-from designer.base.units import format_quantity, parse_quantity
-from designer.circuit.netlist import Circuit
+from designer.base.schema import one_of
+from designer.base.units import parse_quantity
 
 MEASURED = "measured.csv"
 """A design folder's own copy."""
 _MOST_BYTES = 4_000_000
 _COLUMNS = ("part", "value", "tolerance", "board")
-_FACTOR = 2.0
-"""A part is no further from the value it is sold for: a slip of a prefix is a factor of 1000."""
 _UNITS = (
     (re.compile(r"R[1-9]\d{0,3}[AB]?", re.ASCII), "Ω"),
     (re.compile(r"C[1-9]\d{0,3}[AB]?", re.ASCII), "F"),
@@ -66,39 +63,6 @@ class Measured:
     def as_dict(self) -> dict[str, Any]:
         """What decides the boards; the values by the hash of their file."""
         return {"sha256": self.sha256, "boards": list(self.boards), "parts": sorted(self.values)}
-
-    def check(self, circuit: Circuit) -> None:
-        """Refuse what cannot be of this circuit.
-
-        Raises
-        ------
-        InputError : a part that it lacks, or a value far from the one that the part is sold for.
-        """
-        self.check_names(circuit)
-        nominal = _nominal(circuit)
-        for name, values in self.values.items():
-            where = f"line {self.lines.get(name, 0)}"
-            low, high, unit = nominal[name]
-            for value in values:
-                if not math.isnan(value) and not low <= value <= high:
-                    ends = " to ".join(format_quantity(end, unit) for end in (low, high))
-                    found = f"{name}, {format_quantity(value, unit)}"
-                    raise InputError(self.source, where, found, f"a value within {ends}")
-
-    def check_names(self, circuit: Circuit, more: Collection[str] = ()) -> None:
-        """Refuse parts that are neither of this circuit nor among ``more``.
-
-        Raises
-        ------
-        InputError : names the first of them.
-        """
-        known = [*_nominal(circuit), *more]
-        for name in self.values:
-            if name not in known:
-                hint = did_you_mean(name, known)
-                expected = "a part of this design" + (f"; {hint}" if hint else "")
-                where = f"line {self.lines.get(name, 0)}"
-                raise InputError(self.source, where, name, expected)
 
 
 def read_measured(path: Path) -> Measured:
@@ -202,24 +166,3 @@ class _Reader:
         if not 0.0 <= width < math.inf:
             self.refuse(text, f"{expected}, not below 0")
         return width
-
-
-def _nominal(circuit: Circuit) -> dict[str, tuple[float, float, str]]:
-    """Lowest and highest value, and unit, of everything that can be measured on a board."""
-
-    def about(value: float, unit: str) -> tuple[float, float, str]:
-        ends = sorted((value / _FACTOR, value * _FACTOR))
-        return ends[0], ends[1], unit
-
-    found = {r.name: about(r.value, "Ω") for r in circuit.resistors}
-    found |= {c.name: about(c.value, "F") for c in circuit.capacitors}
-    found |= {r.name: about(r.volts, "V") for r in circuit.references}
-    found |= {rail.name: about(rail.volts, "V") for rail in circuit.rails}
-    supply = circuit.supply
-    for s in circuit.sections:
-        found[f"{s.name}.offset"] = (-supply, supply, "V")
-        found[f"{s.name}.low"] = (-_FACTOR * supply, 0.0, "V")
-        found[f"{s.name}.high"] = (0.0, _FACTOR * supply, "V")
-        found[f"{s.name}.bias"] = (-1e-3, 1e-3, "A")
-        found[f"{s.name}.gbw"] = (1.0, 1e12, "Hz")
-    return found

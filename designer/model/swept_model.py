@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -31,6 +31,7 @@ class ModelSubject:
     and "λ" for the axes of a diagram; none where dimensionless.
     """
 
+    whose: ClassVar[str] = "model"
     model: Dimensionless
     omega: float | None = None
     parameters: tuple[str, ...] = MODEL_PARAMETERS
@@ -72,6 +73,19 @@ class ModelSubject:
             assert omega is not None
             out = np.maximum(out, scale_of(_changed(self.model, change), omega))
         return out
+
+    def family(self, parameter: str) -> Family:
+        """One flow for each value of a parameter, the others as they stand."""
+        return of_model(self.model, 1.0 if self.omega is None else self.omega, parameter)
+
+    def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
+        """ω and the model's parameters."""
+        numbers = {f.name: getattr(self.model, f.name) for f in fields(self.model)}
+        return {"omega": self.omega, **{k: v for k, v in numbers.items() if k != "sides"}}
+
+    def remarks(self) -> tuple[str, ...]:
+        """Which stop there is, where there is one only."""
+        return () if self.model.sides == "both" else (f"{self.model.sides} stop only",)
 
     def as_dict(self) -> dict[str, object]:
         """What decides the flow, for hashes and provenance."""

@@ -91,7 +91,7 @@ class ModalBatch:
     def _oscillators(self, A: Array) -> Oscillators | None:
         key = A.tobytes()
         if key not in self._known:
-            self._known[key] = modal_tables._oscillators(A)
+            self._known[key] = modal_tables.oscillators_of(A)
         return self._known[key]
 
 

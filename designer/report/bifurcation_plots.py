@@ -18,9 +18,9 @@ from designer.base.figure_style import GRID, INK, MUTED, new_figure, style
 from designer.bifurcations.basins import SAME, Basins
 from designer.bifurcations.parameter_map import Cell, ParameterMap
 from designer.bifurcations.points import Bifurcation
+from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.bifurcations.titles import NAMES, title
-from designer.circuit.swept_board import Subject
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
 

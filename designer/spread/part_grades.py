@@ -8,7 +8,7 @@ from designer.catalog.entries import Kind
 from designer.circuit.netlist import Capacitor, Circuit, Resistor
 from designer.model.board_table import PartArray
 from designer.model.model_file import ModelFile
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 
 
 def bought(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> dict[str, float]:
@@ -18,7 +18,7 @@ def bought(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> dict[str
     bench) is for the study alone: the part is then bought as the others of its kind are. Elements
     of arrays are not bought one by one.
     """
-    stated = Spread.of(modelfile, circuit, catalog).grades
+    stated = spread_of(modelfile, circuit, catalog).grades
     inside = {name for a in arrays(modelfile, circuit, catalog) for name in a.parts}
     found = {}
     parts: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)
@@ -40,7 +40,7 @@ def arrays(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> tuple[Pa
     rules = modelfile.spread.network
     if not any(rule.family for rule in rules):
         return ()
-    groups = {g.name: g.parts for g in Spread.of(modelfile, circuit, catalog).groups}
+    groups = {g.name: g.parts for g in spread_of(modelfile, circuit, catalog).groups}
     out: list[PartArray] = []
     for number, rule in enumerate(rules, start=1):
         if rule.family is not None:

@@ -14,6 +14,7 @@ from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.circuit.resistors import composites_of
 from designer.model.distributions import Law, Split, Uniform
 from designer.model.spread_table import DataSheet, PartRule, Shape, check_binned
+from designer.spread.measured_check import check_measured, check_measured_names
 from designer.spread.spread import Group, Spread
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def check_names(modelfile: ModelFile, circuit: Circuit) -> None:
             if name not in known and name not in halves:
                 raise InputError(modelfile.source, f"spread.{field}", name, one_of(name, known))
     if modelfile.measured is not None:
-        modelfile.measured.check_names(circuit, halves)
+        check_measured_names(modelfile.measured, circuit, halves)
 
 
 class _Rules:
@@ -76,7 +77,7 @@ class _Rules:
         offset = rules.offset
         measured = self.modelfile.measured
         if measured is not None:
-            measured.check(self.circuit)
+            check_measured(measured, self.circuit)
         elif rules.measured is not None:
             raise self.refuse("measured", rules.measured, "a model file on disk, with the list")
         return Spread(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog, OpAmp
+from designer.catalog.catalog import OpAmp
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resistor
 from designer.model.distributions import Law, Normal, Uniform
@@ -24,7 +24,7 @@ from designer.model.measured_values import Measured
 from designer.spread import random_streams
 
 if TYPE_CHECKING:
-    from designer.model.model_file import ModelFile
+    pass
 
 NAME = "bench-1"
 SATURATION_SPREAD = 0.05
@@ -90,18 +90,6 @@ class Spread:
     ageing: Mapping[str, Law] = field(default_factory=dict)
     groups: tuple[Group, ...] = ()
     measured: Measured | None = None
-
-    @classmethod
-    def of(cls, modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Spread:
-        """What a model file says about the boards of a circuit; ``bench-1`` where it says nothing.
-
-        Raises
-        ------
-        InputError : see ``part_rules.spread_of``.
-        """
-        from designer.spread.part_rules import spread_of  # which makes what is defined here
-
-        return spread_of(modelfile, circuit, catalog)
 
     @classmethod
     def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from designer.check.checked_design import Checked
 from designer.yields import two_engine_yield as combined
@@ -14,16 +13,11 @@ from designer.yields.joint_yield import all_on_one
 from designer.yields.ngspice_sampling import Hearing
 from designer.yields.power_up_yield import Reached
 from designer.yields.start_recipe import Recipe
-from designer.yields.study_layers import RUNGS, RungName, Stores
-from designer.yields.tolerance_study import check, tolerance
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
 from designer.yields.verdict import Answer, StudyPlan, Yield, count
 from designer.yields.yield_maps import YieldMap
-
-if TYPE_CHECKING:
-    pass
 
 SAMPLES = 200
 SEED = 1
@@ -127,15 +121,3 @@ class Study:
         for a in self.answers:
             by[self.asked[a.question]].append(a)
         return {index: tuple(rows) for index, rows in by.items()}
-
-
-__all__ = (
-    "RUNGS",
-    "SAMPLES",
-    "SEED",
-    "RungName",
-    "Stores",
-    "Study",
-    "check",
-    "tolerance",
-)

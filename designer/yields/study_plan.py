@@ -10,7 +10,7 @@ from designer.check.checked_design import Checked
 from designer.check.trust import Trust
 from designer.circuit.design import Design
 from designer.model.model_file import ModelFile
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 from designer.yields.verdict import Answer, Question, StudyPlan, Yield, count
 
 
@@ -30,7 +30,7 @@ def plan_study(
     """
     return StudyPlan(
         circuit=design.circuit,
-        spread=Spread.of(modelfile, design.circuit, catalog),
+        spread=spread_of(modelfile, design.circuit, catalog),
         seed=seed,
         samples=samples,
         questions=tuple(

@@ -25,7 +25,8 @@ from designer.centering.cure_upgrade import price
 from designer.check.synthesis_result import Synthesis
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_grades import arrays, bought
-from designer.spread.spread import Spread, draw_many
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import draw_many
 from tests.shared import paper_cases
 
 CATALOG = load_catalog()
@@ -97,7 +98,7 @@ def test_elements_are_matched_and_within_their_grade(base: Synthesis) -> None:
     """By the law that is stated: uniform, common and own parts, moments of sums."""
     names, circuit = equal(base, 4), base.design.circuit
     file = with_network(base, {"parts": list(names), "family": NAME})
-    spread = Spread.of(file, circuit, CATALOG)
+    spread = spread_of(file, circuit, CATALOG)
     boards = draw_many(circuit, spread, 3, range(20000))
     off = np.array([boards.values[n] / circuit.values[n] - 1.0 for n in names])
     apart = off[:, None, :] - off[None, :, :]
@@ -108,7 +109,7 @@ def test_elements_are_matched_and_within_their_grade(base: Synthesis) -> None:
     assert off.std(axis=1) == pytest.approx(sigma, rel=0.02)
     correlated = share**2 / (share**2 + (1.0 - share) ** 2)
     assert np.corrcoef(off)[0, 1:] == pytest.approx(correlated, abs=0.01)
-    plain = draw_many(circuit, Spread.of(base.modelfile, circuit, CATALOG), 3, range(50))
+    plain = draw_many(circuit, spread_of(base.modelfile, circuit, CATALOG), 3, range(50))
     again = draw_many(circuit, spread, 3, range(50))
     for name, column in plain.values.items():
         assert name in names or (again.values[name] == column).all()
@@ -149,7 +150,7 @@ def test_what_no_array_can_be_is_refused(base: Synthesis) -> None:
 
     def refused(*networks: dict[str, Any], **more: Any) -> InputError:
         with pytest.raises(InputError) as caught:
-            Spread.of(with_network(base, *networks, **more), circuit, CATALOG)
+            spread_of(with_network(base, *networks, **more), circuit, CATALOG)
         return caught.value
 
     both = refused({"parts": list(four), "family": NAME, "share": 0.5})

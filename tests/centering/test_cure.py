@@ -42,10 +42,11 @@ from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
+from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.yields import exact_rung
 from designer.yields.margins import Limit, Margin
-from designer.yields.study import RungName
+from designer.yields.study_layers import RungName
 from designer.yields.trimmed_yield import trimmed_block
 from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yields.yield_maps import Axis, YieldMap
@@ -74,7 +75,7 @@ def known_margin(nominal: float, otherwise: bool = False) -> Margin:
     weights = OTHERWISE if otherwise else WEIGHTS
     made = branch().made
     circuit = made.design.circuit
-    boards = draw_many(circuit, Spread.of(made.modelfile, circuit, CATALOG), 3, range(4000))
+    boards = draw_many(circuit, spread_of(made.modelfile, circuit, CATALOG), 3, range(4000))
     differing = quantities(circuit, boards)
     slopes = np.array(
         [OFFSET if q.name == "U1A.offset" else weights.get(q.name, 0.0) for q in differing]
@@ -598,7 +599,7 @@ def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> Picture:
     network = network_slots(made)[0]
     weights = dict(zip(network.network, signs, strict=False)) | {"R50": 1.0}
     circuit = made.design.circuit
-    boards = draw_many(circuit, Spread.of(made.modelfile, circuit, CATALOG), 3, range(4000))
+    boards = draw_many(circuit, spread_of(made.modelfile, circuit, CATALOG), 3, range(4000))
     differing = quantities(circuit, boards)
     slopes = np.array([weights.get(q.name, 0.0) if q.group == "values" else 0.0 for q in differing])
     limit = Limit("x", "contact", nominal, 1.0, slopes)
@@ -683,5 +684,5 @@ def test_the_finest_choices_can_be_built() -> None:
     for most in finest(parts, CATALOG):
         seen = Picture(branch(), parts, (), (), 0.0, 5)
         file = upgraded_file(branch().made.modelfile, seen.upgrades(most))
-        Spread.of(file, branch().made.design.circuit, CATALOG)
+        spread_of(file, branch().made.design.circuit, CATALOG)
         assert any(most)

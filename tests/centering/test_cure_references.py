@@ -21,7 +21,8 @@ from designer.centering.cure_ways import Way
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
-from designer.spread.spread import Spread, draw_many
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import draw_many
 from designer.yields.margins import Limit, Margin
 from designer.yields.verdict import Question, StudyPlan, Yield
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
@@ -49,7 +50,7 @@ def test_the_references_are_taken_where_they_move_the_limit(
     """With a limit that is known, so that each option's yield is the share of drawn boards."""
     base, target = design(8, 0.215, "rectifier"), 0.97
     circuit = base.design.circuit
-    boards = draw_many(circuit, Spread.of(base.modelfile, circuit, base.catalog), 3, range(4000))
+    boards = draw_many(circuit, spread_of(base.modelfile, circuit, base.catalog), 3, range(4000))
     differing = quantities(circuit, boards)
     slopes = np.array([2.0 * (q.group == "reference") + (q.part == "R4") for q in differing])
     assert np.count_nonzero(slopes) == 3
@@ -75,7 +76,7 @@ def test_the_references_are_taken_where_they_move_the_limit(
     enough = {}
     for k, model in enumerate(slot.models):
         made = cured(base, Upgrades(reference=model) if k else Upgrades())
-        spread = Spread.of(made.modelfile, made.design.circuit, made.catalog)
+        spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
         drawn = draw_many(made.design.circuit, spread, OTHER_SEED, range(8000))
         if (margin.of(drawn) > 0.0).mean() >= target:
             enough[model] = price(made) - price(base)

@@ -34,7 +34,8 @@ from designer.centering.cure_upgrade import (
 from designer.check.synthesis_result import Synthesis
 from designer.model.model_file import parse_model_file
 from designer.spread.part_grades import bought
-from designer.spread.spread import Spread, draw_many
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import draw_many
 from tests.shared import paper_cases
 
 CATALOG = load_catalog()
@@ -107,8 +108,8 @@ def test_a_better_part_is_bought_and_spreads_less(base: Synthesis) -> None:
     assert (own["designators"], own["grade"]) == ("R50", "0.001")
     count = sum(int(row["quantity"]) for row in rows)
     assert count == len(circuit.resistors) + len(circuit.capacitors) + len(circuit.packages)
-    boards = draw_many(circuit, Spread.of(made.modelfile, circuit, CATALOG), 1, range(2000))
-    plain = draw_many(circuit, Spread.of(base.modelfile, circuit, CATALOG), 1, range(2000))
+    boards = draw_many(circuit, spread_of(made.modelfile, circuit, CATALOG), 1, range(2000))
+    plain = draw_many(circuit, spread_of(base.modelfile, circuit, CATALOG), 1, range(2000))
     narrow = np.std(boards.values["R50"]) / np.std(plain.values["R50"])
     assert narrow == pytest.approx(0.1)
     assert np.array_equal(boards.values["R4"], plain.values["R4"])

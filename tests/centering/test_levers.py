@@ -20,7 +20,7 @@ from designer.centering.places import Scored, score
 from designer.centering.windows import Place, Stretch
 from designer.model import find_responses
 from designer.model.model_file import ModelFile, Response
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 from designer.synthesis import parts_choice
 from tests.shared.search_cases import catalog, file
 
@@ -154,7 +154,7 @@ def _enumerated(modelfile: ModelFile, choice: Choice) -> Candidate:
     found = find_responses.find(model, modelfile.responses)
     held = find_responses.peaks(model, found)
     design = parts_choice.synthesise(model, spec, catalog(), held, found, aims=choice.aims)
-    spread = Spread.of(modelfile, design.circuit, catalog())
+    spread = spread_of(modelfile, design.circuit, catalog())
     bench = Stretched(design, spread, 1, BOARDS)
     places = [Place(r.omega, r.b, r.orbit.start) for r in found]
     scored = tuple(score(bench, r.spec, [p], BOARDS)[0] for r, p in zip(found, places, strict=True))

@@ -20,7 +20,8 @@ from designer.cli import entry, search
 from designer.jobs.cure_job import cure
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file
-from designer.spread.spread import Spread, draw_many
+from designer.spread.part_rules import spread_of
+from designer.spread.spread import draw_many
 from tests.shared import paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
@@ -142,7 +143,7 @@ def deviations(upgrades: Upgrades) -> dict[str, np.ndarray]:
     made = paper_cases.synthesised()
     file: ModelFile = parse_model_file(made.modelfile.text + BINNED)
     circuit = made.design.circuit
-    spread = Spread.of(upgraded_file(file, upgrades), circuit, CATALOG)
+    spread = spread_of(upgraded_file(file, upgrades), circuit, CATALOG)
     boards = draw_many(circuit, spread, 5, range(4000))
     sold = {r.name: r.value for r in circuit.resistors}
     sold |= {c.name: c.value for c in circuit.capacitors}

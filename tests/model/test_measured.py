@@ -16,6 +16,7 @@ from designer.cli import entry
 from designer.jobs.synthesise_job import model_file
 from designer.model.measured_values import read_measured
 from designer.model.model_file import parse_model_file, read_model_file
+from designer.spread.part_rules import spread_of
 from designer.spread.spread import BOARD, Spread, draw_many
 from tests.jobs.test_kicad_export import MODEL as LINEAR
 from tests.spread.test_spread_model import CATALOG, CIRCUIT, PAPER, RECTIFIER
@@ -42,7 +43,7 @@ def listed(folder: Path, text: str | bytes, circuit: object = CIRCUIT, more: str
     (folder / "bench.csv").write_bytes(content)
     model = folder / "model.toml"
     model.write_text(f'{PAPER}\n[spread]\nmeasured = "bench.csv"\n{more}', encoding="utf-8")
-    return Spread.of(read_model_file(model), circuit, CATALOG)  # type: ignore[arg-type]
+    return spread_of(read_model_file(model), circuit, CATALOG)  # type: ignore[arg-type]
 
 
 def test_measured_parts_have_their_values_and_others_spread(tmp_path: Path) -> None:
@@ -64,7 +65,7 @@ def test_measured_parts_have_their_values_and_others_spread(tmp_path: Path) -> N
     assert set(boards.gain_bandwidth) == {"U1B"}
     assert set(boards.gain_bandwidth["U1B"]) == {2.9e6}
     assert {name: set(v) for name, v in boards.supply.items()} == {"VCC": {14.93}}
-    bench = draw_many(CIRCUIT, Spread.of(parse_model_file(PAPER), CIRCUIT, CATALOG), 1, range(4000))
+    bench = draw_many(CIRCUIT, spread_of(parse_model_file(PAPER), CIRCUIT, CATALOG), 1, range(4000))
     for name in set(NOMINAL) - {"R1", "C2"}:
         assert np.array_equal(boards.values[name], bench.values[name])
     # The rail's distance stays for the sections that were not measured.
@@ -202,7 +203,7 @@ def test_too_long_a_list(tmp_path: Path) -> None:
 def test_a_text_without_a_file_has_no_list() -> None:
     modelfile = parse_model_file(f'{PAPER}\n[spread]\nmeasured = "bench.csv"\n')
     with pytest.raises(InputError, match="a model file on disk"):
-        Spread.of(modelfile, CIRCUIT, load_catalog())
+        spread_of(modelfile, CIRCUIT, load_catalog())
 
 
 def test_a_design_folder_keeps_the_list_and_notices_another(

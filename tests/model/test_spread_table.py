@@ -11,7 +11,7 @@ from designer.cli import entry
 from designer.model.measured_values import read_measured
 from designer.model.model_file import SpreadSpec, parse_model_file, read_model_file
 from designer.model.spread_table import NetworkRule, Offset, PartRule, Shape
-from designer.spread.spread import Spread
+from designer.spread.part_rules import spread_of
 from tests.circuit.test_reduction import EXACT
 from tests.shared.stages import bought, stage
 from tests.spread.test_spread_model import CATALOG, PAPER
@@ -27,7 +27,7 @@ def table(text: str) -> SpreadSpec:
 def test_the_example_states_every_key_and_is_valid() -> None:
     path = ROOT / "examples" / "spread.toml"
     modelfile = read_model_file(path)
-    spread = Spread.of(modelfile, SOLD, CATALOG)
+    spread = spread_of(modelfile, SOLD, CATALOG)
     assert spread.name == "model file"
     text = path.read_text(encoding="utf-8")
     lines = [line.lstrip("# ") for line in text.splitlines()]
@@ -221,7 +221,7 @@ def test_names_what_does_not_fit_the_design(
 ) -> None:
     modelfile = parse_model_file(f"{PAPER}\n[spread]\n{text}\n")
     with pytest.raises(InputError) as caught:
-        Spread.of(modelfile, SOLD, CATALOG)
+        spread_of(modelfile, SOLD, CATALOG)
     assert caught.value.field == field
     assert found in str(caught.value.found)
     assert expected in caught.value.expected

@@ -7,6 +7,7 @@ from functools import cache
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import ModelFile, parse_model_file
+from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread
 from tests.shared.model_text import PAPER_TABLE
 
@@ -60,4 +61,4 @@ def made() -> Synthesis:
 
 @cache
 def spread() -> Spread:
-    return Spread.of(made().modelfile, made().design.circuit, catalog())
+    return spread_of(made().modelfile, made().design.circuit, catalog())

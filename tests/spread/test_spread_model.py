@@ -20,6 +20,7 @@ from designer.circuit.netlist import Circuit
 from designer.model.distributions import Binned, Normal, Split, Uniform
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.report.spread_words import words_of
+from designer.spread.part_rules import spread_of
 from designer.spread.random_streams import cube
 from designer.spread.spread import BOARD, Group, Spread, draw, draw_many, part_of
 from tests.circuit.test_reduction import EXACT, circuit_of
@@ -49,7 +50,7 @@ EVERYTHING = replace(
 
 
 def of(table: str, circuit: Circuit = CIRCUIT) -> Spread:
-    return Spread.of(modelfile(table), circuit, CATALOG)
+    return spread_of(modelfile(table), circuit, CATALOG)
 
 
 def modelfile(table: str) -> ModelFile:
@@ -65,7 +66,7 @@ def quantities(boards: Boards) -> dict[str, Array]:
 
 
 def test_a_file_without_the_table_means_bench_1() -> None:
-    spread = Spread.of(parse_model_file(PAPER), CIRCUIT, CATALOG)
+    spread = spread_of(parse_model_file(PAPER), CIRCUIT, CATALOG)
     assert spread == Spread.bench_1(CATALOG.opamp("TL074C"), 0.01, 0.01) == of("")
     assert spread.name == "bench-1"
     assert of("supply = 0.01").name != "bench-1"

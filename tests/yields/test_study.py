@@ -33,8 +33,8 @@ from designer.yields.blame_analysis import blame
 from designer.yields.layers import CHUNK, Here, Samples
 from designer.yields.ngspice_sampling import Hearing, Kind, Why, ask_random
 from designer.yields.row_store import BlockStore
-from designer.yields.study import Stores, Study
-from designer.yields.study_layers import Work
+from designer.yields.study import Study
+from designer.yields.study_layers import Stores, Work
 from designer.yields.tolerance_study import tolerance
 from designer.yields.verdict import BLOCK, Answer, Verdict
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE

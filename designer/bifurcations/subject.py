@@ -1,0 +1,65 @@
+"""What a sweep changes: parameters of a system, or settings of its drive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from designer.base.arrays import Array
+from designer.bifurcations.flow_family import Family
+from designer.dynamics.steady_state import Setting
+
+
+class Subject(Protocol):
+    """A system with named parameters.
+
+    ``model.swept_model`` has a mechanical model's, ``circuit.swept_board`` a circuit's.
+    """
+
+    @property
+    def whose(self) -> str:
+        """Whose motion it is, in words, for titles."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of what can be swept."""
+        ...
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """By parameter, and by "x", "v" and "λ" for the axes of a diagram."""
+        ...
+
+    def check(self, option: str, name: str, value: float) -> None:
+        """InputError that names the option, unless the parameter may have this value."""
+        ...
+
+    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+        """One for each set of changes, the others as they stand."""
+        ...
+
+    def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
+        """(states,) size of the states that starts are drawn from: one for all changes."""
+        ...
+
+    def family(self, parameter: str) -> Family:
+        """One flow for each value of a parameter, the others as they stand."""
+        ...
+
+    def held(self, swept: Mapping[str, float | None]) -> Mapping[str, float | None]:
+        """The parameters that are not swept, with their values; None where there is none."""
+        ...
+
+    def remarks(self) -> Sequence[str]:
+        """What a title says of the system beside its parameters."""
+        ...
+
+    def as_dict(self) -> dict[str, object]:
+        """What decides the flow, for hashes and provenance."""
+        ...

@@ -1,0 +1,71 @@
+"""Whether measured values can be of a circuit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+from designer.base.errors import InputError
+from designer.base.schema import did_you_mean
+from designer.base.units import format_quantity
+from designer.circuit.netlist import Circuit
+from designer.model.measured_values import Measured
+
+_FACTOR = 2.0
+"""A part is no further from the value it is sold for: a slip of a prefix is a factor of 1000."""
+
+
+def check_measured(measured: Measured, circuit: Circuit) -> None:
+    """Refuse what cannot be of this circuit.
+
+    Raises
+    ------
+    InputError : a part that it lacks, or a value far from the one that the part is sold for.
+    """
+    check_measured_names(measured, circuit)
+    nominal = _nominal(circuit)
+    for name, values in measured.values.items():
+        where = f"line {measured.lines.get(name, 0)}"
+        low, high, unit = nominal[name]
+        for value in values:
+            if not math.isnan(value) and not low <= value <= high:
+                ends = " to ".join(format_quantity(end, unit) for end in (low, high))
+                found = f"{name}, {format_quantity(value, unit)}"
+                raise InputError(measured.source, where, found, f"a value within {ends}")
+
+
+def check_measured_names(measured: Measured, circuit: Circuit, more: Collection[str] = ()) -> None:
+    """Refuse parts that are neither of this circuit nor among ``more``.
+
+    Raises
+    ------
+    InputError : names the first of them.
+    """
+    known = [*_nominal(circuit), *more]
+    for name in measured.values:
+        if name not in known:
+            hint = did_you_mean(name, known)
+            expected = "a part of this design" + (f"; {hint}" if hint else "")
+            where = f"line {measured.lines.get(name, 0)}"
+            raise InputError(measured.source, where, name, expected)
+
+
+def _nominal(circuit: Circuit) -> dict[str, tuple[float, float, str]]:
+    """Lowest and highest value, and unit, of everything that can be measured on a board."""
+
+    def about(value: float, unit: str) -> tuple[float, float, str]:
+        ends = sorted((value / _FACTOR, value * _FACTOR))
+        return ends[0], ends[1], unit
+
+    found = {r.name: about(r.value, "Ω") for r in circuit.resistors}
+    found |= {c.name: about(c.value, "F") for c in circuit.capacitors}
+    found |= {r.name: about(r.volts, "V") for r in circuit.references}
+    found |= {rail.name: about(rail.volts, "V") for rail in circuit.rails}
+    supply = circuit.supply
+    for s in circuit.sections:
+        found[f"{s.name}.offset"] = (-supply, supply, "V")
+        found[f"{s.name}.low"] = (-_FACTOR * supply, 0.0, "V")
+        found[f"{s.name}.high"] = (0.0, _FACTOR * supply, "V")
+        found[f"{s.name}.bias"] = (-1e-3, 1e-3, "A")
+        found[f"{s.name}.gbw"] = (1.0, 1e12, "Hz")
+    return found
