@@ -24,8 +24,10 @@ from benchmarks.bench_flow import commit, machine, table
 from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.eseries import series_values
+from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
-from designer.model.model_file import CircuitSpec, ModelFile, Response
+from designer.model.model_file import ModelFile
+from designer.model.response_table import Response
 from designer.synthesis.kernel_linear import Rules, Values
 from designer.synthesis.linear_block import PARTS, Targets, catalogue
 from designer.synthesis.linear_rules import Bounds, rules_of

@@ -31,7 +31,8 @@ from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import describe, shoot
 from designer.dynamics.flow import Flow
-from designer.model.model_file import Expect, Response, read_model_file
+from designer.model.model_file import read_model_file
+from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread, draw
 from designer.yields import exact_rung, study_plan
 from designer.yields.layers import Here, Samples

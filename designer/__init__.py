@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from designer.check.synthesis_result import Synthesis, synthesise
     from designer.jobs.study_job import run
     from designer.model.model import Dimensionless, Mechanical
-    from designer.model.model_file import ModelFile, Response, parse_model_file, read_model_file
+    from designer.model.model_file import ModelFile, parse_model_file, read_model_file
+    from designer.model.response_table import Response
     from designer.yields.run_result import RunResult
     from designer.yields.study import Study
     from designer.yields.tolerance_study import tolerance

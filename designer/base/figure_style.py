@@ -25,7 +25,12 @@ from designer.base.arrays import Array
 # line styles.
 INK, MUTED, GRID, CONTACT = "#1a1a1a", "#5c5c5c", "#e3e3e3", "#f1ece0"
 
-MODEL, CIRCUIT, NGSPICE, IMPACT = "#7cc4ee", "#1a1a1a", "#d55e00", "#007a5a"
+MODEL_COLOUR, CIRCUIT_COLOUR, NGSPICE_COLOUR, IMPACT_COLOUR = (
+    "#7cc4ee",
+    "#1a1a1a",
+    "#d55e00",
+    "#007a5a",
+)
 
 EXACT = 1e-12
 """A coefficient error below this is rounding: the parts give the coefficient exactly."""

@@ -179,7 +179,7 @@ def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
     return tuple(done)
 
 
-def write(made: Expression) -> str:
+def expression_text(made: Expression) -> str:
     """The expression as text that ends in a newline: lists of atoms on one line, others indented.
 
     Raises
@@ -191,7 +191,7 @@ def write(made: Expression) -> str:
 
 def write_all(made: Iterable[Expression]) -> str:
     """Several expressions, a blank line between them."""
-    return "\n".join(write(each) for each in made)
+    return "\n".join(expression_text(each) for each in made)
 
 
 def _lines(made: Expression, depth: int) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from designer.bifurcations.windows import Window, WindowEnd
+from designer.bifurcations.windows import BranchWindow, WindowEnd
 
 TOUCH = 1e-9
 """Of the parameter: two windows nearer than this follow upon one another."""
@@ -18,7 +18,7 @@ class Cascade:
     down : towards less values of the parameter. The last one's end is where it stops.
     """
 
-    steps: tuple[Window, ...]
+    steps: tuple[BranchWindow, ...]
     down: bool
 
     @property
@@ -39,7 +39,7 @@ class Cascade:
         return {"down": self.down, "windows": [w.as_dict() for w in self.steps]}
 
 
-def cascade(windows: Sequence[Window], first: Window, *, down: bool = True) -> Cascade:
+def cascade(windows: Sequence[BranchWindow], first: BranchWindow, *, down: bool = True) -> Cascade:
     """The windows that follow upon one, on its own branch or on those that leave it.
 
     Where several begin at the same point the widest is taken.

@@ -35,7 +35,7 @@ class WindowEnd:
 
 
 @dataclass(frozen=True)
-class Window:
+class BranchWindow:
     """A stretch of a branch on which a response is stable.
 
     response : "n-p-q". symmetric : by the branch it lies on. low, high : its ends. branch : the
@@ -68,7 +68,7 @@ class Window:
         }
 
 
-def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> list[Window]:
+def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> list[BranchWindow]:
     """The windows on a branch, in its order.
 
     points : the branch's bifurcation points (``points.locate``). A stretch between two of
@@ -89,7 +89,7 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
             b = _end(branch, after, 1) if j == last else _unlocated(branch, j + 1, j)
             low, high = (a, b) if a.value <= b.value else (b, a)
             response, symmetric = branch.points[j].response, branch.curve.symmetric
-            out.append(Window(branch.parameter, response, symmetric, low, high, number))
+            out.append(BranchWindow(branch.parameter, response, symmetric, low, high, number))
     return out
 
 
@@ -103,9 +103,9 @@ def _alike(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
     return [(run[0], run[-1]) for run in runs]
 
 
-def all_windows(found: Survey) -> list[Window]:
+def all_windows(found: Survey) -> list[BranchWindow]:
     """The windows on every branch; one that reaches to the parent branch ends at its point."""
-    out: list[Window] = []
+    out: list[BranchWindow] = []
     for number, branch in enumerate(found.branches):
         out += [
             replace(w, low=_met(w.low, found.points), high=_met(w.high, found.points))
@@ -124,7 +124,7 @@ def _met(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
     return end
 
 
-def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> Window:
+def window(family: Family, orbit: Orbit, value: float, low: float, high: float) -> BranchWindow:
     """The window of a stable orbit that is known at a value, within [low, high].
 
     Raises

@@ -9,8 +9,8 @@ from designer.base.natural_sort import natural
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
-from designer.catalog.catalog import Catalog, Kind, Use
-from designer.catalog.entries import Rating
+from designer.catalog.catalog import Catalog
+from designer.catalog.entries import Kind, Rating, Use
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.circuit.netlist import (
     Capacitor,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from designer.base.sexpr import expression, write
+from designer.base.sexpr import expression, expression_text
 from designer.board import kicad_sim
 from designer.board.component import Component
 from designer.board.kicad_board import board
@@ -65,18 +65,18 @@ def files(project: Project) -> dict[str, str]:
     placed = place(circuit, [c for e in made if e.placed and (c := e.component) is not None])
     cases = {spot.footprint.name: spot.footprint for spot in placed.spots}
     out = {
-        f"{name}.kicad_sch": write(schematic(name, project.title, made, sheet)),
-        f"{name}.kicad_pcb": write(board(name, project.title, made, placed)),
+        f"{name}.kicad_sch": expression_text(schematic(name, project.title, made, sheet)),
+        f"{name}.kicad_pcb": expression_text(board(name, project.title, made, placed)),
         f"{name}.kicad_pro": settings(name, circuit),
-        f"{name}.net": write(netlist(name, made)),
+        f"{name}.net": expression_text(netlist(name, made)),
         models: kicad_sim.models(circuit, project.components),
-        f"{LIBRARY}.kicad_sym": write(library(shapes(sheet))),
+        f"{LIBRARY}.kicad_sym": expression_text(library(shapes(sheet))),
         "sym-lib-table": _table("sym_lib_table", f"{LIBRARY}.kicad_sym"),
         "fp-lib-table": _table("fp_lib_table", f"{LIBRARY}.pretty"),
         f"{name}.kicad_dru": project.rules,
     }
     for case, shape in sorted(cases.items()):
-        out[f"{LIBRARY}.pretty/{case}.kicad_mod"] = write(module(shape))
+        out[f"{LIBRARY}.pretty/{case}.kicad_mod"] = expression_text(module(shape))
     return out
 
 
@@ -109,4 +109,4 @@ def _table(kind: str, file: str) -> str:
         expression("options", ""),
         expression("descr", "of this project alone"),
     )
-    return write(expression(kind, expression("version", 7), row))
+    return expression_text(expression(kind, expression("version", 7), row))

@@ -29,48 +29,21 @@ from designer.base.eseries import SERIES, series_values
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
 from designer.catalog.entries import (
-    PRICE_CLASSES,
     UNITS,
     Diode,
-    Figure,
     Header,
     Kind,
     Mounting,
     OpAmp,
     PartChoice,
     PartFamily,
-    PartNumber,
     Price,
-    Rating,
     Reference,
-    Section,
     Trimmer,
     Use,
     mounting_of,
 )
 from designer.catalog.read import Entry, read_catalog_file
-
-__all__ = [
-    "ENVIRONMENT",
-    "PRICE_CLASSES",
-    "Catalog",
-    "Diode",
-    "Figure",
-    "Header",
-    "Kind",
-    "Mounting",
-    "OpAmp",
-    "PartChoice",
-    "PartFamily",
-    "PartNumber",
-    "Price",
-    "Rating",
-    "Reference",
-    "Section",
-    "Trimmer",
-    "Use",
-    "load_catalog",
-]
 
 ENVIRONMENT = "DESIGNER_CATALOGS"
 """Environment variable: folders to search first, separated as in PATH."""

@@ -13,7 +13,7 @@ from designer.centering.windows import Stretch
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 
 MISSING = -30.0
 """Standard deviations, further than any response that is there may stand."""

@@ -24,6 +24,7 @@ from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build, terms
 from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.dead_zone_kind import zone_of
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.circuit.reduction import Reduction
@@ -161,7 +162,7 @@ def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
         supply=design.circuit.supply,
         saturation=spec.saturation or opamp.saturation_at(spec.supply),
         clearance="A" if model.k0 > 0.0 else None,
-        zone=build.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+        zone=zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
         composites=design.composites,
     )
 

@@ -33,7 +33,8 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile, Response, naming, need_responses
+from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.response_table import Response
 from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
 from designer.synthesis.attempt import zone_of_spec

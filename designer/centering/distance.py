@@ -28,7 +28,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 from designer.spice.numerics_gate import Subject
 from designer.spread.board_quantities import between
 from designer.spread.spread import Spread, draw_many

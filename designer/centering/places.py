@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from designer.centering.distance import LADDER, Counts, Stand, Stretched
 from designer.centering.windows import CLEARANCE_STEP, Place, Stretch
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
 """Of a stretch: where it is scanned. The first of equal places is taken, so the middle is first."""

@@ -21,7 +21,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course, Steady
 from designer.model import find_responses
 from designer.model.model import Dimensionless
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 from designer.model.search_table import SearchSpec
 from designer.model.swept_model import ModelSubject
 

@@ -10,7 +10,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.model.find_responses import find
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
 
 PERIODS = 20

@@ -37,7 +37,8 @@ from designer.model.find_responses import (
     scale_of,
 )
 from designer.model.model import Dimensionless
-from designer.model.model_file import ModelFile, Response, naming, need_responses
+from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool, require_ngspice

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from designer.catalog.catalog import OpAmp
-from designer.circuit.dead_zone_kind import Zone, zone_of
+from designer.catalog.entries import OpAmp
+from designer.circuit.dead_zone_kind import Zone
 from designer.circuit.dead_zone_parts import OUTPUT, dead_zone
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section, Stop
 from designer.circuit.resistors import Composite, Resistors
 from designer.circuit.terms import Term, inverted_states
-
-__all__ = ["Composite", "Zone", "build", "describe_quantity", "inverter_resistors", "zone_of"]
 
 GENERATOR = Generator("VM1", "vg")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from designer.catalog.catalog import Catalog, Diode, Reference
+from designer.catalog.catalog import Catalog
+from designer.catalog.entries import Diode, Reference
 
 Kind = Literal["saturation", "rectifier"]
 Sides = Literal["both", "upper", "lower"]

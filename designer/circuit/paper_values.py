@@ -22,11 +22,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog, OpAmp
+from designer.catalog.catalog import Catalog
+from designer.catalog.entries import OpAmp
 from designer.circuit import build, terms
 from designer.circuit.netlist import Circuit
+from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
-from designer.model.model_file import CircuitSpec
 
 MODEL = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 """The paper's case, Section 5.1."""

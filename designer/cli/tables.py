@@ -308,18 +308,6 @@ def print_line(console: Console, text: str) -> None:
     console.print(Text(text), soft_wrap=True)
 
 
-__all__: Sequence[str] = (
-    "catalog",
-    "compared",
-    "files",
-    "pictures",
-    "run",
-    "simulated",
-    "synthesised",
-    "tolerance",
-)
-
-
 def _error(value: float) -> str:
     """A coefficient error in words: below 1e-12 it is rounding."""
     return f"{100 * value:.3g} %" if value >= 1e-12 else "0 to rounding"

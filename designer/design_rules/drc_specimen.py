@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from designer.base.sexpr import Atom, Expression, expression, word, write
+from designer.base.sexpr import Atom, Expression, expression, expression_text, word
 from designer.board.kicad_footprint import FILE_VERSION
 from designer.board.kicad_names import identifier
 from designer.board.kicad_rules import CANARY_WIDTH, CustomRule
@@ -49,7 +49,7 @@ def specimen(rules: Sequence[CustomRule], *, breaking: bool) -> str:
         Expression((word("layers"), *(_layer(*each) for each in LAYERS))),
         *(expression("net", number, name) for number, name in enumerate(nets)),
     ]
-    return write(expression("kicad_pcb", *head, *items))
+    return expression_text(expression("kicad_pcb", *head, *items))
 
 
 def canary_track(x: float, y: float) -> Expression:

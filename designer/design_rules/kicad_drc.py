@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer.base.sexpr import Expression, read, write
+from designer.base.sexpr import Expression, expression_text, read
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_reader import BoardFile
 from designer.board.kicad_rules import CANARY, CustomRule, canary, rules_text
@@ -207,4 +207,4 @@ def _with_canary(board: BoardFile) -> str:
     x = min(at[0] for at in corners) + ASIDE[0]
     y = min(at[1] for at in corners) + ASIDE[1]
     whole = read(board.text, board.path)
-    return write(Expression((*whole.items, canary_track(x, y))))
+    return expression_text(Expression((*whole.items, canary_track(x, y))))

@@ -10,8 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from designer.base.figure_style import CIRCUIT, GRID, MUTED, NGSPICE, new_figure, styled
-from designer.base.figure_style import MODEL as OF_THE_MODEL
+from designer.base.figure_style import (
+    CIRCUIT_COLOUR,
+    GRID,
+    MODEL_COLOUR,
+    MUTED,
+    NGSPICE_COLOUR,
+    new_figure,
+    styled,
+)
 from designer.base.plain_json import FORMAT, plain
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, Compared, Truth
 from designer.fidelity.rungs import RUNGS
@@ -28,10 +35,10 @@ TITLES = {
 }
 _LOOKS = {
     "rk4": ("#0072b2", "s"),
-    "model": (OF_THE_MODEL, "o"),
-    "circuit": (CIRCUIT, "o"),
+    "model": (MODEL_COLOUR, "o"),
+    "circuit": (CIRCUIT_COLOUR, "o"),
     "ideal": ("#e6a817", "^"),
-    "dynamic": (NGSPICE, "D"),
+    "dynamic": (NGSPICE_COLOUR, "D"),
     "full": ("#8c1c13", "v"),
 }
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.checks import cores
-from designer.base.design_folder import Folder, StageName
+from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.version import __version__

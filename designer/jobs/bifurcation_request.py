@@ -9,8 +9,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.checks import at_least
-from designer.base.design_folder import StageName
 from designer.base.errors import InputError
+from designer.base.manifest import StageName
 from designer.base.schema import one_of
 from designer.bifurcations import parameter_map, sweep
 from designer.bifurcations.basins import BasinPlan

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import Folder, StageName
+from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.schema import one_of

@@ -19,6 +19,7 @@ from designer.check.first_responses import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build, terms
 from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.dead_zone_kind import zone_of
 from designer.circuit.design import Certificate, Check, Design
 from designer.circuit.netlist import nominal_board
 from designer.jobs import board_files
@@ -88,7 +89,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             supply=float(said["circuit"]["supply"]),
             saturation=float(said["circuit"]["saturation"]),
             clearance="A" if model.k0 > 0.0 else None,
-            zone=build.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+            zone=zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
             composites=said.get("composites", {}),
         )
         gain, bias = (float(said["circuit"][k]) for k in ("gain", "bias"))

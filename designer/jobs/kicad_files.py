@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from designer.base.design_folder import Folder, StageName
+from designer.base.design_folder import Folder
 from designer.base.errors import InputError
-from designer.base.manifest import file_hash
+from designer.base.manifest import StageName, file_hash
 from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components

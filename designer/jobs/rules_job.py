@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from designer.base import atomic_write
-from designer.base.design_folder import Folder, StageName, is_design_folder
+from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.hashing import sha256
+from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.version import __version__

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.checks import cores
-from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder, StageName
+from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder
 from designer.base.errors import InputError
+from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.version import __version__

@@ -14,13 +14,14 @@ from designer.yields.layers import CHUNK, SEARCH
 from designer.yields.ngspice_sampling import Hearing
 from designer.yields.power_up_yield import Reached
 from designer.yields.row_store import BlockStore
+from designer.yields.setting_search import MOST_TRIES
 from designer.yields.start_recipe import Recipe
 from designer.yields.study import Study
 from designer.yields.study_cache import KEPT, Kept
 from designer.yields.study_identity import blame_hash, study_hash
 from designer.yields.study_layers import Stores
 from designer.yields.trimmed_yield import DcTrim, Trimmed
-from designer.yields.tuned_yield import MOST_TRIES, Tuned
+from designer.yields.tuned_yield import Tuned
 from designer.yields.verdict import BLOCK, Answer, StudyPlan
 from designer.yields.yield_maps import OVERS
 

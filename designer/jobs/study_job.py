@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.checks import at_least, cores
-from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder, StageName
+from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
+from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import Catalog, load_catalog

@@ -17,10 +17,10 @@ from designer.base.design_folder import (
     DESIGN_FILES,
     MODEL,
     Folder,
-    StageName,
     is_design_folder,
 )
 from designer.base.errors import InputError
+from designer.base.manifest import StageName
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.version import __version__

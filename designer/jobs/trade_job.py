@@ -28,9 +28,10 @@ from designer.fidelity.rungs import LEVELS, ROUNDS
 from designer.fidelity.trade_study import Response, Trade, trade
 from designer.fidelity.yields import BOARDS, BoardTrade, LeftOut, Tally
 from designer.jobs import design_files
+from designer.jobs.options import Options
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import TRADE
-from designer.jobs.synthesise_job import Options, standing_inputs
+from designer.jobs.synthesise_job import standing_inputs
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spice.pool import SpicePool, require_ngspice

@@ -15,7 +15,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 
 SLOWEST, FASTEST = 1e-3, 1e3
 """Dimensionless drive frequencies: slower, one period has too many steps to wait for."""

@@ -44,30 +44,14 @@ from designer.model.circuit_table import CircuitSpec, CircuitTable
 from designer.model.measured_values import Measured, read_measured
 from designer.model.model import Dimensionless, Mechanical, Sides
 from designer.model.response_table import (
-    MAX_PERIODS,
-    Expect,
     Response,
     ResponseTable,
-    Twin,
     response_of,
 )
 from designer.model.rules_table import overrides
 from designer.model.search_table import SearchSpec, SearchTable
 from designer.model.spread_table import BENCH_1, SpreadSpec, SpreadTable
 from designer.model.tuning_bands import Bands
-
-__all__ = [
-    "MAX_BYTES",
-    "MAX_PERIODS",
-    "CircuitSpec",
-    "Expect",
-    "ModelFile",
-    "Response",
-    "SpreadSpec",
-    "Twin",
-    "parse_model_file",
-    "read_model_file",
-]
 
 MAX_BYTES = 1_000_000
 """A model file is a page of text; anything larger is something else."""

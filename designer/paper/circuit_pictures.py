@@ -13,8 +13,16 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from designer.base.arrays import Array
-from designer.base.figure_style import CIRCUIT, CONTACT, GRID, INK, NGSPICE, new_figure, styled
-from designer.base.figure_style import MODEL as OF_THE_MODEL
+from designer.base.figure_style import (
+    CIRCUIT_COLOUR,
+    CONTACT,
+    GRID,
+    INK,
+    MODEL_COLOUR,
+    NGSPICE_COLOUR,
+    new_figure,
+    styled,
+)
 from designer.circuit.paper_values import MODEL
 from designer.paper.circuit_clock import BASE
 from designer.paper.circuits import TITLES
@@ -40,19 +48,19 @@ def dc_curves(circuits: Sequence[Piece]) -> Figure:
         exact, spice = (np.array(dc[k]) / full for k in ("exact", "ngspice"))
         ideal = v1 - np.clip(v1, -1.0, 1.0)
         above, below = grid[0, column], grid[1, column]
-        above.plot(v1, ideal, color=OF_THE_MODEL, lw=4.0)
-        above.plot(v1, exact, color=CIRCUIT, lw=1.0)
-        above.plot(v1[::8], spice[::8], ls="", marker="o", ms=3.0, color=NGSPICE)
+        above.plot(v1, ideal, color=MODEL_COLOUR, lw=4.0)
+        above.plot(v1, exact, color=CIRCUIT_COLOUR, lw=1.0)
+        above.plot(v1[::8], spice[::8], ls="", marker="o", ms=3.0, color=NGSPICE_COLOUR)
         above.set_title(one["title"], loc="left")
         inside = np.abs(v1) < 1.05
-        below.plot(v1[inside], 100.0 * (exact - ideal)[inside], color=CIRCUIT, lw=1.0)
+        below.plot(v1[inside], 100.0 * (exact - ideal)[inside], color=CIRCUIT_COLOUR, lw=1.0)
         below.plot(
             v1[inside][::4],
             100.0 * (spice - ideal)[inside][::4],
             ls="",
             marker="o",
             ms=2.5,
-            color=NGSPICE,
+            color=NGSPICE_COLOUR,
         )
         below.set_ylim(-1.25, 1.25)
         for axes in (above, below):
@@ -61,9 +69,9 @@ def dc_curves(circuits: Sequence[Piece]) -> Figure:
     grid[0, 0].set_ylabel("f / (slope · threshold)")
     grid[1, 0].set_ylabel("less Eq. (20) [%]")
     handles = [
-        Line2D([], [], color=OF_THE_MODEL, lw=4.0, label="Eq. (20)"),
-        Line2D([], [], color=CIRCUIT, lw=1.0, label="exact circuit"),
-        Line2D([], [], ls="", marker="o", ms=3.0, color=NGSPICE, label="ngspice"),
+        Line2D([], [], color=MODEL_COLOUR, lw=4.0, label="Eq. (20)"),
+        Line2D([], [], color=CIRCUIT_COLOUR, lw=1.0, label="exact circuit"),
+        Line2D([], [], ls="", marker="o", ms=3.0, color=NGSPICE_COLOUR, label="ngspice"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
@@ -82,9 +90,9 @@ def portraits(model: Piece, one: Piece) -> Figure:
     for axes, (wanted, shown) in zip(grid, pairs, strict=False):
         _portrait(axes, wanted, shown)
     handles = [
-        Line2D([], [], color=OF_THE_MODEL, lw=4.0, label="model"),
-        Line2D([], [], color=CIRCUIT, lw=1.0, label="exact circuit"),
-        Line2D([], [], color=NGSPICE, lw=1.0, ls=(0, (2, 2)), label="ngspice"),
+        Line2D([], [], color=MODEL_COLOUR, lw=4.0, label="model"),
+        Line2D([], [], color=CIRCUIT_COLOUR, lw=1.0, label="exact circuit"),
+        Line2D([], [], color=NGSPICE_COLOUR, lw=1.0, ls=(0, (2, 2)), label="ngspice"),
         Patch(color=CONTACT, label="contact"),
     ]
     figure.suptitle(one["title"], fontsize=10, x=0.01, ha="left")
@@ -97,9 +105,9 @@ def _portrait(axes: Axes, wanted: Piece, shown: Piece) -> None:
     reach = 1.15 * max(map(abs, x))
     for side in (-1.0, 1.0):
         axes.axvspan(side * MODEL.b, side * reach, color=CONTACT, lw=0, zorder=0)
-    axes.plot(x, v, color=OF_THE_MODEL, lw=4.0, zorder=1)
-    axes.plot(*shown["portrait"], color=CIRCUIT, lw=1.0, zorder=2)
-    axes.plot(*shown["ngspice_portrait"], color=NGSPICE, lw=1.0, ls=(0, (2, 2)), zorder=3)
+    axes.plot(x, v, color=MODEL_COLOUR, lw=4.0, zorder=1)
+    axes.plot(*shown["portrait"], color=CIRCUIT_COLOUR, lw=1.0, zorder=2)
+    axes.plot(*shown["ngspice_portrait"], color=NGSPICE_COLOUR, lw=1.0, ls=(0, (2, 2)), zorder=3)
     axes.set_xlim(-reach, reach)
     axes.set_title(f"ω = {wanted['omega']:g}: {shown['ngspice'] or shown['circuit']}", loc="left")
     axes.set_xlabel("x₁")
@@ -183,8 +191,8 @@ _MARKS = "osD^v*PXh<>"
 
 def _colour(name: str) -> str:
     if name.startswith("ngspice"):
-        return NGSPICE
-    return CIRCUIT if name.startswith("exact") else "#0072b2"
+        return NGSPICE_COLOUR
+    return CIRCUIT_COLOUR if name.startswith("exact") else "#0072b2"
 
 
 def _cell(axes: Axes, column: int, row: int, text: str, fill: str) -> None:

@@ -28,7 +28,7 @@ from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.continuation import End
 from designer.bifurcations.doubling_cascade import Cascade
 from designer.bifurcations.store import write_sweep
-from designer.bifurcations.windows import NOT_LOCATED, Window, all_windows, outside
+from designer.bifurcations.windows import NOT_LOCATED, BranchWindow, all_windows, outside
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import coexisting, settle, starts, twin
@@ -93,7 +93,7 @@ class Dynamics:
     """Everything that was found."""
 
     found: Survey
-    windows: tuple[Window, ...]
+    windows: tuple[BranchWindow, ...]
     cascades: Mapping[int, Cascade]
     after: Mapping[tuple[int, str], str]
     shared: Mapping[float, tuple[str, ...]]
@@ -372,7 +372,7 @@ def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _named_windows(windows: Sequence[Window]) -> str:
+def _named_windows(windows: Sequence[BranchWindow]) -> str:
     if not windows:
         return ""
     names = [f"{w.response} from ω = {w.low.value:.6f} to {w.high.value:.6f}" for w in windows]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.bifurcations import sweep
-from designer.bifurcations.windows import Window
+from designer.bifurcations.windows import BranchWindow
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model import Dimensionless
 from designer.model.swept_model import ModelSubject
@@ -43,7 +43,7 @@ class Gap:
 
 def gaps(
     model: Dimensionless,
-    mains: Sequence[tuple[int, Window]],
+    mains: Sequence[tuple[int, BranchWindow]],
     steps: int = STEPS,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
@@ -65,7 +65,7 @@ def gaps(
     return out
 
 
-def out_of_turn(windows: Sequence[Window], gap: Gap) -> list[tuple[float, int]]:
+def out_of_turn(windows: Sequence[BranchWindow], gap: Gap) -> list[tuple[float, int]]:
     """(ω, q) of each 1-q-q in a gap that is not in turn, falling.
 
     In turn are 1-p-p, twins too, and below it 1-(p+1)-(p+1); once that was met, 1-p-p no more.
@@ -88,7 +88,7 @@ def out_of_turn(windows: Sequence[Window], gap: Gap) -> list[tuple[float, int]]:
     return out
 
 
-def faults(windows: Sequence[Window], gap: Gap) -> str:
+def faults(windows: Sequence[BranchWindow], gap: Gap) -> str:
     """What in a gap is not as the paper has it; empty where all is."""
     said = []
     if not gap.chaotic:
@@ -103,7 +103,7 @@ def faults(windows: Sequence[Window], gap: Gap) -> str:
     return f"between p = {gap.p} and {gap.after} {' and '.join(said)}" if said else ""
 
 
-def strays(windows: Sequence[Window], mains: Sequence[tuple[int, Window]]) -> list[str]:
+def strays(windows: Sequence[BranchWindow], mains: Sequence[tuple[int, BranchWindow]]) -> list[str]:
     """Which 1-q-q have a window, by its middle, inside the main window of another p."""
     out = []
     for p, main in mains:

@@ -16,7 +16,7 @@ from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import Survey
 from designer.bifurcations.doubling_cascade import Cascade, cascade
 from designer.bifurcations.points import Bifurcation, Kind
-from designer.bifurcations.windows import Window
+from designer.bifurcations.windows import BranchWindow
 from designer.dynamics.orbit import Orbit
 from designer.paper.response_order import Gap, equal, faults, strays
 
@@ -40,7 +40,9 @@ class Statement:
         return dict(self.__dict__)
 
 
-def main_windows(windows: Sequence[Window], p: int) -> tuple[Window | None, Window | None]:
+def main_windows(
+    windows: Sequence[BranchWindow], p: int
+) -> tuple[BranchWindow | None, BranchWindow | None]:
     """The widest symmetric window of 1-p-p, and the widest of its twins."""
     name = f"1-{p}-{p}"
     out = []
@@ -50,7 +52,7 @@ def main_windows(windows: Sequence[Window], p: int) -> tuple[Window | None, Wind
     return out[0], out[1]
 
 
-def symmetric_mains(windows: Sequence[Window]) -> list[tuple[int, Window]]:
+def symmetric_mains(windows: Sequence[BranchWindow]) -> list[tuple[int, BranchWindow]]:
     """p and the widest symmetric window of 1-p-p, for those of p = 1 … 8 that there are."""
     tops = [(p, main_windows(windows, p)[0]) for p in range(1, 9)]
     return [(p, w) for p, w in tops if w is not None]
@@ -58,7 +60,7 @@ def symmetric_mains(windows: Sequence[Window]) -> list[tuple[int, Window]]:
 
 def statements(
     found: Survey,
-    windows: Sequence[Window],
+    windows: Sequence[BranchWindow],
     gaps: Sequence[Gap],
     chatter: Sequence[tuple[float, Orbit]],
 ) -> list[Statement]:
@@ -76,7 +78,7 @@ def statements(
     return [*out, _each(windows), _touches(found)]
 
 
-def _pitchfork(symmetric: Window) -> Statement:
+def _pitchfork(symmetric: BranchWindow) -> Statement:
     end = symmetric.low
     same = end.why == Kind.PITCHFORK
     close = abs(end.value - PITCHFORK) < 0.005
@@ -90,7 +92,7 @@ def _pitchfork(symmetric: Window) -> Statement:
     )
 
 
-def _first_end(found: Survey, windows: Sequence[Window], twins: Window) -> Statement:
+def _first_end(found: Survey, windows: Sequence[BranchWindow], twins: BranchWindow) -> Statement:
     way = cascade(windows, twins)
     touch = _grazing(found, twins)
     grazed = ""
@@ -109,7 +111,7 @@ def _first_end(found: Survey, windows: Sequence[Window], twins: Window) -> State
     )
 
 
-def _grazing(found: Survey, twins: Window) -> Bifurcation | None:
+def _grazing(found: Survey, twins: BranchWindow) -> Bifurcation | None:
     """Where the orbits beyond a window's lower end first touch a stop once more."""
     end = twins.low.point
     if end is None:
@@ -126,7 +128,7 @@ def _grazing(found: Survey, twins: Window) -> Bifurcation | None:
     return min(touches, key=lambda p: abs(p.position - end.position), default=None)
 
 
-def _doublings(windows: Sequence[Window]) -> Statement:
+def _doublings(windows: Sequence[BranchWindow]) -> Statement:
     own = [w for w in windows if w.response in ("1-1-2", "1-2-1")]
     if not own:
         return Statement("1-1-2", "No stable 1-1-2 was met", DISAGREES, SWEEP)
@@ -144,7 +146,7 @@ def _doublings(windows: Sequence[Window]) -> Statement:
     )
 
 
-def _second(windows: Sequence[Window]) -> Statement:
+def _second(windows: Sequence[BranchWindow]) -> Statement:
     symmetric, twins = main_windows(windows, 2)
     if symmetric is None:
         return Statement("1-2-2", "No stable 1-2-2 was met", DISAGREES, SWEEP)
@@ -162,7 +164,7 @@ def _second(windows: Sequence[Window]) -> Statement:
     )
 
 
-def _twins(windows: Sequence[Window]) -> Statement:
+def _twins(windows: Sequence[BranchWindow]) -> Statement:
     having: list[int] = []
     lacking: list[int] = []
     for p in range(2, 9):
@@ -178,7 +180,7 @@ def _twins(windows: Sequence[Window]) -> Statement:
     )
 
 
-def _order(windows: Sequence[Window], gaps: Sequence[Gap]) -> Statement:
+def _order(windows: Sequence[BranchWindow], gaps: Sequence[Gap]) -> Statement:
     there = symmetric_mains(windows)
     falling = all(a[1].high.value > b[1].high.value for a, b in itertools.pairwise(there))
     apart = all(a[1].low.value > b[1].high.value for a, b in itertools.pairwise(there))
@@ -202,7 +204,7 @@ def _order(windows: Sequence[Window], gaps: Sequence[Gap]) -> Statement:
 
 
 def _chattering(
-    found: Survey, windows: Sequence[Window], chatter: Sequence[tuple[float, Orbit]]
+    found: Survey, windows: Sequence[BranchWindow], chatter: Sequence[tuple[float, Orbit]]
 ) -> Statement:
     shown = ", ".join(f"{orbit.response} at {w:g}" for w, orbit in chatter)
     most = max((w for w in windows if w.symmetric), key=lambda w: int(w.response.split("-")[1]))
@@ -223,7 +225,7 @@ def _chattering(
     )
 
 
-def _each(windows: Sequence[Window]) -> Statement:
+def _each(windows: Sequence[BranchWindow]) -> Statement:
     """The conclusions' course of every 1-p-p, of which Section 4 says the steps for p = 1, 2."""
     forks, doubles, others = [], [], []
     tops = symmetric_mains(windows)
@@ -280,7 +282,7 @@ def _list(numbers: Sequence[int]) -> str:
     return ", ".join(map(str, numbers)) if numbers else "none"
 
 
-def main_cascades(windows: Sequence[Window]) -> dict[int, Cascade]:
+def main_cascades(windows: Sequence[BranchWindow]) -> dict[int, Cascade]:
     """For each p what 1-p-p goes over into as ω falls, from its main symmetric window on."""
     out = {}
     for p in range(1, 9):

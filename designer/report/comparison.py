@@ -16,7 +16,8 @@ import numpy as np
 from designer.base.errors import Unreachable
 from designer.board.bom import bill
 from designer.board.component import components
-from designer.catalog.catalog import PRICE_CLASSES, Catalog, Kind, OpAmp
+from designer.catalog.catalog import Catalog
+from designer.catalog.entries import PRICE_CLASSES, Kind, OpAmp
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import paper_values
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
@@ -28,9 +29,9 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, failed
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.board_table import BoardChoice
+from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import ModelResponse, matches
 from designer.model.model import Dimensionless
-from designer.model.model_file import CircuitSpec
 from designer.synthesis import output_loads as loads
 from designer.synthesis.output_loads import Load, Loads
 

@@ -13,13 +13,13 @@ from matplotlib.ticker import MaxNLocator
 
 from designer.base.arrays import Array, Index
 from designer.base.figure_style import (
-    CIRCUIT,
+    CIRCUIT_COLOUR,
     CONTACT,
-    IMPACT,
+    IMPACT_COLOUR,
     INK,
-    MODEL,
+    MODEL_COLOUR,
     MUTED,
-    NGSPICE,
+    NGSPICE_COLOUR,
     axis_limits,
     new_figure,
     say,
@@ -217,21 +217,21 @@ def _portrait(
     )  # fmt: skip
 
 
-_IMPACT: dict[str, Any] = {"mfc": IMPACT, "mec": "white", "mew": 0.5, "ms": 6.0}
+_IMPACT: dict[str, Any] = {"mfc": IMPACT_COLOUR, "mec": "white", "mew": 0.5, "ms": 6.0}
 
 
 def _look(name: str, orbit: Orbit) -> dict[str, Any]:
     """How an engine is drawn; a response without a period in thin lines, or it is a blot."""
     periodic = orbit.status is OrbitStatus.PERIODIC
     if name == "ngspice":
-        return {"ls": "", "marker": "o", "ms": 3.0, "mew": 0, "color": NGSPICE, "zorder": 4}
+        return {"ls": "", "marker": "o", "ms": 3.0, "mew": 0, "color": NGSPICE_COLOUR, "zorder": 4}
     dense = orbit.p + orbit.q > 6 * max(orbit.n, 1) or orbit.n > 2
     broad = 2.6 if dense else 4.0
     width = {"model": broad, "circuit": 0.9} if periodic else {"model": 1.0, "circuit": 0.4}
     style: dict[str, Any] = {"lw": width[name], "solid_capstyle": "round"}
     if name == "model":
-        return {**style, "color": MODEL, "zorder": 2}
-    return {**style, "color": CIRCUIT, "ls": (0, (4.0, 2.2)), "zorder": 3}
+        return {**style, "color": MODEL_COLOUR, "zorder": 2}
+    return {**style, "color": CIRCUIT_COLOUR, "ls": (0, (4.0, 2.2)), "zorder": 3}
 
 
 def _engine_legend(

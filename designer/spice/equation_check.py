@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
+from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, peaks
@@ -35,7 +36,6 @@ from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, Sweep
-from designer.synthesis.parts_choice import Design
 
 Complex = NDArray[np.complex128]
 

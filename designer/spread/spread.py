@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import OpAmp
+from designer.catalog.entries import OpAmp
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resistor
 from designer.model.distributions import Law, Normal, Uniform

@@ -11,26 +11,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Catalog, OpAmp
+from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
+from designer.catalog.entries import OpAmp
 from designer.circuit import build as topology
 from designer.circuit import drive_resistors
-from designer.circuit.build import Composite
 from designer.circuit.coefficients import CoefficientErrors, CutShort, coefficient_errors
-from designer.circuit.dead_zone_kind import Zone
+from designer.circuit.dead_zone_kind import Zone, zone_of
 from designer.circuit.netlist import Circuit
+from designer.circuit.resistors import Composite
 from designer.circuit.terms import Term
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
 from designer.model.model import Dimensionless
 from designer.synthesis import linear_search, nonlinear_block, size_dead_zone
+from designer.synthesis.dead_zone_target import DeadZone
 from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, Limits
 from designer.synthesis.linear_block import Targets
 from designer.synthesis.linear_search import LinearBlock
 from designer.synthesis.nonlinear_block import Room
 from designer.synthesis.part_names import levels, parts_of, terms_of
 from designer.synthesis.preferences import Wishes
-from designer.synthesis.size_dead_zone import DeadZone
 from designer.synthesis.tie_break import Shortfall
 
 BASE = 1e4
@@ -151,7 +152,7 @@ def order(
 
 def zone_of_spec(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> Zone:
     """The dead-zone stage that a model file asks for."""
-    return topology.zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference)
+    return zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference)
 
 
 def linear_block(

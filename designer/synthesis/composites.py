@@ -18,8 +18,8 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.build import Composite
 from designer.circuit.coefficients import EXACT, CoefficientErrors
+from designer.circuit.resistors import Composite
 from designer.synthesis.attempt import Attempt, Order
 from designer.synthesis.part_names import matching_resistors
 from designer.synthesis.tie_break import SOLVER

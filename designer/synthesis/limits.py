@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.catalog import Figure, OpAmp
+from designer.catalog.entries import Figure, OpAmp
 from designer.circuit.design import Check, Design
 from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective

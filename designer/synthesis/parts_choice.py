@@ -27,22 +27,11 @@ from designer.model.model import Dimensionless
 from designer.synthesis import composites, output_loads, side_conditions
 from designer.synthesis.advice import FREES
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block, order, zone_of_spec
-from designer.synthesis.limits import LOAD, NO_AIMS, SIGNAL, SWING_SHARE, Aims, Limits, limits
+from designer.synthesis.limits import NO_AIMS, Aims, Limits, limits
 from designer.synthesis.linear_alternatives import best_beside
 from designer.synthesis.linear_search import LinearBlock
 from designer.synthesis.part_names import check_names, check_preferred, parts_of, wishes_of
 from designer.synthesis.tie_break import Shortfall
-
-__all__ = [
-    "LOAD",
-    "SIGNAL",
-    "SWING_SHARE",
-    "Certificate",
-    "Design",
-    "Peaks",
-    "check_choices",
-    "synthesise",
-]
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""

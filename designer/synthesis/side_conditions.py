@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from designer.catalog.catalog import OpAmp
+from designer.catalog.entries import OpAmp
 from designer.circuit.dead_zone_parts import idle_limits
 from designer.circuit.design import Check, Design
 from designer.circuit.netlist import Circuit, Section

@@ -19,8 +19,6 @@ from designer.synthesis.equal_parts import ties_of
 from designer.synthesis.preferences import NO_WISHES, Wishes
 from designer.synthesis.value_program import Ranking
 
-__all__ = ["DeadZone", "DeadZoneTarget", "parts_of", "size"]
-
 
 def size(
     target: DeadZoneTarget,

@@ -23,10 +23,8 @@ from designer.spread.spread import draw_many
 from designer.yields.bench_procedure import BenchResult, find_on_bench
 from designer.yields.centring import centring_offset
 from designer.yields.generator_offsets import AS_BUILT, Adjustment
-from designer.yields.setting_search import MOST_TRIES, Case, seek
+from designer.yields.setting_search import Case, seek
 from designer.yields.verdict import Answer, StudyPlan, Verdict, judge, kept
-
-__all__ = ["MOST_TRIES", "Bands", "Tuned", "benched_block", "tuned_block"]
 
 DIGITS = 6
 """Decimals of the centring DC offset over the amplitude."""

@@ -15,7 +15,7 @@ from typing import Protocol
 from designer.base.proportion import wilson
 from designer.circuit.netlist import Circuit, Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
 from designer.spread.spread import Spread
 

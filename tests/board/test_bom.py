@@ -11,7 +11,7 @@ from designer.board.component import components
 from designer.circuit.dead_zone_kind import Sides
 from designer.circuit.netlist import Circuit
 from designer.model.board_table import BoardChoice
-from designer.model.model_file import CircuitSpec
+from designer.model.circuit_table import CircuitSpec
 from tests.shared.stages import CATALOG, rectifier, stage
 
 VALUES = {**rectifier(5.0), "R50": 4.7e3, "R202": 24.9e3, "R205": 24.9e3}

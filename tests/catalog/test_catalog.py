@@ -17,14 +17,8 @@ from hypothesis import strategies as st
 from designer.base.errors import InputError, Unreachable
 from designer.base.eseries import SERIES, eseries, series_values
 from designer.base.units import decode_value
-from designer.catalog.catalog import (
-    ENVIRONMENT,
-    PRICE_CLASSES,
-    Catalog,
-    Figure,
-    OpAmp,
-    load_catalog,
-)
+from designer.catalog.catalog import ENVIRONMENT, Catalog, load_catalog
+from designer.catalog.entries import PRICE_CLASSES, Figure, OpAmp
 
 SHIPPED = Path(__file__).resolve().parents[2] / "catalogs"
 

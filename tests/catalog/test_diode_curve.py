@@ -9,8 +9,9 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.netlist_guard import check_netlist
-from designer.catalog.catalog import Figure, load_catalog
+from designer.catalog.catalog import load_catalog
 from designer.catalog.diode_curve import card, diode_model
+from designer.catalog.entries import Figure
 from designer.spice.backends import open_simulator
 from designer.spice.batch_backend import BatchNgspice
 

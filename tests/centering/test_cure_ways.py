@@ -21,7 +21,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.model.model import Dimensionless
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread
 from designer.yields.verdict import Question, StudyPlan, Verdict, Yield
 from tests.circuit.test_coefficients import exact_for_paper

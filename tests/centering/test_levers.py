@@ -19,7 +19,8 @@ from designer.centering.ngspice_check import Agreement
 from designer.centering.places import Scored, score
 from designer.centering.windows import Place, Stretch
 from designer.model import find_responses
-from designer.model.model_file import ModelFile, Response
+from designer.model.model_file import ModelFile
+from designer.model.response_table import Response
 from designer.spread.part_rules import spread_of
 from designer.synthesis import parts_choice
 from tests.shared.search_cases import catalog, file

@@ -8,7 +8,7 @@ import pytest
 from designer.centering.distance import LADDER, Stretched
 from designer.centering.places import MANY, places, room_of, score
 from designer.centering.windows import Place, stretches
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.model.search_table import SearchSpec
 from tests.shared.search_cases import made, spread
 

@@ -11,7 +11,7 @@ from designer.base.errors import InputError
 from designer.bifurcations import windows
 from designer.centering.windows import STEP, check, clearances, stretches
 from designer.model import find_responses, swept_model
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.model.search_table import SearchSpec
 from tests.shared.search_cases import file
 

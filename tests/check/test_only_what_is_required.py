@@ -22,7 +22,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
-from designer.model.model_file import Response
+from designer.model.response_table import Response
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings, write
 from designer.spice.numerics_gate import Subject

@@ -30,7 +30,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.jobs.study_job import _satisfied
 from designer.model.find_responses import ModelResponse
 from designer.model.model import Dimensionless
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.report import words as report_words
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult

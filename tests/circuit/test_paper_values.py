@@ -13,8 +13,8 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit import paper_values
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.paper_values import PRINTED
+from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
-from designer.model.model_file import CircuitSpec
 from tests.shared.oracles import Plain, coefficient_error, dead_zone_gains
 
 CATALOG = load_catalog()

@@ -399,7 +399,7 @@ def test_composites_of_nothing_are_refused(composites: dict[str, str], field: st
 
 
 def test_an_unknown_diode_or_reference_is_refused() -> None:
-    from designer.circuit.build import zone_of
+    from designer.circuit.dead_zone_kind import zone_of
 
     with pytest.raises(InputError, match="1N4148"):
         zone_of("rectifier", "both", CATALOG, diode="1N4184")

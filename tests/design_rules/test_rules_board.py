@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from designer.base.errors import InputError
-from designer.base.sexpr import Expression, expression, read, read_all, write
+from designer.base.sexpr import Expression, expression, expression_text, read, read_all
 from designer.board import kicad_rules
 from designer.board.component import Component
 from designer.board.kicad_names import kicad_net
@@ -67,7 +67,7 @@ def edited(change: Any) -> str:
     """The exported board with every list of its top level changed, or left out for None."""
     whole = read(drawn())
     items = [change(i) if isinstance(i, Expression) else i for i in whole.items]
-    return write(Expression(tuple(i for i in items if i is not None)))
+    return expression_text(Expression(tuple(i for i in items if i is not None)))
 
 
 def reference(footprint: Expression) -> str:
@@ -80,7 +80,7 @@ def renamed(old: str, new: str) -> str:
 
 def with_items(*items: Expression) -> str:
     whole = read(drawn())
-    return write(Expression((*whole.items, *items)))
+    return expression_text(Expression((*whole.items, *items)))
 
 
 def track(net: str, width: float, length: float, y: float = -20.0) -> Expression:
@@ -161,7 +161,7 @@ def test_pins_on_other_nets_are_named(tmp_path: Path) -> None:
     def exchange(item: Expression) -> Expression:
         if item.name != "footprint" or reference(item) != "R4":
             return item
-        text = write(item)
+        text = expression_text(item)
         first, second = (f'"{kicad_net(n)}"' for n in ("v1", "s2"))
         return read(text.replace(first, '"?"').replace(second, first).replace('"?"', second))
 
@@ -177,7 +177,9 @@ def valued(name: str, words: str) -> str:
         if item.name != "footprint" or reference(item) != name:
             return item
         value = next(p for p in item.all("property") if p.text(0) == "Value")
-        return read(write(item).replace(f'"Value" "{value.text(1)}"', f'"Value" "{words}"'))
+        return read(
+            expression_text(item).replace(f'"Value" "{value.text(1)}"', f'"Value" "{words}"')
+        )
 
     return edited(change)
 
@@ -394,7 +396,7 @@ def reshaped(name: str, number: str, change: Any) -> str:
 
     def pad(item: Any) -> Any:
         if isinstance(item, Expression) and item.name == "pad" and item.text(0) == number:
-            return read(change(write(item)))
+            return read(change(expression_text(item)))
         return item
 
     def footprint(item: Expression) -> Expression:
@@ -523,7 +525,7 @@ def test_without_an_edge_or_with_a_gap_in_it_nothing_is_passed(tmp_path: Path) -
             for a, b in zip(corners, [*corners[1:], (corners[0][0] + gap, corners[0][1])],
                             strict=True)
         ]  # fmt: skip
-        return write(Expression((*whole.items, *lines)))
+        return expression_text(Expression((*whole.items, *lines)))
 
     assert by_reading(drawn_in_lines(0.0), tmp_path)["board-outline"].status == PASS
     found = by_reading(drawn_in_lines(0.5), tmp_path)["board-outline"]

@@ -29,7 +29,7 @@ from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.find_responses import find
 from designer.model.model import Dimensionless
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from tests.shared.oracles import Plain, integrate, response_amplitude
 
 REST = np.zeros(4)

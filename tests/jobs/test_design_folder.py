@@ -13,14 +13,16 @@ from typing import Any
 import pytest
 
 from designer.base.csv_tables import csv_text, safe_cell
-from designer.base.design_folder import MANIFEST, Folder, StageName, file_hash
+from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.manifest import MANIFEST, StageName, file_hash
 from designer.base.natural_sort import natural
 from designer.base.plain_json import dumps
 from designer.check import synthesis_result
 from designer.check.synthesis_result import synthesise
 from designer.cli import entry
-from designer.jobs.synthesise_job import Options, read_design
+from designer.jobs.options import Options
+from designer.jobs.synthesise_job import read_design
 from designer.model.model_file import read_model_file
 from tests.shared.paper_cases import PAPER, synthesised
 from tests.shared.quick_folders import without_starts

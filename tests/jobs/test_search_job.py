@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from designer.base.design_folder import MODEL, Folder, StageName
+from designer.base.design_folder import MODEL, Folder
 from designer.base.errors import InputError
+from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.centering.levers import Choice

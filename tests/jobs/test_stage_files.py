@@ -17,6 +17,7 @@ from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_kind import Kind, Sides
+from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit
 from designer.jobs import design_files
 from designer.jobs.json_answers import synthesis_json
@@ -26,7 +27,6 @@ from designer.model.model_file import ModelFile, read_model_file
 from designer.report.data import ReportData
 from designer.report.write import render_html, render_markdown
 from designer.spice.pool import SpicePool
-from designer.synthesis.parts_choice import Certificate, Design
 from designer.yields import study_plan
 from designer.yields.layers import Samples
 from designer.yields.ngspice_runs import hear

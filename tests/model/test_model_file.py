@@ -19,18 +19,10 @@ from pydantic import BaseModel
 
 from designer.base.errors import InputError
 from designer.model import model_file
-from designer.model.circuit_table import SIDE_CONDITIONS
+from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.model import Dimensionless
-from designer.model.model_file import (
-    MAX_BYTES,
-    CircuitSpec,
-    Expect,
-    ModelFile,
-    Response,
-    parse_model_file,
-    read_model_file,
-)
-from designer.model.response_table import ResponseTable
+from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
+from designer.model.response_table import Expect, Response, ResponseTable
 from designer.model.template import TEXT
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -9,8 +9,8 @@ import pytest
 from designer.base.errors import InputError
 from designer.cli import entry
 from designer.model.measured_values import read_measured
-from designer.model.model_file import SpreadSpec, parse_model_file, read_model_file
-from designer.model.spread_table import NetworkRule, Offset, PartRule, Shape
+from designer.model.model_file import parse_model_file, read_model_file
+from designer.model.spread_table import NetworkRule, Offset, PartRule, Shape, SpreadSpec
 from designer.spread.part_rules import spread_of
 from tests.circuit.test_reduction import EXACT
 from tests.shared.stages import bought, stage

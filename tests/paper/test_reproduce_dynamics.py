@@ -21,7 +21,7 @@ from designer.base.progress import Progress
 from designer.base.report_guard import check_ours
 from designer.bifurcations.doubling_cascade import cascade
 from designer.bifurcations.points import Kind
-from designer.bifurcations.windows import Window, WindowEnd
+from designer.bifurcations.windows import BranchWindow, WindowEnd
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.cli import entry
@@ -55,9 +55,9 @@ def small() -> Dynamics:
     return measure(SMALL, Progress())
 
 
-def made(response: str, low: float, high: float, *, symmetric: bool = False) -> Window:
+def made(response: str, low: float, high: float, *, symmetric: bool = False) -> BranchWindow:
     ends = [WindowEnd(v, 0.0, "fold", None, failed("")) for v in (low, high)]
-    return Window("omega", response, symmetric, ends[0], ends[1], 0)
+    return BranchWindow("omega", response, symmetric, ends[0], ends[1], 0)
 
 
 def test_cascade_chains_what_begins_where_the_last_ended() -> None:
@@ -70,7 +70,7 @@ def test_cascade_chains_what_begins_where_the_last_ended() -> None:
     assert cascade(everything, first).describe().startswith("1-1-1 (AS) → fold 3.00000 → 2-2-2")
 
 
-def ladder(seen: str = "aperiodic") -> tuple[list[Window], list[Gap]]:
+def ladder(seen: str = "aperiodic") -> tuple[list[BranchWindow], list[Gap]]:
     """Eight symmetric windows in turn, and between each two the same motion everywhere."""
     windows = [made(f"1-{p}-{p}", 10.0 - p, 10.5 - p, symmetric=True) for p in range(1, 9)]
     between = [
@@ -205,7 +205,7 @@ def test_grazing_from_1_p_p_to_one_impact_more(point: Any, verdict: str) -> None
 
 
 def test_the_course_of_every_1_p_p() -> None:
-    def ended(p: int, why: str, *, symmetric: bool) -> Window:
+    def ended(p: int, why: str, *, symmetric: bool) -> BranchWindow:
         one = made(f"1-{p}-{p}", 10.0 - p, 10.5 - p, symmetric=symmetric)
         return replace(one, low=replace(one.low, why=why))
 

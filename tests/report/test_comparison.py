@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from designer.base import figure_style
-from designer.base.design_folder import MANIFEST
-from designer.catalog.catalog import PRICE_CLASSES, load_catalog
+from designer.base.manifest import MANIFEST
+from designer.catalog.catalog import load_catalog
+from designer.catalog.entries import PRICE_CLASSES
 from designer.circuit import paper_values
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.paper_values import Candidate
@@ -22,8 +23,10 @@ from designer.cli import entry
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import find
-from designer.model.model_file import CircuitSpec, Response, parse_model_file
+from designer.model.model_file import parse_model_file
+from designer.model.response_table import Response
 from designer.report import compare_plots, comparison
 from designer.report.compare_json import comparison_json
 from designer.report.comparison import OURS, Column

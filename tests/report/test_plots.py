@@ -19,7 +19,7 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.report import orbit_plots, study_plots
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult
@@ -118,9 +118,9 @@ def test_no_state_is_left_behind_and_none_is_taken_over() -> None:
 def _lines(figure: Figure, axes: int = 0) -> dict[str, int]:
     """Points of each engine's line, by engine."""
     colours = {
-        figure_style.MODEL: "model",
-        figure_style.CIRCUIT: "circuit",
-        figure_style.NGSPICE: "ngspice",
+        figure_style.MODEL_COLOUR: "model",
+        figure_style.CIRCUIT_COLOUR: "circuit",
+        figure_style.NGSPICE_COLOUR: "ngspice",
     }
     return {
         colours[str(line.get_color())]: len(line.get_xdata())  # type: ignore[arg-type]

@@ -21,7 +21,8 @@ from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
-from designer.model.model_file import Expect, parse_model_file
+from designer.model.model_file import parse_model_file
+from designer.model.response_table import Expect
 from designer.report.data import ReportData
 from designer.report.tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report

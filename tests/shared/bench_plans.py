@@ -10,7 +10,7 @@ import numpy as np
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Board
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread
 from designer.yields import exact_rung
 from designer.yields.verdict import Answer, Question, StudyPlan

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.synthesis.size_dead_zone import DeadZoneTarget
+from designer.synthesis.dead_zone_target import DeadZoneTarget
 
 MAX = 2_000_000
 """Choices that are looked at together."""

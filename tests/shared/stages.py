@@ -8,7 +8,7 @@ import numpy as np
 
 from designer.catalog.catalog import load_catalog
 from designer.circuit import build, terms
-from designer.circuit.dead_zone_kind import Kind, Sides
+from designer.circuit.dead_zone_kind import Kind, Sides, zone_of
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.model.model import Dimensionless
@@ -71,7 +71,7 @@ def stage(
         supply=SUPPLY,
         saturation=SATURATION,
         clearance="A",
-        zone=build.zone_of(kind, sides, CATALOG),
+        zone=zone_of(kind, sides, CATALOG),
         composites=composites or {},
     )
 

@@ -15,6 +15,7 @@ from designer.base.plain_json import dumps
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
 from designer.cli import tables
 from designer.jobs.study_job import _satisfied
@@ -23,7 +24,6 @@ from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
 from designer.spice.equation_check import FLOOR, EquationCheck, Finding, check, explained, transfer
 from designer.spice.pool import SpicePool
-from designer.synthesis.parts_choice import Certificate, Design
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, one_sided, rectifier, stage
 from tests.shared.stages import model as stage_model

@@ -20,11 +20,13 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.resistors import effective
 from designer.circuit.scale_fit import minimax
-from designer.jobs.synthesise_job import Options, read_design, synthesise_into
+from designer.jobs.options import Options
+from designer.jobs.synthesise_job import read_design, synthesise_into
 from designer.model.board_table import BoardChoice
+from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
 from designer.model.model import Dimensionless
-from designer.model.model_file import CircuitSpec, parse_model_file
+from designer.model.model_file import parse_model_file
 from designer.synthesis import composites
 from designer.synthesis.composites import Pair, Program, best, pairs_near
 from designer.synthesis.parts_choice import synthesise

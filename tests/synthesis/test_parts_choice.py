@@ -13,9 +13,11 @@ import pytest
 from designer.base.errors import InputError, Unreachable
 from designer.catalog.catalog import load_catalog
 from designer.circuit.design import Design
+from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, find, peaks
 from designer.model.model import Dimensionless
-from designer.model.model_file import CircuitSpec, Response, read_model_file
+from designer.model.model_file import read_model_file
+from designer.model.response_table import Response
 from designer.spread.spread import Spread, draw
 from designer.synthesis.limits import LOAD, SIGNAL
 from designer.synthesis.parts_choice import synthesise

@@ -26,7 +26,8 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.find_responses import Peaks, find, peaks
 from designer.model.model import Dimensionless
-from designer.model.model_file import Response, parse_model_file, read_model_file
+from designer.model.model_file import parse_model_file, read_model_file
+from designer.model.response_table import Response
 from designer.synthesis import limits, side_conditions
 from designer.synthesis.limits import GENERATOR_PEAK, LOAD, bandwidth_limit, output_gain
 from designer.synthesis.output_loads import Load, Loads

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from designer.base.arrays import Array
 from designer.base.eseries import series_values
+from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
 from designer.synthesis.preferences import Wishes
-from designer.synthesis.size_dead_zone import DeadZone, DeadZoneTarget, parts_of, size
+from designer.synthesis.size_dead_zone import size
 from tests.shared.dead_zone_enumeration import (
     Ranges,
     choices,

@@ -9,7 +9,7 @@ import pytest
 
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
-from designer.model.model_file import Expect
+from designer.model.response_table import Expect
 from designer.model.tuning_bands import Bands
 from designer.yields import bench_procedure
 from designer.yields.bench_procedure import find_on_bench

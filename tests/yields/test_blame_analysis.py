@@ -16,7 +16,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.continued_orbit import Function, follow, functions
 from designer.dynamics.flow import Flow
 from designer.model.distributions import Uniform
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
 from designer.spread.spread import Group, Spread, draw_many
 from designer.yields.blame_analysis import Blame, blame

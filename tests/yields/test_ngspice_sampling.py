@@ -10,7 +10,7 @@ import pytest
 
 from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.yields.ngspice_sampling import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,

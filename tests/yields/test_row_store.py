@@ -17,7 +17,7 @@ import pytest
 from designer.base.errors import InputError
 from designer.circuit.netlist import Capacitor, Circuit, Excitation, Generator, Resistor, Section
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.spice.deck import SolverSettings
 from designer.spread.spread import Spread
 from designer.yields.layers import Here, fill

@@ -20,8 +20,8 @@ from designer.spread.spread import Spread, draw
 from designer.yields import tuned_yield
 from designer.yields.generator_offsets import AS_BUILT, Adjustment
 from designer.yields.joint_yield import all_on_one
-from designer.yields.setting_search import MOST_FOLLOWED, Case, Try, seek
-from designer.yields.tuned_yield import MOST_TRIES, Tuned, benched_block, tuned_block
+from designer.yields.setting_search import MOST_FOLLOWED, MOST_TRIES, Case, Try, seek
+from designer.yields.tuned_yield import Tuned, benched_block, tuned_block
 from designer.yields.verdict import Answer, Question, Verdict, judge
 from tests.shared.bench_plans import answers, ensemble, period_counts, plan, question, shifted
 from tests.shared.paper_cases import subject

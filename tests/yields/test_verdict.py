@@ -19,7 +19,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread, draw
 from designer.yields.layers import Samples
 from designer.yields.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield, count, judge

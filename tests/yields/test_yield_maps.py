@@ -16,7 +16,7 @@ from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import coexisting, settle, starts
 from designer.dynamics.flow import Flow
-from designer.model.model_file import Expect, Response
+from designer.model.response_table import Expect, Response
 from designer.report.map_plots import map_chart
 from designer.report.map_writer import files
 from designer.spread.spread import Spread, draw

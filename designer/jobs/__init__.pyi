@@ -1,0 +1,54 @@
+from . import (
+    bifurcation_job as bifurcation_job,
+)
+from . import (
+    origin as origin,
+)
+from . import (
+    rules_job as rules_job,
+)
+from . import (
+    search_job as search_job,
+)
+from . import (
+    study_job as study_job,
+)
+from . import (
+    synthesise_job as synthesise_job,
+)
+from . import (
+    trade_job as trade_job,
+)
+from .bifurcation_request import (
+    Request as Request,
+)
+from .cure_job import (
+    CureResult as CureResult,
+)
+from .cure_job import (
+    cure as cure,
+)
+from .design_files import (
+    load as load,
+)
+from .export_job import (
+    export_into as export_into,
+)
+from .options import (
+    Options as Options,
+)
+from .origin import (
+    provenance as provenance,
+)
+from .search_job import (
+    search_into as search_into,
+)
+from .study_folder import (
+    FolderStores as FolderStores,
+)
+from .study_job import (
+    run as run,
+)
+from .synthesise_job import (
+    Outcome as Outcome,
+)

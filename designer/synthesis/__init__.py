@@ -1,0 +1,9 @@
+"""From a model to the best parts that can be bought, with a proof of how good they are.
+
+The linear block by compiled joins and mixed-integer optimisation, the dead zone by tables, side
+conditions (swing, load, bandwidth) on the finished circuit.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,188 @@
+"""The house: which package may use which, what is public, what stands once."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+import textwrap
+from collections import defaultdict
+from graphlib import TopologicalSorter
+
+import pytest
+
+from tests.shared.house import HOUSE, ORDER, ROOT, Import, arrows, imports, public, sources
+
+DRAWS = "matplotlib takes a second to import, and nothing before a picture needs it"
+STARTS = "most verbs do not need it"
+LAZY = {
+    DRAWS: {
+        ("board.schematic_drawing", "base.figure_style"),
+        ("jobs.bifurcation_job", "base.figure_style"),
+        ("jobs.bifurcation_job", "report.bifurcation_plots"),
+        ("jobs.board_files", "board.schematic_drawing"),
+        ("jobs.compare_files", "base.figure_style"),
+        ("jobs.compare_files", "report.compare_plots"),
+        ("jobs.cure_job", "base.figure_style"),
+        ("jobs.cure_job", "centering.cure_plots"),
+        ("jobs.study_folder", "report.map_writer"),
+        ("jobs.study_job", "report.data"),
+        ("jobs.study_job", "report.write"),
+        ("jobs.trade_job", "base.figure_style"),
+        ("jobs.trade_job", "fidelity.trade_files"),
+        ("paper.reproduce_circuit", "base.figure_style"),
+        ("paper.reproduce_circuit", "paper.circuit_page"),
+        ("paper.reproduce_circuit", "paper.circuit_pictures"),
+        ("paper.reproduce_tolerance", "base.figure_style"),
+        ("paper.reproduce_tolerance", "paper.tolerance_page"),
+        ("paper.robust_design", "base.figure_style"),
+        ("paper.robust_design", "paper.robust_design_page"),
+        ("report.map_writer", "base.figure_style"),
+        ("report.map_writer", "report.map_plots"),
+        ("report.simulate_plots", "base.figure_style"),
+    },
+    STARTS: {
+        ("jobs.json_answers", "circuit.design"),
+        ("jobs.json_answers", "model.model"),
+        ("jobs.origin", "spice.backends"),
+        ("jobs.study_job", "yields.dask_runner"),
+        ("model.rules_table", "base.units"),
+        ("spice.backends", "spice.batch_backend"),
+        ("spice.backends", "spice.shared_backend"),
+    },
+}
+"""Imports inside functions, outside the command line, each with its reason."""
+
+
+@pytest.fixture(scope="module")
+def every() -> list[Import]:
+    return list(imports())
+
+
+def test_every_module_stands_in_a_package() -> None:
+    """Beside the packages stand only the public list, ``python -m designer`` and ``py.typed``."""
+    assert {p.name for p in HOUSE.iterdir() if p.name != "__pycache__"} == {
+        *ORDER,
+        "__init__.py",
+        "__main__.py",
+        "py.typed",
+    }
+
+
+def test_no_import_runs_back(every: list[Import]) -> None:
+    """Every import goes to the own package or to one that stands before it."""
+    place = {package: number for number, package in enumerate(ORDER)}
+    assert len(every) > 1000
+    back = [
+        f"{i.importer}:{i.line} uses {i.module}"
+        for i in every
+        if i.module and place[i.module.split(".")[0]] > place[i.importer.split(".")[0]]
+    ]
+    assert back == []
+
+
+def test_packages_use_modules_and_not_the_public_list_of_the_whole(every: list[Import]) -> None:
+    """``designer`` and the packages' lists are for users: inside, an import names its module."""
+    assert [f"{i.importer}:{i.line}" for i in every if "." not in i.module] == []
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_no_circle_inside_a_package(package: str, every: list[Import]) -> None:
+    graph: dict[str, set[str]] = defaultdict(set)
+    for i in every:
+        if i.importer.split(".")[0] == i.module.split(".")[0] == package:
+            graph[i.importer].add(i.module)
+    TopologicalSorter(graph).prepare()  # CycleError names the circle
+
+
+def test_no_private_name_crosses_a_module(every: list[Import]) -> None:
+    private = [f"{i.importer}:{i.line} {i.name}" for i in every if re.match(r"_[^_]", i.name)]
+    assert private == []
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_what_others_use_is_listed(package: str, every: list[Import]) -> None:
+    """What another package imports is in the package's list, with its module."""
+    listed = public(package)
+    missing = set()
+    for i in every:
+        used, _, module = i.module.partition(".")
+        if used != package or i.importer.split(".")[0] == package:
+            continue
+        name, home = (i.name, module) if i.name else (module, "")
+        if listed.get(name) != home:
+            missing.add(f"from .{home} import {name}")
+    assert sorted(missing) == []
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_what_is_listed_is_there(package: str) -> None:
+    """Every listed name can be imported, and none hides a module of the same name."""
+    module = importlib.import_module(f"designer.{package}")
+    assert module.__doc__
+    listed = public(package)
+    assert sorted(module.__all__) == sorted(listed)
+    for name, home in listed.items():
+        value = getattr(module, name)
+        if home:
+            assert not (HOUSE / package / f"{name}.py").exists(), name
+            assert value is getattr(importlib.import_module(f"designer.{package}.{home}"), name)
+        else:
+            assert value.__name__ == f"designer.{package}.{name}"
+
+
+def test_imports_inside_functions_have_a_reason(every: list[Import]) -> None:
+    """Start-up time is the only one; whatever the command line uses may wait for its verb."""
+    lazy = {(i.importer, i.module) for i in every if i.lazy and not i.importer.startswith("cli.")}
+    assert lazy == {pair for pairs in LAZY.values() for pair in pairs}
+
+
+def test_a_class_name_stands_once() -> None:
+    """Private classes and those of tests aside."""
+    homes: dict[str, list[str]] = defaultdict(list)
+    for module, path in sources().items():
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes[node.name].append(module)
+    assert {name: found for name, found in homes.items() if len(found) > 1} == {}
+
+
+def test_dynamics_and_bifurcations_stand_alone() -> None:
+    """Shaw and Holmes' oscillator, built by hand where no other package can be imported."""
+    script = textwrap.dedent(
+        """
+        import sys
+
+        ALONE = {"base", "dynamics", "bifurcations"}
+
+        class Forbidden:
+            def find_spec(self, name, path=None, target=None):
+                parts = name.split(".")
+                if parts[0] == "designer" and len(parts) > 1 and parts[1] not in ALONE:
+                    raise ImportError(f"{name} is another package")
+
+        sys.meta_path.insert(0, Forbidden())
+        from tests.shared.shaw_holmes import main
+
+        main()
+        """
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["orbits", "points"]
+
+
+def test_the_picture_is_of_this_house() -> None:
+    """``scripts/draw-architecture`` draws it; an arrow that imports no longer say is an error."""
+    text = (ROOT / "docs" / "images" / "architecture.svg").read_text("utf-8")
+    assert set(re.findall(r'id="package-(\w+)"', text)) == set(ORDER)
+    assert set(re.findall(r'id="use-(\w+)-(\w+)"', text)) == arrows()
+
+
+def test_the_page_has_a_paragraph_for_each_package() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    assert re.findall(r"(?m)^- \*\*`(\w+)`\*\*", page) == list(ORDER)

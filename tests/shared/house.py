@@ -1,0 +1,115 @@
+"""The packages of ``designer`` in the order in which data flows, and the imports between them."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+HOUSE = ROOT / "designer"
+ORDER = (
+    "base",
+    "dynamics",
+    "bifurcations",
+    "catalog",
+    "model",
+    "circuit",
+    "synthesis",
+    "spread",
+    "spice",
+    "check",
+    "board",
+    "yields",
+    "design_rules",
+    "centering",
+    "fidelity",
+    "report",
+    "jobs",
+    "paper",
+    "cli",
+)
+"""A package may use those before it. The picture in docs/architecture.md is drawn from this."""
+
+
+@dataclass(frozen=True)
+class Import:
+    """One name that a module takes from another of the same project."""
+
+    importer: str
+    """The importing module, as "package.module"."""
+    module: str
+    """The module that it is taken from, as "package.module"; "package" for a package's own list."""
+    name: str
+    """The name; "" where the module itself is imported."""
+    lazy: bool
+    """Whether the import stands inside a function."""
+    line: int
+    """Of the importing file."""
+
+
+def sources() -> dict[str, Path]:
+    """Every module in a package, as "package.module"."""
+    return {
+        f"{path.parent.name}.{path.stem}": path
+        for package in ORDER
+        for path in sorted((HOUSE / package).glob("*.py"))
+        if path.stem != "__init__"
+    }
+
+
+def imports() -> Iterator[Import]:
+    """All imports between modules of the project, lazy ones and those for types only too."""
+    modules = sources()
+    for importer, path in modules.items():
+        tree = ast.parse(path.read_text("utf-8"))
+        lazy = {
+            id(node)
+            for function in ast.walk(tree)
+            if isinstance(function, ast.FunctionDef)
+            for node in ast.walk(function)
+        }
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            if node.module != "designer" and not node.module.startswith("designer."):
+                continue
+            source = node.module.removeprefix("designer").removeprefix(".")
+            for alias in node.names:
+                whole = f"{source}.{alias.name}".removeprefix(".")
+                module, name = (whole, "") if whole in modules else (source, alias.name)
+                yield Import(importer, module, name, id(node) in lazy, node.lineno)
+
+
+def public(package: str) -> dict[str, str]:
+    """The names that a package lists, each with its module; a listed module with ""."""
+    listed: dict[str, str] = {}
+    for node in ast.parse((HOUSE / package / "__init__.pyi").read_text("utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            listed |= {alias.name: node.module or "" for alias in node.names}
+    return listed
+
+
+def uses() -> dict[str, set[str]]:
+    """The packages that each package imports."""
+    found: dict[str, set[str]] = {package: set() for package in ORDER}
+    for i in imports():
+        here, there = i.importer.split(".")[0], i.module.split(".")[0]
+        if here != there:
+            found[here].add(there)
+    return found
+
+
+def arrows() -> set[tuple[str, str]]:
+    """Which package uses which, without those that a way over other packages says too."""
+    used = uses()
+    over: dict[str, set[str]] = {}
+    for package in ORDER:
+        over[package] = used[package].union(*(over[u] for u in used[package]))
+    return {
+        (package, other)
+        for package in ORDER
+        for other in used[package]
+        if not any(other in over[u] for u in used[package])
+    }
