@@ -27,6 +27,9 @@ INK, MUTED, GRID, CONTACT = "#1a1a1a", "#5c5c5c", "#e3e3e3", "#f1ece0"
 
 MODEL, CIRCUIT, NGSPICE, IMPACT = "#7cc4ee", "#1a1a1a", "#d55e00", "#007a5a"
 
+ON_DARK, ON_LIGHT = "#fefefe", "#1b1b1b"
+"""Ink on areas that are filled with a colour: the same on a page of any colour."""
+
 EXACT = 1e-12
 """A coefficient error below this is rounding: the parts give the coefficient exactly."""
 
