@@ -68,7 +68,8 @@ bench: $(VENV)/.bench ngspice ## run the benchmarks
 reports: env ngspice ## make the reports that this commit lacks
 	@DESIGNER=$(VENV)/bin/designer scripts/make-reports
 
-picture: env ngspice ## draw the README's picture
+picture: env ngspice ## draw the README's pictures
+	@$(VENV)/bin/python scripts/make-model-picture
 	@$(VENV)/bin/python scripts/make-picture
 
 lock: ## resolve pyproject.toml anew into requirements/constraints.txt

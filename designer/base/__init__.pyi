@@ -113,6 +113,12 @@ from .figure_style import (
     NGSPICE_COLOUR as NGSPICE_COLOUR,
 )
 from .figure_style import (
+    ON_DARK as ON_DARK,
+)
+from .figure_style import (
+    ON_LIGHT as ON_LIGHT,
+)
+from .figure_style import (
     axis_limits as axis_limits,
 )
 from .figure_style import (

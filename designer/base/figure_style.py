@@ -32,6 +32,9 @@ MODEL_COLOUR, CIRCUIT_COLOUR, NGSPICE_COLOUR, IMPACT_COLOUR = (
     "#007a5a",
 )
 
+ON_DARK, ON_LIGHT = "#fefefe", "#1b1b1b"
+"""Ink on areas that are filled with a colour: the same on a page of any colour."""
+
 EXACT = 1e-12
 """A coefficient error below this is rounding: the parts give the coefficient exactly."""
 

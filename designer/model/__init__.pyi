@@ -1,4 +1,7 @@
 from . import (
+    equations as equations,
+)
+from . import (
     find_responses as find_responses,
 )
 from . import (
@@ -102,6 +105,9 @@ from .response_table import (
 )
 from .search_table import (
     SearchSpec as SearchSpec,
+)
+from .sketch import (
+    sketch as sketch,
 )
 from .spread_table import (
     DataSheet as DataSheet,

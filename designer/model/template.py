@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
-TEXT = """\
+from designer.model.sketch import sketch
+
+_SKETCH = "\n".join(f"# {line}" for line in sketch().splitlines())
+
+TEXT = f"""\
 # A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
 # Numbers may carry units as text: "22.1k", "100nF", "1 kHz".
 
 format = 1
 title = "My model"
 
-# Two masses in a row: M1 moves between stops, M2 stands on a spring. Dimensionless parameters;
-# or a table [mechanical] with M1, M2, C1, C2, K0, K1, K2, B, P1, P2 in SI units instead.
+# Two masses in a row: M1 moves between stops, M2 stands on a spring. Displacements count to the
+# right; the right stop is the upper one. K: springs, C: dampers, K0: springs of the stops.
+#
+{_SKETCH}
+#
+# M1 X1'' + C1 (X1' - X2') + K1 (X1 - X2) + F(X1) = P1 sin(Omega T)
+# M2 X2'' + C1 (X2' - X1') + C2 X2' + K1 (X2 - X1) + K2 X2 = P2 sin(Omega T)
+# F(X) = K0 (X - clip(X, -B, B))
+#
+# The same dimensionless, with t = T sqrt(K1/M1), x = X K1/(P1 + P2), omega = Omega sqrt(M1/K1):
+#
+# x1'' + 2 zeta (x1' - x2') + (x1 - x2) + f(x1) = (1 - f20) sin(omega t)
+# m/(1 - m) x2'' + 2 zeta (x2'/(1 - c) - x1') + (x2/(1 - k) - x1) = f20 sin(omega t)
+# f(x) = k0/(1 - k0) (x - clip(x, -b, b))
+#
+# Dimensionless parameters; or a table [mechanical] with M1, M2, C1, C2, K0, K1, K2, B, P1, P2 in
+# SI units instead.
 [model]
 m = 0.5         # M2/(M1 + M2), in (0, 1)
 k = 0.5         # K2/(K1 + K2), in (0, 1)

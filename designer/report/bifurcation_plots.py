@@ -130,7 +130,7 @@ def parameter_map(made: ParameterMap, name: str = "") -> Figure:
         _grid(axes, made.cells, plan.xs, plan.ys, looks)
         axes.set_xlabel(_axis(plan.subject, plan.x))
         axes.set_ylabel(_axis(plan.subject, plan.y))
-        _legend(figure, looks, made.counts, len(made.cells))
+        _legend(axes, looks, made.counts, len(made.cells))
     return figure
 
 
@@ -167,7 +167,7 @@ def basins(made: Basins, name: str = "") -> Figure:
         handles.append(
             Line2D([], [], ls="", marker="o", ms=6, mfc=MUTED, mec="white", label="its strobes")
         )
-        figure.legend(handles=handles, loc="outside right upper")
+        _legend_beside(axes, handles)
     return figure
 
 
@@ -176,6 +176,11 @@ def basins(made: Basins, name: str = "") -> Figure:
 
 def _head(figure: Figure, text: str) -> None:
     figure.suptitle(text, x=0.012, ha="left", fontsize=8.5, color=INK)
+
+
+def _legend_beside(axes: Axes, handles: Sequence[Any]) -> None:
+    """A legend at the right of the axes, below the heading, which takes the whole width."""
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
 
 
 Coloured = tuple[str, Array, list[Steady]]
@@ -344,9 +349,7 @@ def _cells(axes: Axes, xs: Array, ys: Array, numbers: Array, colours: Sequence[s
     )
 
 
-def _legend(
-    figure: Figure, looks: Mapping[str, str], counts: Mapping[str, int], total: int
-) -> None:
+def _legend(axes: Axes, looks: Mapping[str, str], counts: Mapping[str, int], total: int) -> None:
     handles = []
     for response, colour in looks.items():
         if colour not in (REST, OPEN):
@@ -356,7 +359,7 @@ def _legend(
         share = sum(counts[r] for r, c in looks.items() if c == colour) / total
         if share:
             handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{said}: {share:.1%}"))
-    figure.legend(handles=handles, loc="outside right upper")
+    _legend_beside(axes, handles)
 
 
 def _attractor_colours(made: Basins) -> list[str]:

@@ -8,11 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, say, styled
+from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, ON_LIGHT, new_figure, say, styled
 from designer.yields.blame_analysis import ResponseBlame, Subject
 
 PARTS_SHOWN = 16
 INDICES_SHOWN = 8
+LEAST_HEIGHT = 2.0
+"""Inches, so that the label of the colour bar stands beside it."""
 COLOURS = "cividis"
 """Even in lightness and told apart with every common form of colour blindness."""
 _FIRST, _TOTAL = "#0072b2", "#9fcbe6"
@@ -30,7 +32,7 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
         return figure
     groups, parts = _rows([b for _, b in shown])
     rows = groups + parts
-    figure = new_figure(7.4, 0.2 * len(rows) + 1.3)
+    figure = new_figure(7.4, max(0.2 * len(rows) + 1.3, LEAST_HEIGHT))
     axes = figure.subplots()
     values = np.full((len(rows), len(shown)), np.nan)
     for j, (_, b) in enumerate(shown):
@@ -49,10 +51,10 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
         axes.axhline(len(groups) - 0.5, color="white", lw=3.0)
     for i, j in np.ndindex(*values.shape):
         if np.isfinite(values[i, j]) and values[i, j] >= 0.5:
-            ink = "white" if values[i, j] < 55.0 else INK
+            ink = ON_DARK if values[i, j] < 55.0 else ON_LIGHT
             axes.text(j, i, f"{values[i, j]:.0f}", ha="center", va="center", color=ink, size=7)
     bar = figure.colorbar(image, ax=axes, pad=0.015, fraction=0.04)
-    bar.set_label("losses avoided if exact [%]")
+    bar.set_label("losses avoided\nif exact [%]")
     bar.outline.set_visible(False)
     return figure
 
@@ -73,8 +75,7 @@ def index_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None]) -
         axes.set_axis_off()
     for axes, (title, b) in zip(grid.flat, shown, strict=False):
         _indices(axes, title, b)
-    for axes in grid[-1]:
-        axes.set_xlabel("share of the margin’s variance [%]")
+    figure.supxlabel("share of the margin’s variance [%]", size=8.5)  # wider than one panel
     handles = [
         axes.barh([0], [0], color=_TOTAL, label="total index"),
         axes.barh([0], [0], color=_FIRST, label="first-order index"),

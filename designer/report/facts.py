@@ -7,7 +7,8 @@ from typing import Any
 
 from designer.base.figure_style import EXACT
 from designer.circuit.design import Design
-from designer.report import design_tables, tables, tolerance, words
+from designer.model.sketch import sketch
+from designer.report import design_tables, model_page, tables, tolerance, words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
 from designer.yields.verdict import Yield
@@ -26,10 +27,14 @@ def facts(data: ReportData) -> dict[str, Any]:
         "title": data.modelfile.title,
         "summary": _summary(data),
         "tiles": _tiles(data),
+        "equations": model_page.equations(data),
+        "sketch": sketch(design.model).splitlines(),
+        "drawing_note": model_page.drawing_note(data),
         "model_table": design_tables.model_table(data),
         "mechanical_table": design_tables.mechanical_table(data),
         "response_table": tables.response_table(data),
         "settings_table": tables.settings_table(data),
+        "settings_note": _settings_note(data),
         "problems": _problems(data),
         "yield_table": tables.yield_table(data),
         "ngspice_table": tables.ngspice_table(data),
@@ -156,7 +161,7 @@ def _yield_words(data: ReportData) -> list[str]:
             f"{least.samples - least.failed}: of a thousand boards, {_of_a_thousand(least)}."
         )
     whole = data.all_on_one_board
-    if whole is not None and math.isfinite(whole.rate):
+    if whole is not None and math.isfinite(whole.rate) and safe < len(rows):
         said.append(
             f"{words.all_of(len(data.checked))} responses on one and the same board: {whole.ok} of "
             f"{whole.samples - whole.failed}; of a thousand, {_of_a_thousand(whole)}."
@@ -183,20 +188,25 @@ def _tiles(data: ReportData) -> list[tuple[str, str]]:
     out = []
     if data.checked:
         asked = "all engines agree" if data.ngspice_asked else "ngspice was not asked"
-        out.append((f"{good} of {len(data.checked)}", f"responses found, {asked}"))
+        what = "response" if len(data.checked) == 1 else "responses"
+        out.append((f"{good} of {len(data.checked)}", f"{what} found, {asked}"))
     worst = data.design.errors.max_error
-    out.append(("exact" if worst < EXACT else words.error(worst), "largest coefficient error"))
+    if worst < EXACT:
+        out.append(("exact", "every coefficient of the equations, to rounding"))
+    else:
+        out.append((words.error(worst), "largest coefficient error"))
     out.append((str(data.design.distinct_values), "different R and C values"))
     rates = [y for i in range(len(data.checked)) for y in [data.yield_of(i)] if y and y.samples]
     known = [y for y in rates if math.isfinite(y.rate)]
     if known:
         least = min(known, key=lambda y: y.rate)
         low, high = words.span(*least.interval)
-        out.append((f"{100 * least.rate:.0f} %", f"least yield ({low} to {high} %)"))
+        what = "yield" if len(known) == 1 else "least yield"
+        out.append((f"{100 * least.rate:.0f} %", f"{what} ({low} to {high}\u00a0%)"))
     whole = data.all_on_one_board
     if whole is not None and math.isfinite(whole.rate):
         low, high = words.span(*whole.interval)
-        out.append((f"{100 * whole.rate:.0f} %", f"all on one board ({low} to {high} %)"))
+        out.append((f"{100 * whole.rate:.0f} %", f"all on one board ({low} to {high}\u00a0%)"))
     return out
 
 
@@ -209,6 +219,20 @@ def _study_note(data: ReportData) -> str:
         "Boards run as built: the generator stays at the settings above. Verdicts are those of "
         "the exact circuit. Intervals are Wilson's, at 95 %."
     )
+
+
+def _settings_note(data: ReportData) -> str:
+    said = (
+        "Amplitudes into a high impedance; a generator set for 50 Ω shows half. No DC. Shortest "
+        "contact and nearest grazing (the smaller of shallowest contact and nearest miss) are "
+        "those of the nominal circuit."
+    )
+    if any(c.gate is not None for c in data.checked):
+        said += (
+            " The largest difference is between ngspice's runs at the strobes, in per cent of "
+            "the peak."
+        )
+    return said
 
 
 def _parts_note(data: ReportData) -> str:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, new_figure, styled
 from designer.yields.yield_maps import YieldMap
 
 _LINE, _BAND, _BEST = "#0072b2", "#c6dff0", "#d55e00"
@@ -98,7 +98,7 @@ def _heat(label: str, found: YieldMap) -> Figure:
     axes.set_xlabel(_AXES["omega"])
     _hertz(axes, found)
     axes.set_ylabel(_AXES["grade"])
-    axes.axvline(found.used, color="white", lw=1.0, ls="--")
+    axes.axvline(found.used, color=ON_DARK, lw=1.0, ls="--")
     best = found.recommended
     where = ([], []) if best is None else ([best[0]], [found.axes[1].values.index(best[1])])
     said = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"

@@ -8,9 +8,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from designer.base.figure_style import EXACT, GRID, INK, MUTED, new_figure, styled
+from designer.base.figure_style import (
+    EXACT,
+    GRID,
+    INK,
+    MUTED,
+    ON_DARK,
+    ON_LIGHT,
+    new_figure,
+    styled,
+)
 from designer.yields.verdict import Answer, Verdict, Yield
 
 VERDICTS = {
@@ -151,7 +160,10 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
     left.set_xlabel("largest multiplier; stable below 1")
     if positive:
         right.set_xscale("log")
-        right.set_xlim(min(positive) / 2.0, max(positive) * 2.0)
+        low, high = min(positive) / 2.0, max(positive) * 2.0
+        right.set_xlim(low, high)
+        subs = (1.0,) if high / low > 300.0 else (1.0, 2.0, 5.0)
+        right.xaxis.set_major_locator(LogLocator(subs=subs))
         right.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
         right.xaxis.set_minor_formatter(NullFormatter())
     right.set_xlabel("shallowest contact or nearest miss [V]")
@@ -185,7 +197,7 @@ def _shares(axes: Axes, row: int, counted: Yield) -> None:
             continue
         axes.barh(row, width, left=start, height=0.66, color=VERDICTS[verdict], ec="white", lw=0.8)
         if width >= 4.0:
-            ink = "white" if verdict is Verdict.OK else INK
+            ink = ON_DARK if verdict is Verdict.OK else ON_LIGHT
             axes.text(
                 start + width / 2.0, row, str(number), ha="center", va="center_baseline",
                 color=ink, size=7.5,

@@ -24,6 +24,9 @@ from designer.yields.verdict import Answer, Verdict, Yield
 REASONS_SHOWN = 5
 """Kinds of loss that are named; the rest is counted."""
 
+PHRASE = 60
+"""Characters of a cell that may stand in lines of a few words each."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -32,6 +35,18 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numeric: tuple[int, ...] = ()
+
+    @property
+    def broad(self) -> bool:
+        """Whether it needs more than a phone's width: many columns, or long text."""
+        longest = max((len(cell) for row in self.rows for cell in row), default=0)
+        return len(self.columns) > 3 or longest > PHRASE
+
+
+def _told(columns: Sequence[str], rows: Sequence[tuple[str, ...]], numeric: Sequence[int]) -> Table:
+    """A table whose last column stands only where some row says something in it."""
+    end = None if any(row[-1] for row in rows) else -1
+    return Table(tuple(columns[:end]), tuple(row[:end] for row in rows), tuple(numeric))
 
 
 def response_table(data: ReportData) -> Table:
@@ -59,7 +74,7 @@ def response_table(data: ReportData) -> Table:
 
 def settings_table(data: ReportData) -> Table:
     system = nominal_reduction(data.design).system() if data.checked else None
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for c in data.checked:
         assert system is not None
         contact = words.NONE
@@ -86,14 +101,14 @@ def settings_table(data: ReportData) -> Table:
                 difference,
             )
         )
-    return Table(
-        (
-            "ω", "b", "frequency", "amplitude (peak)", "shortest contact", "nearest grazing",
-            "ngspice steps per period", "method", "largest difference",
-        ),
-        tuple(rows),
-        (0, 1, 2, 3, 4, 5, 6, 8),
+    names = (
+        "ω", "b", "frequency", "amplitude (peak)", "shortest contact", "nearest grazing",
+        "ngspice steps per period", "method", "largest difference",
     )  # fmt: skip
+    if not any(c.gate is not None for c in data.checked):
+        rows = [row[:-3] for row in rows]
+        return Table(names[:-3], tuple(rows), tuple(range(len(names) - 3)))
+    return Table(names, tuple(rows), (0, 1, 2, 3, 4, 5, 6, 8))
 
 
 def yield_table(data: ReportData) -> Table | None:
@@ -108,12 +123,12 @@ def yield_table(data: ReportData) -> Table | None:
         rows.append((words.name(c), *_counts(y), _reasons(data.answers_to(i))))
     if data.all_on_one_board is not None:
         rows.append(("all on one board", *_counts(data.all_on_one_board), ""))
-    return Table(
+    return _told(
         (
             "response", "ok", "lost", "grazing", "failed", "yield", "of 1000 boards (95 %)",
             "what became of the others",
         ),
-        tuple(rows),
+        rows,
         (1, 2, 3, 4, 5, 6),
     )  # fmt: skip
 
@@ -141,12 +156,12 @@ def ngspice_table(data: ReportData) -> Table | None:
             rows.append((words.name(c), start, *map(str, (len(asked), *counts)), said_))
     if not rows:
         return None
-    return Table(
+    return _told(
         (
             "response", "started on", "boards", "agreed", "differed", "undecided", "failed",
             "exact circuit but ngspice (boards); why without answer",
         ),
-        tuple(rows),
+        rows,
         (2, 3, 4, 5, 6),
     )  # fmt: skip
 
@@ -195,17 +210,19 @@ def _per_thousand(y: Yield) -> str:
 
 def _reasons(answers: Sequence[Answer]) -> str:
     """Why boards do not show a response, most frequent first; figures in a reason do not count."""
-    met = Counter(
-        f"{a.verdict} {re.sub(r' by .*', '', a.reason)}".strip()
-        for a in answers
-        if a.verdict is not Verdict.OK
-    )
+    met = Counter(_reason(a) for a in answers if a.verdict is not Verdict.OK)
     ranked = sorted(met.items(), key=lambda item: (-item[1], item[0]))
     said = [f"{text} ({n})" for text, n in ranked[:REASONS_SHOWN]]
     rest = ranked[REASONS_SHOWN:]
     if rest:
         said.append(f"{words.plural(len(rest), 'other outcome')} ({sum(n for _, n in rest)})")
     return ", ".join(said)
+
+
+def _reason(answer: Answer) -> str:
+    reason = re.sub(r" by .*", "", answer.reason)
+    join = "" if not reason else " " if reason.startswith("to ") else ": "
+    return f"{answer.verdict}{join}{reason}"
 
 
 def _left_out(data: ReportData, i: int) -> str:

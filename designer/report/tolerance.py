@@ -6,7 +6,7 @@ Whatever a study does not have leaves no trace: its table is None and its sectio
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,19 +21,23 @@ from designer.yields.verdict import Verdict, Yield, count
 
 PARTS_SHOWN = 4
 DIFFERENCES_SHOWN = 20
+NO_LOSS = "no board was lost"
 STARTED: dict[str, str] = {Kind.OWN: "its own orbit", Kind.NOMINAL: "the nominal orbit"}
 
 
 def facts(data: ReportData) -> dict[str, Any]:
     """The tables of this part by name; None for what the study does not have."""
+    kinds = _kinds(data)
     return {
-        "kinds_table": _kinds(data),
+        "kinds_table": kinds,
+        "kinds_heading": "" if kinds is None else _heading(kinds.columns[1:]),
         "difference_table": _differences(data),
         "recipe_table": _recipes(data),
         "limit_table": _limits(data),
         "avoided_table": _avoided(data),
         "corner_table": _corners(data),
         "map_table": _maps(data),
+        "blame_heading": _blame_heading(data.layers.blame),
         "blame_note": _blame_note(data.layers.blame),
     }
 
@@ -73,6 +77,12 @@ def _kinds(data: ReportData) -> Table | None:
         table.append(("all on one board", *(whole.get(name, words.NONE) for name, _ in columns)))
     names = tuple(name for name, _ in columns)
     return Table(("response", *names), tuple(table), tuple(range(1, len(columns) + 1)))
+
+
+def _heading(kinds: Sequence[str]) -> str:
+    """What a table of these kinds of yield shows."""
+    text = f"{', '.join(kinds[:-1])} and {kinds[-1]}"
+    return f"{text[0].upper()}{text[1:]}"
 
 
 @dataclass(frozen=True)
@@ -179,7 +189,7 @@ def _recipes(data: ReportData) -> Table | None:
 
 
 def _limits(data: ReportData) -> Table | None:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for i, c in enumerate(data.checked):
         b = blame_of(data, i)
         if b is None:
@@ -188,13 +198,16 @@ def _limits(data: ReportData) -> Table | None:
         decided = p.ok + p.lost
         said = words.NONE
         if decided:
-            said = f"{p.right} of {decided}" if p.lost else "no board was lost"
+            said = f"{p.right} of {decided}" if p.lost else NO_LOSS
             if p.right < decided:
                 said += f" (lost boards missed: {p.missed}, false alarms: {p.alarms})"
         rows.append((words.name(c), b.limited_by, said))
     if not rows:
         return None
-    return Table(("response", "what limits it", "verdicts foretold by the margin"), tuple(rows))
+    columns: tuple[str, ...] = ("response", "what limits it", "verdicts foretold by the margin")
+    if all(row[-1] in (NO_LOSS, words.NONE) for row in rows):
+        columns, rows = columns[:-1], [row[:-1] for row in rows]
+    return Table(columns, tuple(rows))
 
 
 def _avoided(data: ReportData) -> Table | None:
@@ -300,14 +313,25 @@ def _label_of(data: ReportData, question: int) -> str:
     )
 
 
+def _blame_heading(found: Blame | None) -> str:
+    if found is None:
+        return ""
+    lost = any(b.lost for b in found.responses)
+    return "Which part is to blame" if lost else "What comes nearest to a loss"
+
+
 def _blame_note(found: Blame | None) -> str:
     if found is None:
         return ""
-    return (
-        "Lost boards were asked again with one part or one group exact and all else as drawn; "
-        "shares do not add up, since a board can be lost by several parts together. The margin is "
-        "the distance to the loss, linear in the parts; its indices tell whose spread moves it, "
-        "and are worth as much as the verdicts that it foretells. Cost: "
+    asked = "No board was lost, so none was asked again. "
+    if any(b.lost for b in found.responses):
+        asked = (
+            "Lost boards were asked again with one part or one group exact and all else as drawn; "
+            "shares do not add up, since a board can be lost by several parts together. "
+        )
+    return asked + (
+        "The margin is the distance to the loss, linear in the parts; its indices tell whose "
+        "spread moves it, and are worth as much as the verdicts that it foretells. Cost: "
         f"{words.plural(found.attractors, 'attractor')} and "
         f"{words.plural(found.orbits, 'step')} of following orbits."
     )

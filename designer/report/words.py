@@ -14,6 +14,9 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 
 NONE = "–"
 
+SMALLEST = 1e-6
+"""Coefficient errors below this have no digits of their own."""
+
 TERM = re.compile(r"x(\d)('{1,2}) x(\d)('?)")
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -97,12 +100,16 @@ def error(value: float) -> str:
     """A coefficient error, a logarithm, in per cent."""
     if not math.isfinite(value):
         return NONE
-    return "exact (< 1e-12)" if abs(value) < EXACT else f"{100 * value:.3g} %"
+    if abs(value) < EXACT:
+        return "exact (< 1e-12)"
+    return f"{100 * value:.3g} %" if abs(value) >= SMALLEST else f"< {100 * SMALLEST:.4f} %"
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     if not math.isfinite(value):
         return NONE
+    if unit == "kg":  # it has a prefix already
+        return f"{value:.{digits}g}\u00a0kg"
     text = format_quantity(value, unit, digits).removesuffix(unit)
     figure = text.rstrip("fpnµmkMGT")
     return f"{figure}\u00a0{text[len(figure) :]}{unit}"

@@ -13,13 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from designer.base.atomic_write import write
 from designer.report.data import ReportData
 from designer.report.facts import facts
 from designer.report.pictures import pictures
 from designer.report.tables import Table
+
+_NPQ = r"(?:\d+-\d+-\d+|n-p-q|n-q-p)"
+_WHOLE = re.compile(rf"ω = [\d.]+(?: \({_NPQ}\))?|(?<![\w-]){_NPQ}(?![\w-])")
 
 
 def write_report(data: ReportData, html: Path, markdown: Path) -> None:
@@ -53,6 +56,7 @@ def _html(data: ReportData, said: Mapping[str, Any]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    pages.filters["text"] = _unbroken
     page = pages.get_template("report.html.j2")
     return page.render(**said, **pictures(data))
 
@@ -69,7 +73,14 @@ def _markdown(said: Mapping[str, Any]) -> str:
     )
     pages.filters["table"] = _text_table
     pages.filters["verbatim"] = lambda text: Markup("    " + " ".join(str(text).split()))
+    pages.filters["preformatted"] = lambda line: Markup("    " + line)
     return pages.get_template("report.md.j2").render(**said)
+
+
+def _unbroken(value: object) -> Markup:
+    """Any text in HTML: no line ends inside an n-p-q, or between a frequency and its n-p-q."""
+    text = str(escape(str(value)))
+    return Markup(_WHOLE.sub(lambda m: f'<span class="whole">{m[0]}</span>', text))
 
 
 def _plain(value: object) -> object:

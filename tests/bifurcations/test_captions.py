@@ -22,6 +22,7 @@ from designer.dynamics.steady_state import Course
 from designer.model.swept_model import ModelSubject
 from designer.report import bifurcation_plots
 from tests.dynamics.test_modal_tables import PAPER
+from tests.shared.figure_text import clipped, overlapping
 
 QUICK = Course(40, 16, 400)
 
@@ -104,14 +105,18 @@ def test_pictures_can_be_read_alone(both: Sweep) -> None:
     assert ("aperiodic" in said) == any(w.response == "aperiodic" for w in both.windows)
     subject, values = ModelSubject(PAPER, 1.43), np.linspace(0.2, 0.3, 2)
     plan: Any = MapPlan(subject, "b", values, "k0", np.array([0.9, 0.95]), course=QUICK)
-    said = _texts(bifurcation_plots.parameter_map(parameter_map.run(plan), "Small"))
+    figure = bifurcation_plots.parameter_map(parameter_map.run(plan), "Small")
+    assert (clipped(figure), overlapping(figure)) == ([], [])
+    said = _texts(figure)
     assert "Small responses n-p-q of the model over b and k₀, from rest" in said
     assert "held: ω = 1.43, m = 0.5" in said
     assert "b = " not in said
     plan = BasinPlan(
         subject, {"omega": 1.43}, "x1", values, "x1'", values, np.zeros(4), course=QUICK
     )
-    said = _texts(bifurcation_plots.basins(basins.run(plan), "Small"))
+    figure = bifurcation_plots.basins(basins.run(plan), f"Small{' AND RATHER LONG' * 5}")
+    assert (clipped(figure), overlapping(figure)) == ([], [])  # heading and legend
+    said = _texts(figure)
     assert "by the initial x₁ and x₁′" in said
     assert "ω = 1.43" in said
     assert "b = 0.25" in said

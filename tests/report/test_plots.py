@@ -26,6 +26,7 @@ from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.yields.verdict import Answer, Verdict, Yield
+from tests.shared.figure_text import clipped, overlapping
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SETTINGS = SolverSettings("trap", 1e-5)
@@ -104,6 +105,13 @@ def test_every_figure_renders_and_is_the_same_twice(name: str, tmp_path: Path) -
     assert content.startswith(PNG)
     assert len(content) > 1500
     assert content == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize("name", sorted(_figures()))
+def test_no_text_is_cut_off_or_covered(name: str) -> None:
+    figure = _figures()[name]()
+    assert clipped(figure) == []
+    assert overlapping(figure) == []
 
 
 def test_no_state_is_left_behind_and_none_is_taken_over() -> None:
@@ -228,6 +236,14 @@ def test_margins_keep_verdicts_apart() -> None:
     assert points[study_plots.VERDICTS[Verdict.LOST]].tolist() == [0.5]
     nearest = [np.asarray(m.get_xdata()) for m in right.lines]
     assert any(0.01 in x for x in nearest)
+
+
+def test_a_narrow_range_of_margins_has_more_than_one_number() -> None:
+    near = [_answer(k, Verdict.OK, 0.5, 0.45 + 0.1 * k) for k in range(3)]
+    figure = study_plots.margin_chart(["a"], [near])
+    figure.canvas.draw()
+    low, high = figure.axes[1].get_xlim()
+    assert sum(low <= tick <= high for tick in figure.axes[1].get_xticks()) >= 2
 
 
 def test_a_label_is_text_and_never_a_formula() -> None:

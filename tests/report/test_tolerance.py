@@ -147,7 +147,7 @@ def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
     assert {k: v for k, v in facts(plain).items() if v} == {}
     page = Page(render_html(plain))
     text = page.text + render_markdown(plain)
-    for heading in ("Which part is to blame", "Where to sit", "As built, tuned", "How to reach"):
+    for heading in ("Which part is to blame", "Where to sit", "and both engines", "How to reach"):
         assert heading not in text
     assert "#blame" not in {a.get("href") for a in page.named("a")}
 
@@ -166,6 +166,24 @@ def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
     assert second[4:] == ("–", "–")
     assert whole[0] == "all on one board"
     assert whole[2].startswith("75 %")
+
+
+def test_the_heading_names_the_kinds_that_there_are(full: ReportData) -> None:
+    layers = Layers(combined=(Together(), None))
+    assert facts(replace(full, layers=layers))["kinds_heading"] == (
+        "As built and both engines together"
+    )
+
+
+def test_without_a_loss_nobody_is_to_blame(full: ReportData) -> None:
+    one, other = (replace(blamed(q, 0), prediction=Prediction(100, 0, 0, 0)) for q in (0, 1))
+    none = Blame((one, other), 100, 1, 500, 300, 1.0)
+    text = render_markdown(replace(full, layers=replace(full.layers, blame=none)))
+    assert "foretold by the margin" not in text
+    assert "## What comes nearest to a loss" in text
+    assert "No board was lost, so none was asked again." in text
+    assert "Lost boards were asked" not in text
+    assert "to blame" not in text
 
 
 def test_a_difference_says_where_ngspice_started(full: ReportData) -> None:
@@ -195,6 +213,12 @@ def test_the_provenance_has_the_spread_in_words(plain: ReportData) -> None:
     rows = {row[0]: row[1] for row in provenance_table(data).rows}
     assert set(rows) == {"seed", "spread"}
     assert rows["spread"].startswith("bench-1: resistors uniform within ± 1 %")
+
+
+def test_a_very_small_error_has_no_exponent() -> None:
+    assert words.error(5.06e-9) == words.error(-5.06e-9) == "< 0.0001 %"
+    assert words.error(1.26e-4) == "0.0126 %"
+    assert words.error(1e-13) == "exact (< 1e-12)"
 
 
 def test_an_interval_near_the_end_keeps_its_ends_apart() -> None:
@@ -237,7 +261,8 @@ def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: Re
     page = Page(html)
     assert html == render_html(full)
     for heading in (
-        "As built, tuned, trimmed, reached", "Where the engines differ", "How to reach a response",
+        "As built, tuned, tuned on the bench, reached and both engines together",
+        "Where the engines differ", "How to reach a response",
         "Which part is to blame", "Losses avoided", "Worst corners", "Where to sit",
     ):  # fmt: skip
         assert len(re.findall(rf"<h[23]>{heading}</h[23]>", html)) == 1
@@ -246,7 +271,7 @@ def test_both_pages_hold_every_section_once_and_nothing_of_it_is_markup(full: Re
     assert "<b>x</b>" not in html
     assert HOSTILE in page.text
     assert "<b>" not in markdown.replace("\\<", "")
-    alts = [str(a["alt"]) for a in page.named("img")]
+    alts = page.pictures()
     assert sum("losses" in a for a in alts) == 1
     assert sum("Sobol" in a for a in alts) == 1
     assert sum(a.startswith("Yield over omega") for a in alts) == 1

@@ -22,6 +22,7 @@ from designer.yields.blame_analysis import ResponseBlame, Subject
 from designer.yields.margins import Prediction
 from designer.yields.sobol import Index
 from designer.yields.yield_maps import Axis, YieldMap
+from tests.shared.figure_text import clipped, overlapping
 
 LABELS = ["ω = 0.54   1-3-3", "ω = 0.41   1-4-4"]
 
@@ -71,6 +72,24 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "heat": lambda: map_chart("1-3-3", mapped(two=True)),
     "sheet": lambda: yield_sheet(rows()),
 }
+
+
+@pytest.mark.parametrize("name", sorted(FIGURES))
+def test_no_text_is_cut_off_or_covered(name: str) -> None:
+    figure = FIGURES[name]()
+    assert clipped(figure) == []
+    assert overlapping(figure) == []
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 9])
+def test_charts_of_blame_have_room_for_their_text(count: int) -> None:
+    labels = [f"ω = 0.{k}15   1-{k}-{k}" for k in range(1, count + 1)]
+    one = blamed({"thresholds of the dead zone": 8, "R204A": 3})
+    wide = tuple(replace(i, coordinate=f"U3D.offset_drift_{i.part}") for i in one.indices)
+    blames = [replace(one, indices=wide)] * count
+    for figure in (index_chart(labels, blames), avoided_chart(labels, blames)):
+        assert clipped(figure) == []
+        assert overlapping(figure) == []
 
 
 @pytest.mark.parametrize("name", sorted(FIGURES))

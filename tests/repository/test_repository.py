@@ -8,6 +8,7 @@ import tomllib
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -15,6 +16,9 @@ import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from PIL import Image
+
+from designer.model.equations import dimensionless_equations
+from tests.dynamics.test_modal_tables import PAPER
 
 ROOT = Path(__file__).resolve().parents[2]
 CONSTRAINTS = ROOT / "requirements" / "constraints.txt"
@@ -142,12 +146,26 @@ def test_the_readme_s_picture_and_table_are_of_the_same_boards() -> None:
     assert drawn == told
 
 
-def test_scripts_in_python_import_what_there_is() -> None:
-    """No target runs the one that draws the picture; here at least its names are looked up."""
-    path = ROOT / "scripts" / "make-picture"
-    loader = SourceFileLoader("make_picture", str(path))
-    spec = spec_from_loader("make_picture", loader)
+def _script(name: str) -> ModuleType:
+    path = ROOT / "scripts" / name
+    loader = SourceFileLoader(name.replace("-", "_"), str(path))
+    spec = spec_from_loader(loader.name, loader)
     assert spec is not None
     module = module_from_spec(spec)
     loader.exec_module(module)
-    assert callable(module.main)
+    return module
+
+
+def test_scripts_in_python_import_what_there_is() -> None:
+    """No target runs the one that draws the picture; here at least its names are looked up."""
+    assert callable(_script("make-picture").main)
+
+
+def test_the_picture_of_the_model_is_what_the_script_draws() -> None:
+    script = _script("make-model-picture")
+    assert script.PICTURE.read_text(encoding="utf-8") == script.picture()
+    for page in ("README.md", "docs/model-file.md"):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        assert "images/model.svg)" in text
+        for line in dimensionless_equations(PAPER):
+            assert f"    {line}\n" in text, page

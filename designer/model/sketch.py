@@ -1,0 +1,47 @@
+"""The mechanical model drawn with plain characters, for comments and for Markdown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from designer.model.model import Dimensionless
+
+_SPRING, _DAMPER, _NONE = "---/\\/\\/\\---", "----[=------", " " * 12
+_PLATE_LEFT, _PLATE_RIGHT = "|-/\\/\\/\\-|", "|-/\\/\\/\\-|"
+_MASS_1 = 33
+"""Column of the left side of M1."""
+
+
+def sketch(model: Dimensionless | None = None) -> str:
+    """Lines of ASCII: two masses in a row from ground, the stops of M1, the forces.
+
+    model : what it does not have is left out: a damper, a force, a stop. None : every part.
+    """
+    lower = model is None or (model.k0 > 0.0 and model.sides in ("both", "lower"))
+    upper = model is None or (model.k0 > 0.0 and model.sides in ("both", "upper"))
+    damper = _DAMPER if model is None or model.c > 0.0 else _NONE
+    first = " --> P1 sin(Omega T)" if model is None or model.f20 < 1.0 else ""
+    second = "'--> P2 sin(Omega T)" if model is None or model.f20 > 0.0 else ""
+    rod = _MASS_1 + 3
+    lines = []
+    if lower or upper:
+        names = f"{'K0' if lower else '':>{rod - 8}}{'B' if lower else '':>6}   "
+        lines.append(names + (" B     K0" if upper else ""))
+        left = _PLATE_LEFT if lower else ""
+        lines.append(f"{left:>{rod - 4}}    |" + (f"    {_PLATE_RIGHT}" if upper else ""))
+        lines.append(" " * rod + "|")
+    rows = (
+        ("|", _NONE, "+------+", _NONE, "+------+", ""),
+        ("|", _SPRING, "|      |", _SPRING, "|      |", ""),
+        ("|", "     K2     ", "|  M2  |", "     K1     ", "|  M1  |", first),
+        ("|", damper, "|      |", _DAMPER, "|      |", ""),
+        ("|", "     C2     " if damper is _DAMPER else _NONE, "+------+", "     C1     ",
+         "+------+", ""),
+    )  # fmt: skip
+    lines += ["".join(row) for row in rows]
+    mark = "|" if second else "'"
+    lines.append(" " * 16 + f"{mark}--> x2" + " " * 13 + "'--> x1")
+    if second:
+        lines.append(" " * 16 + second)
+    return "\n".join(line.rstrip() for line in lines)

@@ -1,0 +1,79 @@
+"""SVG documents as parts of a page: no identifiers that clash, colours that follow the page.
+
+A figure of ``base.figure_style`` and a drawing of ``board.schematic_drawing`` state their colours
+outright, since they also stand alone. Inside a page each of these colours is a CSS variable, whose
+values for a light page, a dark page and paper stand in ``templates/report.css.j2``.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import count
+
+from markupsafe import Markup
+
+VARIABLES = {
+    "#000000": "ink",
+    "#1a1a1a": "ink",
+    "#5c5c5c": "soft",
+    "#8a8a8a": "axis",
+    "#e3e3e3": "grid",
+    "#f1ece0": "contact",
+    "#ffffff": "page",
+    "#7cc4ee": "model",
+    "#d55e00": "ngspice",
+    "#007a5a": "impact",
+    "#0072b2": "ok",
+    "#e69f00": "lost",
+    "#cc79a7": "grazing",
+    "#9a9a9a": "failed",
+    "#9fcbe6": "pale",
+    "#c6dff0": "band",
+    "#d9d9d9": "none",
+}
+"""Name of the CSS variable, without its prefix ``--plot-``, by the colour that it replaces."""
+
+_NAMES = {"black": "#000000", "white": "#ffffff"}
+_COLOUR = re.compile(r"\b(fill|stroke|background-color)(:\s*|=\")(#[0-9a-f]{6}|black|white)\b")
+_DROPPED = re.compile(
+    r"<!--.*?-->|<style\b.*?</style>|\s(?:xmlns|xmlns:xlink|xml:lang|version)=\"[^\"]*\"",
+    re.DOTALL,
+)
+_ID = re.compile(r'\sid="([^"]*)"')
+_REFERENCE = re.compile(r'((?:xlink:)?href="#|url\(#)([^")]+)')
+_ROOT = re.compile(r"<svg\b([^>]*)>")
+_SIZE = re.compile(r'\s(?:width|height|style)="[^"]*"')
+
+
+class InlineSvg:
+    """Documents of one page; each gets identifiers of its own, in the order of the calls."""
+
+    def __init__(self) -> None:
+        self._numbers = count(1)
+
+    def element(self, svg: str, label: str) -> Markup:
+        """The ``<svg>`` element of a page for the document ``svg``.
+
+        svg : trusted markup, as ``figure_style.to_svg`` and ``schematic_drawing.svg`` write it,
+        with text escaped. label : what the picture shows, in words, for those who cannot see it;
+        escaped here.
+        """
+        prefix = f"s{next(self._numbers)}-"
+        text = _DROPPED.sub("", svg)
+        used = {match[2] for match in _REFERENCE.finditer(text)}
+        text = _ID.sub(lambda m: f' id="{prefix}{m[1]}"' if m[1] in used else "", text)
+        text = _REFERENCE.sub(lambda m: f"{m[1].removeprefix('xlink:')}{prefix}{m[2]}", text)
+        text = text.replace("xlink:href=", "href=")
+        text = _COLOUR.sub(_variable, text)
+        root = Markup('<svg role="img" aria-label="{}"').format(label)
+        return Markup(_ROOT.sub(lambda m: f"{root}{_SIZE.sub('', m[1])}>", text, count=1).strip())
+
+
+def _variable(match: re.Match[str]) -> str:
+    """The declaration of a colour by its variable; as an attribute it becomes a style."""
+    name, sign, colour = match.groups()
+    variable = VARIABLES.get(_NAMES.get(colour, colour))
+    if variable is None:
+        return match[0]
+    value = f"var(--plot-{variable})"
+    return f'style="{name}: {value}' if sign.startswith("=") else f"{name}: {value}"
