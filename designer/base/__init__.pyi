@@ -68,6 +68,9 @@ from .environment import (
     set_environment as set_environment,
 )
 from .errors import (
+    MISSING as MISSING,
+)
+from .errors import (
     DesignerError as DesignerError,
 )
 from .errors import (
@@ -77,7 +80,13 @@ from .errors import (
     InputError as InputError,
 )
 from .errors import (
+    InputErrors as InputErrors,
+)
+from .errors import (
     Unreachable as Unreachable,
+)
+from .errors import (
+    problems_in as problems_in,
 )
 from .eseries import (
     SERIES as SERIES,
@@ -203,6 +212,12 @@ from .schema import (
     Accepts as Accepts,
 )
 from .schema import (
+    FieldProblems as FieldProblems,
+)
+from .schema import (
+    Problem as Problem,
+)
+from .schema import (
     checked as checked,
 )
 from .schema import (
@@ -243,6 +258,9 @@ from .schema import (
 )
 from .schema import (
     span as span,
+)
+from .schema import (
+    validated as validated,
 )
 from .sexpr import (
     Atom as Atom,

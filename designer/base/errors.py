@@ -7,7 +7,24 @@ environment. Anything else that escapes is a defect of the tool.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from enum import Enum
 from pathlib import Path
+from typing import Final
+
+
+class Absent(Enum):
+    """What was found where nothing stands; an enumeration, so that workers pass it on as it is."""
+
+    MISSING = "missing"
+
+
+MISSING: Final = Absent.MISSING
+"""``found`` of an ``InputError`` about a field, an option or a file that is not there."""
+
+
+MOST_PROBLEMS = 30
+"""Problems of one input that a message has a line for; the rest is counted."""
 
 
 class DesignerError(Exception):
@@ -23,7 +40,7 @@ class InputError(DesignerError):
     ----------
     file : path or short name of where the input came from (``None`` for a function argument).
     field : dotted name of the offending field, such as ``model.k0`` or ``response[2].omega``.
-    found : what stands there now.
+    found : what stands there now; ``MISSING`` where nothing does.
     expected : what would have been accepted, in words.
     """
 
@@ -36,7 +53,31 @@ class InputError(DesignerError):
         self.expected = expected
         where = f"{self.file}: " if self.file else ""
         shown = found if isinstance(found, str) else repr(found)
-        super().__init__(f"{where}{field}: found {_clip(shown)}, expected {expected}")
+        stands = " is missing" if found is MISSING else f": found {_clip(shown)}"
+        super().__init__(f"{where}{field}{stands}, expected {expected}")
+
+
+class InputErrors(InputError):
+    """Several things wrong with one input: an ``InputError`` about the first whose message has a
+    line for each.
+
+    Parameters
+    ----------
+    problems : at least one; those of an ``InputErrors`` among them count one by one.
+    """
+
+    def __init__(self, problems: Sequence[InputError]) -> None:
+        first = problems[0]
+        super().__init__(first.file, first.field, first.found, first.expected)
+        self.problems = tuple(each for problem in problems for each in problems_in(problem))
+        shown = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
+        more = len(self.problems) - MOST_PROBLEMS
+        self.args = ("\n".join([*shown, *([f"and {more} more"] if more > 0 else [])]),)
+
+
+def problems_in(error: InputError) -> tuple[InputError, ...]:
+    """Each thing that an error says is wrong."""
+    return error.problems if isinstance(error, InputErrors) else (error,)
 
 
 class Unreachable(InputError):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.hashing import sha256
 
 FORMAT = 1
@@ -125,13 +125,15 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         value = json.loads(path.read_bytes())
     except OSError as error:
-        raise InputError(path, "the file", error.strerror or str(error), "JSON") from None
+        gone = isinstance(error, FileNotFoundError)
+        reason = MISSING if gone else error.strerror or str(error)
+        raise InputError(path, "the file", reason, "JSON") from None
     except ValueError as error:
         raise InputError(path, "the file", str(error), "JSON") from None
     if not isinstance(value, dict):
         raise InputError(path, "the file", type(value).__name__, "a JSON object")
     if value.get("format") != FORMAT:
-        raise InputError(path, "format", value.get("format"), f"{FORMAT}")
+        raise InputError(path, "format", value.get("format", MISSING), f"{FORMAT}")
     return value
 
 

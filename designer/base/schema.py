@@ -5,8 +5,9 @@ A field of a table states in one place what it accepts and how that reads in a m
     supply: Annotated[float, number("V", "a number > 0", lambda x: x > 0)] = 15.0
 
 pydantic walks the tables (missing keys, unknown keys, nesting); ``checked`` turns the first thing
-it dislikes into an ``InputError``. Nothing is converted silently: a text is no number where the
-field has no unit, 1 is not true, and a key that nobody reads is an error.
+it dislikes into an ``InputError``, ``validated`` each of them. Nothing is converted silently: a
+text is no number where the field has no unit, 1 is not true, and a key that nobody reads is an
+error.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.units import parse_quantity
 
 STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -32,11 +33,28 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 @dataclass(frozen=True)
+class Problem:
+    """What is wrong with one key of a field that is a table; "" for the field itself."""
+
+    key: str
+    found: object
+    expected: str
+
+
+class FieldProblems(ValueError):
+    """Everything that is wrong with one field that is a table."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        super().__init__("; ".join(problem.expected for problem in problems))
+        self.problems = tuple(problems)
+
+
+@dataclass(frozen=True)
 class Accepts:
     """What a field accepts: in words, and as a function that returns the value or raises.
 
     ``check`` raises ValueError for what it does not accept; a message there says more than
-    ``expected`` does and is added to it.
+    ``expected`` does and is added to it. FieldProblems stand for themselves.
     """
 
     expected: str
@@ -50,6 +68,8 @@ class Accepts:
     def _checked(self, value: object) -> object:
         try:
             return self.check(value)
+        except FieldProblems:
+            raise
         except ValueError as error:
             detail = f" ({error})" if str(error) else ""
             raise ValueError(self.expected + detail) from None
@@ -218,28 +238,59 @@ def parse_toml(text: str, file: str | None) -> dict[str, Any]:
 def checked(
     model: type[ModelT], data: Mapping[str, object], file: str | None, *, within: str = ""
 ) -> ModelT:
-    """``data`` as ``model``, or an ``InputError`` for the first thing that does not fit.
+    """``data`` as ``model``, or an ``InputError`` for the first thing that does not fit, by the
+    order of ``validated``."""
+    table, problems = validated(model, data, file, within=within)
+    if table is None:
+        raise problems[0]
+    return table
 
-    Unknown keys come first: a misspelt key is also a missing one, and its spelling is the cause.
-    ``within`` is put in front of the field's name.
+
+def validated(
+    model: type[ModelT], data: Mapping[str, object], file: str | None, *, within: str = ""
+) -> tuple[ModelT | None, list[InputError]]:
+    """``data`` as ``model``; or None, and an ``InputError`` for each thing that does not fit.
+
+    Unknown keys come first: a misspelt key is also a missing one, and its spelling is the cause. A
+    key that is missing because it is misspelt is not said again. ``within`` is put in front of the
+    field's name.
     """
     try:
-        return model.model_validate(data)
+        return model.model_validate(data), []
     except ValidationError as error:
         problems = error.errors(include_url=False)
-    problem = min(problems, key=lambda p: p["type"] != "extra_forbidden")
-    place = problem["loc"]
-    field = _dotted((within, *place) if within else place)
-    if problem["type"] == "extra_forbidden":
-        owner = _model_at(model, place[:-1])
-        expected = one_of(str(place[-1]), sorted(owner.model_fields) if owner else ())
-        raise InputError(file, field, f"unknown key {place[-1]!r}", expected) from None
-    expected = _expected(model, place)
-    if problem["type"] == "missing":
-        raise InputError(file, field, "nothing", expected) from None
-    if problem["type"] == "value_error":
-        expected = str(problem["ctx"]["error"])
-    raise InputError(file, field, shown(problem["input"]), expected) from None
+    out: list[InputError] = []
+    misspelt: set[tuple[int | str, ...]] = set()
+    for problem in sorted(problems, key=lambda p: p["type"] != "extra_forbidden"):
+        place = problem["loc"]
+        field = _dotted((within, *place) if within else place)
+        if problem["type"] == "extra_forbidden":
+            owner = _model_at(model, place[:-1])
+            known = sorted(owner.model_fields) if owner else []
+            expected = one_of(str(place[-1]), known)
+            misspelt |= {(*place[:-1], name) for name in known if f'mean "{name}"?' in expected}
+            out.append(InputError(file, field, f"unknown key {place[-1]!r}", expected))
+        elif problem["type"] == "missing":
+            if place not in misspelt:
+                out.append(InputError(file, field, MISSING, _expected(model, place)))
+        else:
+            out += _wrong(file, field, dict(problem), _expected(model, place))
+    return None, out
+
+
+def _wrong(
+    file: str | None, field: str, problem: Mapping[str, Any], expected: str
+) -> list[InputError]:
+    """The value of a field that is not what it accepts."""
+    said = problem["ctx"]["error"] if problem["type"] == "value_error" else None
+    if isinstance(said, FieldProblems):
+        return [
+            InputError(file, f"{field}.{p.key}" if p.key else field, p.found, p.expected)
+            for p in said.problems
+        ]
+    return [
+        InputError(file, field, shown(problem["input"]), expected if said is None else str(said))
+    ]
 
 
 def shown(value: object) -> str:

@@ -36,6 +36,7 @@ def parse_quantity(value: str | float, unit: str) -> float:
     value : a number is taken as it is; a text may carry a prefix, the unit, or both.
     unit : what the quantity is measured in, such as "Ω", "F", "N/m"; "" for a bare number.
         A text that ends in the unit is read with it first: for metres "5m" is 5 m, "5mm" 5e-3 m.
+        What a unit is per may carry a prefix too: for V/s "9 V/µs" is 9e6 V/s.
 
     Raises
     ------
@@ -113,14 +114,14 @@ def _split(text: str, unit: str) -> tuple[Decimal, int]:
     if unit == "kg":
         return _split_mass(text)
     normal = text.translate(_MICRO)
-    bare = _without_unit(normal, unit)
+    bare, per = _without_denominator(_without_unit(normal, unit), unit)
     infix = _INFIX.fullmatch(bare)
     if infix and (infix[2] != "R" or unit == _OHM):
         shift = 0 if infix[2] == "R" else _PREFIXES[infix[2]]
-        return Decimal(f"{infix[1]}.{infix[3]}"), shift
+        return Decimal(f"{infix[1]}.{infix[3]}"), shift - per
     prefixed = _PREFIXED.fullmatch(bare)
     if prefixed:
-        return Decimal(prefixed[1]), _PREFIXES[prefixed[2]]
+        return Decimal(prefixed[1]), _PREFIXES[prefixed[2]] - per
     if re.match(_NUMBER, bare, re.ASCII):
         wanted = f"in {unit}, with or without an SI prefix" if unit else "without a unit"
         raise ValueError(f"not a number {wanted}")
@@ -144,6 +145,16 @@ def _without_unit(text: str, unit: str) -> str:
         if spelling and text.endswith(spelling):
             return text.removesuffix(spelling).rstrip()
     return text
+
+
+def _without_denominator(text: str, unit: str) -> tuple[str, int]:
+    """A text without a unit such as V/us for V/s, and the power of ten of what it is per."""
+    above, slash, below = unit.partition("/")
+    if not slash or not below[0].isalpha():  # V/√Hz has no prefix below
+        return text, 0
+    above = "[ ·]?".join(map(re.escape, above.split(" ")))
+    found = re.fullmatch(rf"(.*?)\s*{above}\s*/\s*([fpnumkMGT]){re.escape(below)}", text)
+    return (found[1], _PREFIXES[found[2]]) if found else (text, 0)
 
 
 def _plain(number: Decimal) -> str:

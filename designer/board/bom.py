@@ -85,6 +85,7 @@ def _line(here: Sequence[Component]) -> Line:
     said = [] if first.kind in ("resistor", "capacitor") else [c.description for c in here]
     if first.kind != "op-amp":
         said += [c.role for c in here]
+    said += [c.bought.note for c in here if c.bought is not None and c.bought.note]
     return Line(
         quantity=len(here),
         designators=tuple(sorted((c.reference for c in here), key=natural)),

@@ -14,7 +14,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from designer.base.csv_tables import csv_text
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.schema import (
     STRICT,
     Accepts,
@@ -27,7 +27,7 @@ from designer.base.schema import (
     parse_toml,
 )
 from designer.board.bom import COLUMNS, Line
-from designer.catalog.catalog import LAYOUTS
+from designer.catalog.folders import LAYOUTS
 
 FIELDS = (*COLUMNS, "package", "comment")
 """What a column may show: a field of the bill; the footprint's name; value, grade and number."""
@@ -121,7 +121,7 @@ def _read(name: str, path: Path) -> Layout:
     titles = [column.title for column in table.columns]
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None or not titles:
-        raise InputError(path, "columns", twice or "nothing", "columns, each title once")
+        raise InputError(path, "columns", twice or MISSING, "columns, each title once")
     columns = tuple(Column(c.title, c.field, c.text or "") for c in table.columns)
     return Layout(name, table.separator, columns)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -28,7 +29,8 @@ from designer.model.board_table import BoardChoice
 @dataclass(frozen=True)
 class Bought:
     """What is ordered: grade is a fraction or None; substitute : another maker's part number, with
-    the maker in front, or ""; dielectric : what it is made of, or ""."""
+    the maker in front, or ""; dielectric : what it is made of, or ""; note : what a buyer has to
+    know beside, or ""."""
 
     manufacturer: str
     part_number: str
@@ -37,6 +39,7 @@ class Bought:
     grade: float | None = None
     substitute: str = ""
     dielectric: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -225,6 +228,7 @@ class _Lister:
             grade=found.family.grade,
             substitute="" if other is None else f"{other.manufacturer} {other.part_number}",
             dielectric=found.family.dielectric,
+            note=_better(found.family.grade, grade) if use == "signal" else "",
         )
         value = format_quantity(found.value, unit)
         made = f"{found.family.dielectric} {kind}, {100 * found.family.grade:g} %"
@@ -326,6 +330,13 @@ class _Lister:
             near=near,
             parts=(part.name,),
         )
+
+
+def _better(grade: float, asked: float) -> str:
+    """What is said of a part that is bought at another grade than was asked for."""
+    if math.isclose(grade, asked, rel_tol=1e-9):
+        return ""
+    return f"asked for at {100 * asked:g} %, at which nobody sells this value"
 
 
 def _spare(count: int) -> str:

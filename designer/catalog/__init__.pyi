@@ -2,9 +2,6 @@ from . import (
     diode_curve as diode_curve,
 )
 from .catalog import (
-    LAYOUTS as LAYOUTS,
-)
-from .catalog import (
     Catalog as Catalog,
 )
 from .catalog import (
@@ -65,6 +62,9 @@ from .diode_curve import (
     diode_model as diode_model,
 )
 from .entries import (
+    FORBIDDEN as FORBIDDEN,
+)
+from .entries import (
     PRICE_CLASSES as PRICE_CLASSES,
 )
 from .entries import (
@@ -96,6 +96,9 @@ from .entries import (
 )
 from .entries import (
     Use as Use,
+)
+from .folders import (
+    LAYOUTS as LAYOUTS,
 )
 from .vendor_model import (
     VendorModel as VendorModel,

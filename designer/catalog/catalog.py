@@ -10,18 +10,14 @@ and an entry of the same kind and name in an earlier folder replaces the later o
 
 from __future__ import annotations
 
-import hashlib
-import importlib.resources
 import math
-import os
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
 from designer.base.errors import InputError, Unreachable
@@ -29,6 +25,7 @@ from designer.base.eseries import SERIES, series_values
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
 from designer.catalog.entries import (
+    FORBIDDEN,
     UNITS,
     Diode,
     Header,
@@ -43,13 +40,9 @@ from designer.catalog.entries import (
     Use,
     mounting_of,
 )
-from designer.catalog.read import Entry, read_catalog_file
+from designer.catalog.folders import read_folders
+from designer.catalog.shortage import Offer, no_part, no_values, other_case
 
-ENVIRONMENT = "DESIGNER_CATALOGS"
-"""Environment variable: folders to search first, separated as in PATH."""
-
-LAYOUTS = "bom-layouts"
-"""Folder of layouts beside the catalogue's files (``board.bom_layouts``)."""
 _SAME = 1e-9  # relative; values and grades closer than this are the same
 _NamedT = TypeVar("_NamedT", OpAmp, Diode, Reference, PartFamily)
 _CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
@@ -60,7 +53,8 @@ class Catalog:
     """Everything that the folders hold; earlier entries come from earlier folders.
 
     ``hash`` is of the content of all files, wherever they lie, layouts of bills among them.
-    mounting : the cases that a board takes; what is sold in no such case is no choice.
+    mounting : the cases that a board takes; what is sold in no such case is no choice. refused :
+    names of the families that a model file does not let parts be bought from.
     """
 
     families: tuple[PartFamily, ...]
@@ -73,10 +67,32 @@ class Catalog:
     headers: tuple[Header, ...] = ()
     prices: tuple[Price, ...] = ()
     mounting: Mounting = "mixed"
+    refused: frozenset[str] = frozenset()
 
     def mounted(self, mounting: Mounting) -> Catalog:
         """The same catalogue for a board that takes these cases."""
         return replace(self, mounting=mounting)
+
+    def bought_from(self, asked: Mapping[Kind, Sequence[str]]) -> Catalog:
+        """The same catalogue with the choice of families that a model file states.
+
+        asked : by kind, the families that are bought from, or, each with ``FORBIDDEN`` in front,
+        those that are not; none: every one.
+
+        Raises
+        ------
+        InputError : no family of signal parts has that name; lists those that there are.
+        """
+        refused: set[str] = set()
+        for kind, names in asked.items():
+            known = [f.name for f in self.families if f.kind == kind and f.use == "signal"]
+            bare = [name.removeprefix(FORBIDDEN) for name in names]
+            for name in bare:
+                if name not in known:
+                    raise InputError(None, f"circuit.{kind}_family", name, one_of(name, known))
+            forbids = any(name.startswith(FORBIDDEN) for name in names)
+            refused |= {n for n in known if names and (n in bare) is forbids}
+        return replace(self, refused=frozenset(refused))
 
     def euro(self, price_class: int) -> float:
         """What a part of this class counts with, in euro apiece.
@@ -108,34 +124,43 @@ class Catalog:
         sold = {value for family in fitting for value in family.values}
         result = np.array([value for value in wanted if value in sold], dtype=np.float64)
         if len(result) == 0:
-            self._explain(kind, series, (lo, hi), grade, sold)
+            raise no_values(self._offer(kind, grade), series, (lo, hi), self._offer(kind, 1.0))
         return result
 
-    def part(self, kind: Kind, value: float, grade: float, use: Use = "signal") -> PartChoice:
-        """The cheapest part of this value at ``grade`` or better.
+    def sold(
+        self, kind: Kind, value: float, grade: float, use: Use = "signal"
+    ) -> PartChoice | None:
+        """What is bought of this value where ``grade`` is asked for; None where nothing can be.
 
-        Among equally cheap ones the better grade, then the one that is listed first.
+        Everything that buys or draws a part asks here: the bill of materials buys this part, and
+        a study draws it at the grade of its family. It is the cheapest of that very grade. Where
+        nobody sells the value in it, it is the cheapest of a better one, and of equally cheap ones
+        the best. Then it is the one that is listed first.
+        """
+        found = self._holding(self._families(kind, grade, use), value)
+        return _choice(*min(found, key=lambda each: _preference(each[0], grade))) if found else None
+
+    def cheapest(self, kind: Kind, value: float, grade: float) -> PartChoice | None:
+        """The cheapest signal part of this value at ``grade`` or better, whatever its grade; of
+        equally cheap ones the best. None where nobody sells it."""
+        found = self._holding(self._families(kind, grade), value)
+        return (
+            _choice(*min(found, key=lambda each: (each[0].price, each[0].grade))) if found else None
+        )
+
+    def part(self, kind: Kind, value: float, grade: float, use: Use = "signal") -> PartChoice:
+        """As ``sold``, where something has to be bought.
 
         Raises
         ------
-        Unreachable : no family holds the value at that grade.
+        Unreachable : no family holds the value at that grade or a better one.
         """
-        fitting = self._families(kind, grade, use)
-        found = self._holding(fitting, value)
-        if not found:
-            unit = UNITS[kind]
-            sold = sorted({each for family in fitting for each in family.values})
-            near = sorted(sold, key=lambda each: abs(math.log(each / value)))[:2]
-            expected = " or ".join(format_quantity(each, unit) for each in sorted(near))
-            raise Unreachable(
-                None,
-                kind,
-                f"{format_quantity(value, unit)} at {grade:.4g}",
-                f"a value that can be bought at this grade, such as {expected}"
-                if near
-                else f"a grade that can be bought: {self._best_grade(kind)}",
-            )
-        return _choice(*min(found, key=lambda each: (each[0].price, each[0].grade)))
+        found = self.sold(kind, value, grade, use)
+        if found is None:
+            offer = self._offer(kind, grade, use)
+            holding = [family for family, _ in self._holding(offer.families, value)]
+            raise no_part(offer, value, holding, self._offer(kind, 1.0, use))
+        return found
 
     def array(self, name: str, value: float) -> PartChoice:
         """The array of this family with parts of this value.
@@ -159,8 +184,8 @@ class Catalog:
         return _choice(*found[0])
 
     def substitute(self, part: PartChoice, grade: float) -> PartChoice | None:
-        """Another maker's part of the same value, grade or better, use and footprint; the cheapest,
-        or None where the catalogue has none."""
+        """Another maker's part of the same value, use and footprint, chosen as ``part`` is; None
+        where the catalogue has none."""
         family = part.family
         found = [
             (other, exact)
@@ -171,26 +196,34 @@ class Catalog:
         ]
         if not found:
             return None
-        return _choice(*min(found, key=lambda each: (each[0].price, each[0].grade)))
+        return _choice(*min(found, key=lambda each: _preference(each[0], grade)))
 
-    def opamp(self, name: str) -> OpAmp:
+    def opamp(self, name: str, supply: float | None = None) -> OpAmp:
         """The op-amp of this name; InputError names the known ones and a likely one, or says that
-        it is not sold in a case that the board takes."""
-        return self._cased(_named(self.opamps, name, "circuit.opamp"))
+        it is not sold in a case that the board takes, and which others are.
+
+        supply : rails [V] that those others have to stand; None: those that its figures hold at.
+        """
+        named = _named(self.opamps, name, "circuit.opamp")
+        rails = named.rated_supply if supply is None else supply
+        others = [other for other in self.opamps if other.takes(rails)]
+        return self._cased(named, f"op-amps for ± {rails:g} V", others)
 
     def diode(self, name: str) -> Diode:
-        """The diode of this name; InputError names the known ones and a likely one."""
-        return self._cased(_named(self.diodes, name, "diode"))
+        """The diode of this name; InputError as for ``opamp``."""
+        return self._cased(_named(self.diodes, name, "diode"), "diodes", self.diodes)
 
     def reference(self, name: str) -> Reference:
         """The voltage reference of this name; InputError as for ``opamp``."""
-        return self._cased(_named(self.references, name, "reference"))
+        named = _named(self.references, name, "reference")
+        same = [r for r in self.references if math.isclose(r.voltage, named.voltage, rel_tol=_SAME)]
+        return self._cased(named, f"references of {format_quantity(named.voltage, 'V')}", same)
 
     def trimmer(self, value: float) -> Trimmer:
         """The first trimmer of this value [Ω]; InputError names the values that there are."""
-        for entry in self.trimmers:
-            if math.isclose(entry.value, value, rel_tol=_SAME):
-                return self._cased(entry)
+        same = [t for t in self.trimmers if math.isclose(t.value, value, rel_tol=_SAME)]
+        if same:
+            return self._cased(same[0], f"trimmers of {format_quantity(value, 'Ω')}", same)
         known = ", ".join(format_quantity(entry.value, "Ω") for entry in self.trimmers)
         raise InputError(None, "trimmer", format_quantity(value, "Ω"), f"one of {known}")
 
@@ -202,8 +235,15 @@ class Catalog:
         most = max((entry.ways[1] for entry in self.headers), default=0)
         raise InputError(None, "header", ways, f"a number of ways up to {most}")
 
-    def _cased(self, entry: _CasedT) -> _CasedT:
-        """The entry in the first of its cases that the board takes."""
+    def _cased(self, entry: _CasedT, what: str, others: Sequence[_CasedT]) -> _CasedT:
+        """The entry in the first of its cases that the board takes.
+
+        what, others : parts of its sort, in words and as entries: what may be taken instead.
+
+        Raises
+        ------
+        InputError : it has no such case; names those of ``others`` that have one.
+        """
         if self.mounting in ("mixed", mounting_of(entry.footprint)):
             return entry
         for case in entry.cases:
@@ -218,24 +258,35 @@ class Catalog:
                     return moved
                 return replace(moved, pins=case.pins)
         sold = mounting_of(entry.footprint)
-        raise InputError(
-            None,
-            "board.mounting",
-            self.mounting,
-            f'"{sold}" or "mixed": {entry.name} is in the catalogue in no other case',
-        )
+        cased = [
+            other.name
+            for other in others
+            if other != entry and any(mounting_of(f) == self.mounting for f in _footprints(other))
+        ]
+        expected = other_case(entry.name, self.mounting, sold, what, cased)
+        raise InputError(None, "board.mounting", self.mounting, expected)
 
     def _families(self, kind: Kind, grade: float, use: Use = "signal") -> list[PartFamily]:
+        """Those of this grade or a better one that the board takes and the file lets be bought."""
+        return [
+            each
+            for each in self._of_kind(kind, grade, use)
+            if self.mounting in ("mixed", each.mounting) and each.name not in self.refused
+        ]
+
+    def _offer(self, kind: Kind, grade: float, use: Use = "signal") -> Offer:
+        families = tuple(self._of_kind(kind, grade, use))
+        return Offer(kind, grade, families, self.mounting, self.refused)
+
+    def _of_kind(self, kind: Kind, grade: float, use: Use) -> list[PartFamily]:
+        """Those of this grade or a better one, whether they may be bought or not."""
         if kind not in UNITS:
             raise InputError(None, "kind", kind, one_of(kind, UNITS))
         limit = grade * (1.0 + _SAME)
         return [
             each
             for each in self.families
-            if each.kind == kind
-            and each.use == use
-            and each.grade <= limit
-            and self.mounting in ("mixed", each.mounting)
+            if each.kind == kind and each.use == use and each.grade <= limit
         ]
 
     @staticmethod
@@ -248,41 +299,6 @@ class Catalog:
             if math.isclose(nearest, value, rel_tol=_SAME)
         ]
 
-    def _best_grade(self, kind: Kind) -> str:
-        grades = [family.grade for family in self._families(kind, 1.0)]
-        return f"{min(grades):.4g} or more" if grades else f"the catalogue has no {kind}s"
-
-    def _explain(
-        self,
-        kind: Kind,
-        series: Sequence[str],
-        limits: tuple[float, float],
-        grade: float,
-        sold: set[float],
-    ) -> NoReturn:
-        """Raise ``Unreachable`` naming what stands in the way: grade, range or series."""
-        if not sold:
-            raise Unreachable(None, f"circuit.{kind}_grade", grade, self._best_grade(kind))
-        unit = UNITS[kind]
-        low, high = (format_quantity(end, unit) for end in limits)
-        on_series = [
-            value for value in sorted(sold) if value in series_values(series, value, value)
-        ]
-        if not on_series:
-            raise Unreachable(
-                None,
-                f"circuit.{kind}s",
-                ", ".join(series),
-                "a series of which values can be bought",
-            )
-        ends = " to ".join(format_quantity(end, unit) for end in (on_series[0], on_series[-1]))
-        raise Unreachable(
-            None,
-            f"circuit.{kind}_range",
-            f"{low} to {high}",
-            f"a range with values that can be bought at {grade:.4g}: within {ends}",
-        )
-
 
 def load_catalog(extra: Path | None = None) -> Catalog:
     """Read all catalogue folders, ``extra`` first.
@@ -291,74 +307,35 @@ def load_catalog(extra: Path | None = None) -> Catalog:
     ------
     InputError : a named folder does not exist, or a file in one is wrong; names file and field.
     """
-    folders = _folders(extra)
-    digest = hashlib.sha256()
-    kept: dict[tuple[type[Entry], str], Entry] = {}
-    for folder in folders:
-        for key, entry in _read_folder(folder, digest).items():
-            kept.setdefault(key, entry)
-    entries = kept.values()
+    held = read_folders(extra)
+    entries = held.entries
     return Catalog(
         tuple(entry for entry in entries if isinstance(entry, PartFamily)),
         tuple(entry for entry in entries if isinstance(entry, OpAmp)),
         tuple(entry for entry in entries if isinstance(entry, Diode)),
         tuple(entry for entry in entries if isinstance(entry, Reference)),
-        digest.hexdigest(),
-        folders,
+        held.hash,
+        held.folders,
         tuple(entry for entry in entries if isinstance(entry, Trimmer)),
         tuple(entry for entry in entries if isinstance(entry, Header)),
         tuple(entry for entry in entries if isinstance(entry, Price)),
     )
 
 
-def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry], str], Entry]:
-    """The entries of a folder, files in the order of their names; other files are left alone."""
-    found: dict[tuple[type[Entry], str], Entry] = {}
-    files = (path for path in folder.iterdir() if path.suffix in (".toml", ".csv"))
-    for path in sorted(files, key=lambda each: each.name):
-        content, entries = read_catalog_file(path)
-        digest.update(f"{path.name} {len(content)}\n".encode())
-        digest.update(content)
-        for entry in entries:
-            key = type(entry), entry.name
-            if key in found:
-                raise InputError(path, "name", entry.name, "names that this folder uses once")
-            found[key] = entry
-    for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
-        content = path.read_bytes()
-        digest.update(f"{LAYOUTS}/{path.name} {len(content)}\n".encode())
-        digest.update(content)
-    return found
-
-
-def _folders(extra: Path | None) -> tuple[Path, ...]:
-    named = [] if extra is None else [("the catalogue folder", Path(extra))]
-    listed = os.environ.get(ENVIRONMENT, "").split(os.pathsep)
-    named += [(ENVIRONMENT, Path(text)) for text in listed if text]
-    for origin, folder in named:
-        if not folder.is_dir():
-            raise InputError(None, origin, str(folder), "a folder of catalogue files")
-    own = Path(platformdirs.user_config_dir("designer", appauthor=False)) / "catalogs"
-    return (
-        *(folder for _, folder in named),
-        *([own] if own.is_dir() else []),
-        _shipped(),
-    )
-
-
-def _shipped() -> Path:
-    """In a wheel inside the package; in a checkout at its top level, beside the package."""
-    package = Path(str(importlib.resources.files("designer")))
-    for folder in (package / "catalogs", package.parent / "catalogs"):
-        if folder.is_dir():
-            return folder
-    raise InputError(None, "catalogs", "nothing", "the catalogue that comes with the tool")
-
-
 def _nearest(ascending: Sequence[float], value: float) -> float:
     """The one that is nearest to the value, the smaller of two that are as near."""
     above = bisect_left(ascending, value)
     return min(ascending[max(above - 1, 0) : above + 1], key=lambda each: abs(each - value))
+
+
+def _footprints(entry: OpAmp | Diode | Reference | Trimmer) -> tuple[str, ...]:
+    """Of every case that it is sold in."""
+    return entry.footprint, *(case.footprint for case in entry.cases)
+
+
+def _preference(family: PartFamily, grade: float) -> tuple[bool, int, float]:
+    """Least for the family that is bought from where ``grade`` is asked for."""
+    return not math.isclose(family.grade, grade, rel_tol=_SAME), family.price, family.grade
 
 
 def _choice(family: PartFamily, value: float) -> PartChoice:

@@ -16,6 +16,9 @@ Use = Literal["signal", "supply", "array"]
 Mounting = Literal["mixed", "smd", "tht"]
 """Which cases a board takes: any, the first that the catalogue names; or one kind alone."""
 
+FORBIDDEN = "!"
+"""Stands in front of a family's name that a model file does not let parts be bought from."""
+
 UNITS: dict[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
 
 PRICE_CLASSES = (0.01, 0.05, 0.25, 1.0, 5.0, math.inf)
@@ -155,6 +158,10 @@ class OpAmp:
     def sections(self) -> int:
         """Number of amplifiers in the package."""
         return len(self.pins)
+
+    def takes(self, supply: float) -> bool:
+        """Whether it works from rails of ± ``supply`` [V]."""
+        return (self.supply.min or 0.0) <= supply <= (self.supply.max or math.inf)
 
     def saturation_at(self, supply: float) -> float:
         """Typical output limit [V] at rails of ± ``supply``: the distance to the rail stays."""

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from designer.base.errors import InputError
+from pydantic import BaseModel
+
+from designer.base.errors import MISSING, InputError, InputErrors, problems_in
 from designer.base.eseries import series_values
-from designer.base.schema import checked, one_of, parse_toml
+from designer.base.schema import one_of, parse_toml, validated
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.entries import (
     UNITS,
@@ -29,7 +33,17 @@ from designer.catalog.entries import (
     Section,
     Trimmer,
 )
-from designer.catalog.tables import CaseTable, FamilyTable, FileTables, OpAmpTable
+from designer.catalog.tables import (
+    CaseTable,
+    DiodeTable,
+    FamilyTable,
+    FileTables,
+    HeaderTable,
+    OpAmpTable,
+    PriceTable,
+    ReferenceTable,
+    TrimmerTable,
+)
 from designer.catalog.vendor_model import read_vendor_model
 
 Entry = PartFamily | OpAmp | Diode | Reference | Trimmer | Header | Price
@@ -42,7 +56,8 @@ def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
 
     Raises
     ------
-    InputError : the file cannot be read, or anything in it is wrong.
+    InputError : the file cannot be read.
+    InputErrors : more than one thing in it is wrong; names each.
     """
     try:
         with path.open("rb") as stream:
@@ -59,54 +74,84 @@ def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
         found = f"byte 0x{content[error.start]:02x}"
         raise InputError(path, f"line {row}", found, "text in UTF-8") from None
     if path.suffix == ".csv":
-        return content, tuple(_from_csv(text, str(path)))
-    entries = tuple(_from_toml(text, str(path)))
+        return content, _from_csv(text, str(path))
+    entries = _from_toml(text, str(path))
     # A model beside the file is content too: the catalogue's hash follows it.
     spice = [e.spice for e in entries if isinstance(e, OpAmp) and e.spice is not None]
     return b"\n".join([content, *(model.content for model in spice)]), entries
 
 
-def _from_toml(text: str, file: str) -> Iterable[Entry]:
-    tables = checked(FileTables, parse_toml(text, file), file)
-    for index, family in enumerate(tables.family, start=1):
-        yield _family(family, file, f"family[{index}]")
-    for index, opamp in enumerate(tables.opamp, start=1):
-        yield _opamp(opamp, file, f"opamp[{index}]")
-    for diode in tables.diode:
-        yield Diode(**{**dict(diode), "cases": _cases(diode.cases)})
-    for reference in tables.reference:
-        yield Reference(**{**dict(reference), "cases": _cases(reference.cases)})
-    for trimmer in tables.trimmer:
-        rating = Rating(**dict(trimmer.rating))
-        yield Trimmer(**{**dict(trimmer), "rating": rating, "cases": _cases(trimmer.cases)})
-    for header in tables.header:
-        yield Header(**{**dict(header), "rating": Rating(**dict(header.rating))})
-    for price in tables.price:
-        yield Price(str(price.price_class), price.euro, price.source, price.assumed)
+def _from_toml(text: str, file: str) -> tuple[Entry, ...]:
+    data = parse_toml(text, file)
+    tables, problems = validated(FileTables, data, file)
+    entries: list[Entry] = []
+    for key, (table, make) in _SORTS.items():
+        rows = _rows(table, data.get(key)) if tables is None else getattr(tables, key)
+        for index, row in enumerate(rows, start=1):
+            if row is not None:
+                _collect(partial(make, row, file, f"{key}[{index}]"), entries, problems)
+    return _all_right(entries, problems)
 
 
-def _from_csv(text: str, file: str) -> Iterable[Entry]:
+def _rows(table: type[BaseModel], rows: object) -> list[BaseModel | None]:
+    """The tables of one sort in a file of which something is wrong; None for those that are."""
+    if not isinstance(rows, list):
+        return []
+    return [validated(table, row, None)[0] if isinstance(row, dict) else None for row in rows]
+
+
+def _collect(make: Callable[[], Entry], entries: list[Entry], problems: list[InputError]) -> None:
+    """Make one more entry, or note what is wrong with it."""
+    try:
+        entries.append(make())
+    except InputError as error:
+        problems += problems_in(error)
+
+
+def _all_right(entries: Sequence[Entry], problems: Sequence[InputError]) -> tuple[Entry, ...]:
+    """The entries.
+
+    Raises
+    ------
+    InputError : the problem, or InputErrors: every problem.
+    """
+    if problems:
+        raise problems[0] if len(problems) == 1 else InputErrors(problems)
+    return tuple(entries)
+
+
+def _from_csv(text: str, file: str) -> tuple[Entry, ...]:
     """Part families, one a row; the columns are the keys of a TOML table, and ``format``."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     known = ["format", *sorted(FamilyTable.model_fields)]
+    entries: list[Entry] = []
     try:
         header = next(reader, [])
-        for name in header:
-            if name not in known:
-                raise InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
-        for row in reader:
+        problems = [
+            InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
+            for name in header
+            if name not in known
+        ]
+        for row in reader if not problems else ():
             place = f"line {reader.line_num}"
             if not row:
                 continue
             if len(row) != len(header):
-                raise InputError(file, place, f"{len(row)} cells", f"{len(header)}, as the header")
+                expected = f"{len(header)}, as the header"
+                problems.append(InputError(file, place, f"{len(row)} cells", expected))
+                continue
             cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
             if cells.pop("format", "") != "1":
-                raise InputError(file, f"{place}.format", "no 1", "1 in a column format")
-            table = {key: _cell(key, cell) for key, cell in cells.items() if cell}
-            yield _family(checked(FamilyTable, table, file, within=place), file, place)
+                expected = "1 in a column format"
+                problems.append(InputError(file, f"{place}.format", "no 1", expected))
+            cut = {key: _cell(key, cell) for key, cell in cells.items() if cell}
+            table, wrong = validated(FamilyTable, cut, file, within=place)
+            problems += wrong
+            if table is not None:
+                _collect(partial(_family, table, file, place), entries, problems)
     except csv.Error as error:
         raise InputError(file, f"line {reader.line_num}", str(error), "a CSV file") from None
+    return _all_right(entries, problems)
 
 
 def _cell(key: str, cell: str) -> object:
@@ -128,38 +173,41 @@ def _cell(key: str, cell: str) -> object:
 
 
 def _family(table: FamilyTable, file: str, place: str) -> PartFamily:
-    def refuse(key: str, found: object, expected: str) -> InputError:
-        return InputError(file, f"{place}.{key}", found, expected)
+    problems: list[InputError] = []
+
+    def refuse(key: str, found: object, expected: str) -> None:
+        problems.append(InputError(file, f"{place}.{key}", found, expected))
 
     unit = UNITS[table.kind]
+    values: tuple[float, ...] = ()
     try:
         values = _values(table, unit)
+        if not values:
+            refuse("values", MISSING, "values, or series and a range that holds some")
     except InputError as error:  # raised by the series, which do not know the file
-        raise refuse(error.field, error.found, error.expected) from None
+        refuse(error.field, error.found, error.expected)
     except ValueError as error:
-        raise refuse("range", str(error), f"quantities in {unit}, ascending") from None
+        refuse("range", str(error), f"quantities in {unit}, ascending")
     for key, stated in (("elements", table.elements), ("matching", table.matching)):
         if (stated is not None) is not (table.use == "array"):
             expected = f'{key} with use = "array", and only there'
-            raise refuse(key, "nothing" if stated is None else stated, expected)
-    if not values:
-        raise refuse("values", "nothing", "values, or series and a range that holds some")
+            refuse(key, MISSING if stated is None else stated, expected)
     rule = PartNumber(table.part_number.prefix, table.part_number.code, table.part_number.suffix)
     for value in values:
         try:
             rule.of(value)
         except ValueError as error:
             spelled = format_quantity(value, unit)
-            raise refuse(
-                "part_number.code", rule.code, f"a code that can spell {spelled} ({error})"
-            ) from None
+            refuse("part_number.code", rule.code, f"a code that can spell {spelled} ({error})")
+            break
     if table.example is not None:
         try:
             made = rule.of(parse_quantity(table.example.value, unit))
+            if made != table.example.part_number:
+                refuse("example.part_number", table.example.part_number, f"{made}, by the rule")
         except ValueError as error:
-            raise refuse("example.value", table.example.value, f"a value ({error})") from None
-        if made != table.example.part_number:
-            raise refuse("example.part_number", table.example.part_number, f"{made}, by the rule")
+            refuse("example.value", table.example.value, f"a value ({error})")
+    _all_right((), problems)
     return PartFamily(
         name=table.name,
         kind=table.kind,
@@ -196,25 +244,28 @@ def _values(table: FamilyTable, unit: str) -> tuple[float, ...]:
 
 def _opamp(table: OpAmpTable, file: str, place: str) -> OpAmp:
     sections = tuple(Section(**dict(section)) for section in table.section)
+    problems: list[InputError] = []
     pins = [*table.supply_pins]
     for section in sections:
         pins += [section.inverting, section.noninverting, section.output]
     names = [section.name for section in sections]
     for key, used in (("section.name", names), ("section", pins)):
-        for name in used:
+        for name in dict.fromkeys(used):
             if used.count(name) > 1:
-                raise InputError(file, f"{place}.{key}", name, "a name or pin that is used once")
+                expected = "a name or pin that is used once"
+                problems.append(InputError(file, f"{place}.{key}", name, expected))
     if not sections:
-        raise InputError(file, f"{place}.section", "nothing", "at least one section")
+        problems.append(InputError(file, f"{place}.section", MISSING, "at least one section"))
     spice = None
     if table.spice is not None:
         named = table.spice
         try:
             spice = read_vendor_model(named.file, named.subckt, named.pins, Path(file).parent)
         except InputError as error:
-            if error.file is not None:
-                raise
-            raise InputError(file, f"{place}.{error.field}", error.found, error.expected) from None
+            if error.file is None:
+                error = InputError(file, f"{place}.{error.field}", error.found, error.expected)
+            problems.append(error)
+    _all_right((), problems)
     figures = {key: value for key, value in table if key not in ("section", "spice")}
     cases = _cases(table.cases)
     return OpAmp(**{**figures, "pins": sections, "spice": spice, "cases": cases})
@@ -222,3 +273,32 @@ def _opamp(table: OpAmpTable, file: str, place: str) -> OpAmp:
 
 def _cases(tables: Iterable[CaseTable]) -> tuple[Case, ...]:
     return tuple(Case(**dict(table)) for table in tables)
+
+
+def _cased(entry: type[Diode] | type[Reference]) -> Callable[[Any, str, str], Entry]:
+    return lambda table, _file, _place: entry(**{**dict(table), "cases": _cases(table.cases)})
+
+
+def _trimmer(table: TrimmerTable, _file: str, _place: str) -> Trimmer:
+    rating = Rating(**dict(table.rating))
+    return Trimmer(**{**dict(table), "rating": rating, "cases": _cases(table.cases)})
+
+
+def _header(table: HeaderTable, _file: str, _place: str) -> Header:
+    return Header(**{**dict(table), "rating": Rating(**dict(table.rating))})
+
+
+def _price(table: PriceTable, _file: str, _place: str) -> Price:
+    return Price(str(table.price_class), table.euro, table.source, table.assumed)
+
+
+_SORTS: dict[str, tuple[type[BaseModel], Callable[[Any, str, str], Entry]]] = {
+    "family": (FamilyTable, _family),
+    "opamp": (OpAmpTable, _opamp),
+    "diode": (DiodeTable, _cased(Diode)),
+    "reference": (ReferenceTable, _cased(Reference)),
+    "trimmer": (TrimmerTable, _trimmer),
+    "header": (HeaderTable, _header),
+    "price": (PriceTable, _price),
+}
+"""By the name of its tables in a file: what a sort of entry is checked and made by."""

@@ -81,7 +81,8 @@ def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tup
     spread = spread_of(made.modelfile, circuit, catalog)
     measured = made.modelfile.measured
     taken = {name for g in spread.groups if not g.reel for name in g.parts}
-    taken |= {*spread.grades, *spread.shapes, *(() if measured is None else measured.values)}
+    taken |= {*(spread.grades.keys() - spread.asked.keys()), *spread.shapes}
+    taken |= set() if measured is None else measured.values.keys()
     nodes = {s.inverting: k for k, s in enumerate(circuit.sections)}
 
     def place(part: Resistor) -> int:
@@ -126,11 +127,15 @@ def trimmer_slot(made: Synthesis, without: frozenset[str] = frozenset()) -> Part
 
 
 def _grades(
-    catalog: Catalog, kind: Kind, part: Resistor | Capacitor, now: float
+    catalog: Catalog, kind: Kind, part: Resistor | Capacitor, asked: float
 ) -> PartSlot | None:
     """The slot of one part; None where nothing better is sold. A dearer grade that is no better
-    than a cheaper one is left out."""
-    base = catalog.part(kind, part.value, now)
+    than a cheaper one is left out.
+
+    asked : the grade that is asked for; the part is as it is bought there.
+    """
+    base = catalog.part(kind, part.value, asked)
+    now = base.family.grade
     better = {
         f.grade
         for f in catalog.families
@@ -138,9 +143,8 @@ def _grades(
     }
     options, grades = [Option(f"{100.0 * now:g} %", 0.0)], [now]
     for grade in sorted(better):
-        try:
-            sold = catalog.part(kind, part.value, grade)
-        except Unreachable:
+        sold = catalog.sold(kind, part.value, grade)
+        if sold is None or sold.family.grade != grade:  # a better one has its own turn
             continue
         extra = catalog.euro(sold.price) - catalog.euro(base.price)
         if all(extra < o.price for o in options[1:]):

@@ -68,6 +68,7 @@ def search(
     Unreachable : no design keeps its conditions and the match error.
     """
     said = Progress() if progress is None else progress
+    catalog = modelfile.choices(catalog)
     with naming(modelfile):
         seen = look(modelfile, catalog, jobs, said) if windows is None else tuple(windows)
         hunt = _Hunt(
@@ -88,6 +89,7 @@ def look(
 ) -> tuple[tuple[Stretch, ...], ...]:
     """Everything that may be refused, refused; and where the model shows each response."""
     need_responses(modelfile)
+    catalog = modelfile.choices(catalog)
     with naming(modelfile):
         for choice in topologies(modelfile, catalog):
             spec = choice.spec(modelfile.circuit)

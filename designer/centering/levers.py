@@ -83,9 +83,10 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[Choice]:
     own, spec = Choice.of(modelfile.circuit), modelfile.search
     for name in spec.opamps:
         try:
-            catalog.opamp(name)
+            catalog.opamp(name, modelfile.circuit.supply)
         except InputError as error:
-            raise InputError(None, "search.opamps", error.found, error.expected) from None
+            field = "search.opamps" if error.field == "circuit.opamp" else error.field
+            raise InputError(None, field, error.found, error.expected) from None
     opamps = spec.opamps or (own.opamp,)
     found = [
         replace(own, opamp=opamp, dead_zone=zone) for opamp in opamps for zone in spec.dead_zones

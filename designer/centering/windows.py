@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
 from designer.dynamics.orbit import OrbitStatus
@@ -87,7 +87,7 @@ def check(wanted: Sequence[Response]) -> None:
             raise InputError(
                 None,
                 f"response[{number}].expect",
-                "nothing",
+                MISSING,
                 f'n-p-q such as "1-2-2": {open_} is chosen in the window of that response',
             )
         if isinstance(spec.b, tuple) and not spec.b[0] < spec.b[1]:

@@ -34,8 +34,7 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
     InputError, Unreachable : the model file asks for what cannot be built.
     """
     began = time.perf_counter()
-    catalog = load_catalog() if catalog is None else catalog
-    catalog = catalog.mounted(modelfile.board.mounting)
+    catalog = modelfile.choices(load_catalog() if catalog is None else catalog)
     with naming(modelfile):
         found, design = checked_design.design_for(modelfile, catalog)
     return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.progress import Progress
 from designer.cli.app import (
     Jobs,
@@ -86,7 +86,7 @@ def search(
         options = Options(seed, jobs, count, overwrite, resume, rung=said.value)
         options.check()
         if not model.exists():
-            raise InputError(model, "MODEL|DIR", "nothing", "a model file or a design folder")
+            raise InputError(model, "MODEL|DIR", MISSING, "a model file or a design folder")
         if model.is_dir():
             for name, given in (("--samples", samples), ("--rung", rung)):
                 if given is not None:
@@ -131,7 +131,7 @@ def _cured(
     from designer.jobs.cure_job import cure
 
     if wanted is None:
-        raise InputError(None, "--yield", "nothing", "the yield that the cure shall reach")
+        raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
     return cure(
         folder,
         target=wanted,

@@ -35,6 +35,14 @@ def synthesised(answer: Mapping[str, Any]) -> None:
     for (kind, value), names in sorted(kinds.items()):
         add_row(table, format_quantity(value, "F" if kind == "C" else "Ω"), " ".join(names))
     console.print(table)
+    if answer.get("better_grades"):
+        from designer.spread.part_grades import (  # only here is it needed
+            BetterGrade,
+            better_grades_text,
+        )
+
+        better = {name: BetterGrade(**said) for name, said in answer["better_grades"].items()}
+        print_line(console, better_grades_text(better))
     certificate = answer["certificate"]
     print_line(
         console,

@@ -100,10 +100,10 @@ def absorption(
         yield Found(force, capacitor.name, more=more)
 
 
-def stiffness(circuit: Circuit, mu: float, grade: float) -> Iterator[Found]:
+def stiffness(circuit: Circuit, mu: float, grades: Mapping[str, float]) -> Iterator[Found]:
     """What the dead zone leaves, in units of K1: |nominal| and a standard deviation.
 
-    mu : the stop's stiffness over K1. grade : of the resistors, spread evenly.
+    mu : the stop's stiffness over K1. grades : of each resistor as it is bought, spread evenly.
     """
     if not circuit.stops:
         return
@@ -112,9 +112,12 @@ def stiffness(circuit: Circuit, mu: float, grade: float) -> Iterator[Found]:
         r.name: (mu * leftover(circuit, {r.name: r.value * (1.0 + STEP)}) - nominal) / STEP
         for r in circuit.resistors
     }
-    deviation = float(np.sqrt(sum(c**2 for c in change.values()))) * grade / np.sqrt(3.0)
-    worst = max(change, key=lambda name: abs(change[name]))
-    more = f"nominal {abs(nominal):.2g}, deviation {deviation:.2g} at {100 * grade:g} % resistors"
+    most = max(grades[name] for name in change)
+    shares = {name: c * (grades[name] / most) for name, c in change.items()}
+    deviation = float(np.sqrt(sum(c**2 for c in shares.values()))) * most / np.sqrt(3.0)
+    worst = max(shares, key=lambda name: abs(shares[name]))
+    bought = " and ".join(f"{100 * g:g}" for g in sorted({grades[name] for name in change}))
+    more = f"nominal {abs(nominal):.2g}, deviation {deviation:.2g} at {bought} % resistors"
     yield Found(float(abs(nominal) + deviation), f"{worst}, which has most of it", more=more)
 
 

@@ -42,7 +42,7 @@ LOOKS: dict[str, Look] = {
         s.circuit, s.dielectrics, s.forces, s.drive
     ),
     "dead-zone-stiffness": lambda s: on_precision.stiffness(
-        s.circuit, s.design.model.mu, s.made.modelfile.circuit.resistor_grade
+        s.circuit, s.design.model.mu, s.resistor_grades
     ),
 }
 """By id: yields what was found, one value for each place that the rule looks at."""

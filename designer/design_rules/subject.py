@@ -112,6 +112,18 @@ class Subject:
         return highest / (2.0 * np.pi * self.design.errors.scales.seconds)
 
     @cached_property
+    def resistor_grades(self) -> dict[str, float]:
+        """Grade of each resistor as it is bought; where none is known, that of the model file."""
+        usual = self.made.modelfile.circuit.resistor_grade
+        known = {
+            name: component.bought.grade
+            for component in self.components
+            if component.bought is not None and component.bought.grade is not None
+            for name in component.parts
+        }
+        return {r.name: known.get(r.name, usual) for r in self.circuit.resistors}
+
+    @cached_property
     def watts(self) -> dict[str, float]:
         """Rated power [W] by resistor, of what is ordered; without those that state none."""
         return self._rated("resistor", "W")

@@ -9,7 +9,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.checks import at_least
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.schema import one_of
 from designer.bifurcations import parameter_map, sweep
@@ -80,7 +80,7 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     over = request.over or ("frequency" if request.circuit else "omega")
     for option, value in (("--from", request.low), ("--to", request.high)):
         if value is None:
-            raise InputError(None, option, "nothing", f"a value of {over}")
+            raise InputError(None, option, MISSING, f"a value of {over}")
         subject.check("--over" if over not in subject.parameters else option, over, value)
     low, high, steps = _axis("--from", "--to", "--steps", request.low, request.high, request.steps)
     swept = [over]
@@ -144,7 +144,7 @@ def _axis(
     assert low is not None
     assert high is not None
     if steps is None:
-        raise InputError(None, third, "nothing", "a whole number >= 2")
+        raise InputError(None, third, MISSING, "a whole number >= 2")
     at_least(third, steps, 2)
     if steps > MOST_STEPS:
         raise InputError(None, third, steps, f"at most {MOST_STEPS}")
@@ -232,7 +232,7 @@ def _at_frequency(
         known = [r.omega for r in modelfile.responses if r.omega is not None]
         if not known:
             raise InputError(
-                None, "--omega", "nothing", "the drive's frequency: no response of the file has one"
+                None, "--omega", MISSING, "the drive's frequency: no response of the file has one"
             )
         omega = known[0]
     check_omega("--omega", omega)

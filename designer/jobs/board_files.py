@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from designer.board import board_notes
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill, bill_csv
 from designer.board.bom_layouts import file_of, layouts
-from designer.board.component import components, pin_numbers, to_buy
+from designer.board.component import Component, components, pin_numbers, to_buy
 from designer.check.synthesis_result import Synthesis
+from designer.model.board_table import BoardChoice
 from designer.model.model_file import ModelFile
 
 BILL, NOTES, DRAWING, PICTURE = "bom.csv", "board.md", "schematic.svg", "schematic.png"
@@ -30,12 +33,24 @@ def texts(made: Synthesis) -> dict[str, str]:
 
     circuit, choice = board_circuit(made)
     found = components(circuit, made.catalog, choice)
+    return {
+        NOTES: board_notes.markdown(made, circuit, choice, found),
+        DRAWING: schematic_drawing.svg(circuit, made.modelfile.title, pin_numbers(found)),
+        **_bills(made, found, choice),
+    }
+
+
+def bills(made: Synthesis) -> dict[str, str]:
+    """The bills of materials alone, by name; raises as ``texts`` does."""
+    circuit, choice = board_circuit(made)
+    return _bills(made, components(circuit, made.catalog, choice), choice)
+
+
+def _bills(made: Synthesis, found: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
     bought = bill(to_buy(found, choice))
     others = layouts(made.modelfile.board.bom, made.catalog.folders)
     return {
         BILL: bill_csv(bought),
-        NOTES: board_notes.markdown(made, circuit, choice, found),
-        DRAWING: schematic_drawing.svg(circuit, made.modelfile.title, pin_numbers(found)),
         **{layout.file: layout.csv(bought) for layout in others},
     }
 

@@ -31,7 +31,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.jobs import design_files, rung_choice
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
-from designer.jobs.synthesise_job import design_inputs, made_from, read_design
+from designer.jobs.synthesise_job import design_inputs, grade_inputs, made_from, read_design
 from designer.model.model_file import naming, need_responses
 from designer.synthesis.tie_break import SOLVER
 
@@ -93,6 +93,7 @@ def cure(
         "budget": budget,
         "without": sorted(unwanted),
         "seed": options.seed,
+        **grade_inputs(base.modelfile, base.catalog),
     }
     wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
         "cure": (inputs, [CURE, STUDIES, *FRONT])

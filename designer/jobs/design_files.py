@@ -30,6 +30,7 @@ from designer.model.find_responses import find, peaks
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming
 from designer.spice import deck
+from designer.spread.part_grades import better_grades
 from designer.synthesis.tie_break import SOLVER
 
 SETUP = "setup.csv"
@@ -53,15 +54,28 @@ def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str
     folder.write(board_files.PICTURE, board_files.picture(made))
     if made.modelfile.measured is not None:
         folder.write(MEASURED, made.modelfile.measured.content)
-    folder.write(
-        DESIGN,
-        dumps(
-            synthesis_json(
-                made.modelfile, made.design, made.found, design_provenance(made), made.seconds
-            )
-        ),
-    )
+    folder.write(DESIGN, dumps(answer(made)))
     return folder.json(DESIGN)
+
+
+def renew_bills(folder: Folder, made: Synthesis) -> None:
+    """Write the bills of a finished design anew, as its parts are bought now."""
+    assert folder.manifest is not None
+    for name, text in board_files.bills(made).items():
+        if name in folder.manifest.files:
+            folder.rewrite(name, text)
+
+
+def answer(made: Synthesis) -> dict[str, Any]:
+    """What ``design.json`` says of a design."""
+    return synthesis_json(
+        made.modelfile,
+        made.design,
+        made.found,
+        design_provenance(made),
+        made.seconds,
+        better_grades(made.modelfile, made.design.circuit, made.catalog),
+    )
 
 
 def design_provenance(made: Synthesis) -> dict[str, Any]:
@@ -76,9 +90,9 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     said, file = folder.json(DESIGN), folder / DESIGN
     model, spec = modelfile.model, modelfile.circuit
     found = find(model, modelfile.responses)
-    catalog = catalog.mounted(modelfile.board.mounting)
+    catalog = modelfile.choices(catalog)
     with naming(modelfile):
-        opamp = catalog.opamp(spec.opamp)
+        opamp = catalog.opamp(spec.opamp, spec.supply)
     system = model.second_order()
     try:
         values = {str(name): float(value) for name, value in said["parts"].items()}

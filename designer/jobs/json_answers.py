@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.dynamics.orbit import Orbit
     from designer.model.find_responses import ModelResponse
     from designer.model.model_file import ModelFile
+    from designer.spread.part_grades import BetterGrade
 
 STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "maps")
 """What ``run`` prints of a study beside its responses."""
@@ -27,8 +28,13 @@ def synthesis_json(
     found: Sequence[ModelResponse],
     provenance: Mapping[str, Any],
     seconds: float,
+    better_grades: Mapping[str, BetterGrade] | None = None,
 ) -> dict[str, Any]:
-    """What ``synthesise`` prints and ``design.json`` holds."""
+    """What ``synthesise`` prints and ``design.json`` holds.
+
+    better_grades : parts that are bought at a better grade than was asked for; the key is left
+    out where there are none.
+    """
     from designer.circuit.design import settings
     from designer.model.model import STATES
 
@@ -46,6 +52,7 @@ def synthesis_json(
         },
         "parts": circuit.values,
         "composites": design.composites,
+        **({"better_grades": _plain_grades(better_grades)} if better_grades else {}),
         "errors": errors.errors,
         "max_error": errors.max_error,
         "certificate": dict(design.certificate.__dict__),
@@ -72,6 +79,10 @@ def synthesis_json(
         "provenance": provenance,
         "cost": {"seconds": seconds, "synthesis_seconds": design.seconds},
     }
+
+
+def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, dict[str, float]]:
+    return {name: {"asked": g.asked, "bought": g.bought} for name, g in better.items()}
 
 
 def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import SEARCH
 from designer.jobs.study_folder import FolderStores
 from designer.jobs.study_job import SPICE_TIMEOUT, run_into
-from designer.jobs.synthesise_job import Outcome, design_inputs, made_from, model_file
+from designer.jobs.synthesise_job import Outcome, design_inputs, grade_inputs, made_from, model_file
 from designer.model.model_file import ModelFile, naming
 from designer.spice import numerics_gate
 from designer.spice.batch_backend import program_version
@@ -191,6 +191,7 @@ def _confirmed(
         "samples": options.samples,
         "rung": RUNG,
         "boards": OWN_SAMPLES,
+        **grade_inputs(modelfile, catalog),
     }
     wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
         "confirmation": (inputs, [CONFIRMATION])

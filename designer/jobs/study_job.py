@@ -28,7 +28,7 @@ from designer.jobs.options import Options
 from designer.jobs.origin import provenance
 from designer.jobs.study_folder import FolderStores, layers_of, merged, study_files, write_maps
 from designer.jobs.study_json import study_json
-from designer.jobs.synthesise_job import Outcome, design_inputs, standing_inputs
+from designer.jobs.synthesise_job import Outcome, bills_are_of_old, design_inputs, standing_inputs
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spice import equation_check
 from designer.spice.equation_check import EquationCheck
@@ -88,6 +88,10 @@ def run_into(
         else:
             made = load(folder, modelfile, catalog)
             folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+            if bills_are_of_old(
+                wanted["design"][0], design_inputs(modelfile, catalog)["design"][0]
+            ):
+                design_files.renew_bills(folder, made)
         design_seconds = time.perf_counter() - began
         result, blocks = _studied(folder, made, options, help_, progress)
     result.cost["design_seconds"] = design_seconds

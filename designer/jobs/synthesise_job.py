@@ -19,7 +19,7 @@ from designer.base.design_folder import (
     Folder,
     is_design_folder,
 )
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
@@ -29,13 +29,14 @@ from designer.check import simulation, synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import board_files, compare_files, design_files, kicad_files
 from designer.jobs.design_files import load
-from designer.jobs.json_answers import simulate_json, synthesis_json
+from designer.jobs.json_answers import simulate_json
 from designer.jobs.options import Options as Options
 from designer.jobs.origin import provenance
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming, read_model_file
 from designer.report import simulate_plots
 from designer.spice.opamp_model import Rung
+from designer.spread.part_grades import once_otherwise
 from designer.yields.run_result import RunResult
 
 
@@ -71,7 +72,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
         modelfile = model_file(path)
         if out is None:
             raise InputError(
-                None, "--out", "nothing", "a folder to write into: this verb writes a design folder"
+                None, "--out", MISSING, "a folder to write into: this verb writes a design folder"
             )
         return modelfile, out
     if not is_design_folder(path):
@@ -133,9 +134,7 @@ def compare_in_memory(modelfile: ModelFile, options: Options, progress: Progress
     progress.stage("responses of the model, parts")
     made = synthesis_result.synthesise(modelfile)
     compared = compare_files.make(made, progress)
-    said = design_files.design_provenance(made)
-    design = plain(synthesis_json(modelfile, made.design, made.found, said, made.seconds))
-    answer = compare_files.beside(design, plain(compared.file))
+    answer = compare_files.beside(plain(design_files.answer(made)), plain(compared.file))
     return Outcome(answer, _all_found(answer), None, False)
 
 
@@ -196,6 +195,10 @@ def read_design(
     return load(folder, modelfile, catalog)
 
 
+GRADES = "grades"
+"""Among a design's inputs where the bill once held other grades than the study drew."""
+
+
 def made_from(folder: Folder) -> dict[str, Any]:
     """Inputs of the folder's design; empty where there is none."""
     made = folder.manifest.stages.get("design") if folder.manifest else None
@@ -210,11 +213,18 @@ def design_inputs(
         "catalogue": catalog.hash,
         "version": __version__,
     }
+    inputs |= grade_inputs(modelfile, catalog)
     files = [*DESIGN_FILES, *board_files.names(modelfile)]
     if modelfile.measured is not None:
         inputs["measured"] = modelfile.measured.sha256
         files.append(MEASURED)
     return {"design": (inputs, files)}
+
+
+def grade_inputs(modelfile: ModelFile, catalog: Catalog) -> dict[str, str]:
+    """What tells the boards of this file, and its bill, from those of folders that bought other
+    grades than they drew; empty where none did."""
+    return {GRADES: "drawn as bought"} if once_otherwise(modelfile, catalog) else {}
 
 
 def standing_inputs(
@@ -238,8 +248,21 @@ def standing_inputs(
             f"{_shown(origin, 'version')}; here are catalogue {_shown(here, 'catalogue')} and "
             f"version {_shown(here, 'version')}: its parts stand as they are"
         )
+        if bills_are_of_old(origin, here):
+            progress.note(
+                "it is of a version whose bill of materials bought better grades than its study "
+                "drew: a study that is made now writes the bill anew"
+            )
         wanted["design"] = (origin, files)
     return wanted
+
+
+def bills_are_of_old(origin: Mapping[str, Any], here: Mapping[str, Any]) -> bool:
+    """Whether a folder's bill may list other grades than a study draws now.
+
+    origin, here : inputs of its design, as it was made and as it would be made now.
+    """
+    return GRADES in here and GRADES not in origin
 
 
 def _shown(inputs: Mapping[str, Any], key: str) -> str:

@@ -31,7 +31,7 @@ from designer.jobs import design_files
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import TRADE
-from designer.jobs.synthesise_job import standing_inputs
+from designer.jobs.synthesise_job import grade_inputs, standing_inputs
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spice.pool import SpicePool, require_ngspice
@@ -141,7 +141,7 @@ def answer(
     wanted = standing_inputs(folder, modelfile, catalog, progress)
     levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
     inputs = {**wanted["design"][0], **asdict(extent), "levels": levels, "seed": options.seed}
-    inputs["rules"] = RULES
+    inputs |= {"rules": RULES, **grade_inputs(modelfile, catalog)}
     wanted["trade"] = (inputs, [*NAMES, PIECES])
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
     if not todo:

@@ -25,6 +25,7 @@ from designer.base.schema import (
     physical_span,
 )
 from designer.base.units import parse_quantity
+from designer.catalog.entries import FORBIDDEN
 
 DeadZone = Literal["saturation", "rectifier"]
 Objective = Literal["match", "yield"]
@@ -42,6 +43,8 @@ class CircuitSpec:
     """What the circuit is to be made of and how it is to be chosen; the defaults of a model file.
 
     supply, saturation [V] (saturation None: the catalogue's); grades as fractions (0.01 is 1 %);
+    resistor_family, capacitor_family : names of the catalogue's families that parts are bought
+    from, or, each with ``!`` in front, of those that they are not; none: every family.
     resistor_range [Ω], capacitor_range [F]; frequency [Hz] is the band for ω = 1. diode, reference:
     parts of the rectifying dead zone. matched : groups of parts with equal values. preferred :
     values [Ω or F] that do not count among the distinct ones. most_values : limit on distinct
@@ -69,6 +72,8 @@ class CircuitSpec:
     slack: float = 0.0
     composites: Names = False
     side_conditions: Names = True
+    resistor_family: tuple[str, ...] = ()
+    capacitor_family: tuple[str, ...] = ()
 
     @property
     def kept(self) -> frozenset[str]:
@@ -93,6 +98,26 @@ def _series() -> Accepts:
         return _known(names, SERIES)
 
     return Accepts("one or a list of " + ", ".join(SERIES), check)
+
+
+def _families() -> Accepts:
+    """Their names are looked up when the catalogue is there."""
+    one = line("").check
+    expected = (
+        'a family of the catalogue or a list of them, or, with "!" in front of each, those that '
+        'are not bought from: "Yageo RC0603FR-07" or ["!Vishay CRCW0603 F"]'
+    )
+
+    def check(value: object) -> tuple[str, ...]:
+        names = [value] if isinstance(value, str) else value
+        if not isinstance(names, list) or not names:
+            raise ValueError
+        read = tuple(dict.fromkeys(str(one(name)).strip() for name in names))
+        if len({name.startswith(FORBIDDEN) for name in read}) > 1:
+            raise ValueError("all of them with ! or none")
+        return read
+
+    return Accepts(expected, check)
 
 
 def _known(names: Iterable[object], known: Sequence[str]) -> tuple[str, ...]:
@@ -215,3 +240,5 @@ class CircuitTable(BaseModel):
     ] = CircuitSpec.slack
     composites: Annotated[Names, _composites()] = CircuitSpec.composites
     side_conditions: Annotated[Names, _conditions()] = CircuitSpec.side_conditions
+    resistor_family: Annotated[tuple[str, ...], _families()] = CircuitSpec.resistor_family
+    capacitor_family: Annotated[tuple[str, ...], _families()] = CircuitSpec.capacitor_family

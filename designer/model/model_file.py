@@ -25,7 +25,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.inside_folder import inside
 from designer.base.schema import (
     STRICT,
@@ -38,7 +38,9 @@ from designer.base.schema import (
     parse_toml,
     physical,
 )
+from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
+from designer.catalog.entries import Kind
 from designer.model.board_table import BoardSpec, BoardTable
 from designer.model.circuit_table import CircuitSpec, CircuitTable
 from designer.model.measured_values import Measured, read_measured
@@ -85,6 +87,22 @@ class ModelFile:
         """Hash of the text: two files with the same hash ask for the same thing."""
         return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
 
+    def choices(self, catalog: Catalog) -> Catalog:
+        """The catalogue with what this file lets parts be bought from: cases and families.
+
+        Raises
+        ------
+        InputError : a family that the catalogue does not have; names this file and the known ones.
+        """
+        asked: dict[Kind, tuple[str, ...]] = {
+            "resistor": self.circuit.resistor_family,
+            "capacitor": self.circuit.capacitor_family,
+        }
+        try:
+            return catalog.mounted(self.board.mounting).bought_from(asked)
+        except InputError as error:
+            raise InputError(self.source, error.field, error.found, error.expected) from None
+
 
 def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
     """Read and check a model file, and the list of measured values that it names, if any.
@@ -105,7 +123,7 @@ def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise InputError(path, "the file", "nothing", "a model file (TOML)") from None
+        raise InputError(path, "the file", MISSING, "a model file (TOML)") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(path, "the file", reason, "a model file that can be read") from None
@@ -185,7 +203,7 @@ def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical 
         if error.file is not None:
             raise
         raise InputError(file, error.field, error.found, error.expected) from None
-    raise InputError(file, "model", "nothing", "a table [model] or a table [mechanical]")
+    raise InputError(file, "model", MISSING, "a table [model] or a table [mechanical]")
 
 
 # Which quantity of Eq. (1)-(2) to look at when a dimensionless one leaves its domain.
@@ -292,7 +310,7 @@ def need_responses(modelfile: ModelFile, more: str = "") -> None:
         raise InputError(
             str(modelfile.source) if modelfile.source else None,
             "response",
-            "nothing",
+            MISSING,
             f"at least one table [[response]]{more}",
         )
 

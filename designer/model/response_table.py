@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NoReturn
 
 from pydantic import BaseModel
 
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.schema import STRICT, Accepts, choice, flag, number, physical, shown, span
 from designer.model.model import Mechanical
 
@@ -88,7 +88,7 @@ def response_of(
         if not 0.0 < omega < math.inf:
             refuse("Omega", table.Omega, "a frequency within the range of numbers")
     elif table.omega is None:
-        refuse("omega", "nothing", _OMEGA + ("" if mechanical is None else ", or Omega in rad/s"))
+        refuse("omega", MISSING, _OMEGA + ("" if mechanical is None else ", or Omega in rad/s"))
     if table.twin == "exact" and table.expect is None:
         refuse("twin", shown(table.twin), "an expect that it can apply to")
     assert not isinstance(omega, str)

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.schema import STRICT, Accepts, line, number, one_of, span
 from designer.base.units import parse_quantity
 from designer.model.distributions import Binned, Law, Normal, Uniform
@@ -285,7 +285,7 @@ class SpreadTable(BaseModel):
         """
         for number_, rule in enumerate(self.network, start=1):
             if (rule.share is None) is (rule.family is None):
-                found = "nothing" if rule.share is None else "share and family"
+                found = MISSING if rule.share is None else "share and family"
                 expected = "a share, or the family of arrays that it is bought from"
                 raise InputError(file, f"spread.network[{number_}].share", found, expected)
         for key, shape, grade in (

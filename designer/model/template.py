@@ -61,6 +61,8 @@ resistors = "E96"               # a series, or several: ["E24", "E96"]
 capacitors = "E12"
 resistor_grade = 0.01           # 1 %
 capacitor_grade = 0.01
+# resistor_family = "Yageo RC0603FR-07" # bought from this family alone; or from a list of them
+# capacitor_family = ["!KEMET C0603 F 50 V"] # with "!" in front of each: from every other one
 resistor_range = ["1k", "1M"]
 capacitor_range = ["1nF", "1µF"]
 frequency = [50, 1000]          # Hz, where omega = 1 may lie

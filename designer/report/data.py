@@ -16,6 +16,7 @@ from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model_file import ModelFile
 from designer.report.layers import Layers
+from designer.spread.part_grades import BetterGrade, better_grades
 from designer.yields.joint_yield import all_on_one
 from designer.yields.ngspice_sampling import Hearing
 from designer.yields.verdict import Answer, StudyPlan, Yield
@@ -36,6 +37,7 @@ class ReportData:
     heard : what ngspice said about boards of the study. layers : what else the study has.
     starts : how to start each response, from ``setup.csv``; empty where there is none. board : the
     circuit with its fittings, to be drawn; None for no drawing. pins : of its op-amps.
+    better_grades : parts that are bought at a better grade than was asked for.
     """
 
     modelfile: ModelFile
@@ -53,6 +55,7 @@ class ReportData:
     starts: tuple[str, ...] = ()
     board: Circuit | None = None
     pins: Numbers = field(default_factory=dict)
+    better_grades: Mapping[str, BetterGrade] = field(default_factory=dict)
 
     @classmethod
     def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
@@ -74,6 +77,7 @@ class ReportData:
             starts=tuple(starts),
             board=circuit,
             pins=pin_numbers(found),
+            better_grades=better_grades(result.modelfile, result.design.circuit, result.catalog),
             layers=Layers(
                 tuned=result.study.tuned,
                 trimmed=result.study.trimmed,

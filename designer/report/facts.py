@@ -11,6 +11,7 @@ from designer.model.sketch import sketch
 from designer.report import design_tables, model_page, tables, tolerance, words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
+from designer.spread.part_grades import better_grades_text
 from designer.yields.verdict import Yield
 
 FORMAT = 1
@@ -237,11 +238,13 @@ def _settings_note(data: ReportData) -> str:
 
 def _parts_note(data: ReportData) -> str:
     c = data.design.circuit
+    better = better_grades_text(data.better_grades)
     return (
         f"Supply ± {c.supply:g} V, op-amp output limits ± {c.saturation:g} V nominal. "
         f"{words.plural(len(c.sections), 'section')} of {c.opamp} in "
         f"{words.plural(len(c.packages), 'package')}; {len(c.resistors)} resistors, "
         f"{len(c.capacitors)} capacitors, {data.design.distinct_values} different values."
+        + (f" {better}" if better else "")
     )
 
 

@@ -37,7 +37,11 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         said.append(f"temperature uniform from {low:g} to {high:g} °C")
     if spread.ageing:
         said.append(f"ageing of {_ageing(spread)}")
-    own = sorted({*spread.grades, *spread.shapes}, key=natural)
+    better = sorted(spread.asked, key=natural)
+    for grade in sorted({spread.grades[name] for name in better}):
+        names = ", ".join(name for name in better if spread.grades[name] == grade)
+        said.append(f"bought, and drawn, at a better grade of {_percent(grade)}: {names}")
+    own = sorted({*spread.grades, *spread.shapes} - {*better}, key=natural)
     said += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
     networks = [g for g in spread.groups if not g.reel]
     said += [f"{', '.join(g.parts)} share {_percent(g.share)} of a deviation" for g in networks]

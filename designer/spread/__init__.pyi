@@ -17,10 +17,22 @@ from .board_quantities import (
     with_column as with_column,
 )
 from .part_grades import (
+    BetterGrade as BetterGrade,
+)
+from .part_grades import (
     arrays as arrays,
 )
 from .part_grades import (
+    better_grades as better_grades,
+)
+from .part_grades import (
+    better_grades_text as better_grades_text,
+)
+from .part_grades import (
     bought as bought,
+)
+from .part_grades import (
+    once_otherwise as once_otherwise,
 )
 from .part_rules import (
     check_names as check_names,

@@ -1,8 +1,16 @@
-"""How each part is bought, where it is not as the others of its kind: its grade, its array."""
+"""How each part is bought, where it is not as the others of its kind: its grade, its array.
+
+What is bought of a value at a grade is ``Catalog.sold``'s to say: a study draws each part at the
+grade of that (``spread.part_rules``), and the bill of materials lists that.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 from designer.base.errors import Unreachable
+from designer.base.natural_sort import natural
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind
 from designer.circuit.netlist import Capacitor, Circuit, Resistor
@@ -11,14 +19,83 @@ from designer.model.model_file import ModelFile
 from designer.spread.part_rules import spread_of
 
 
+@dataclass(frozen=True)
+class BetterGrade:
+    """A part of which nobody sells the value at the grade that was asked for; fractions.
+
+    asked : the grade that was asked for. bought : the grade that it is bought and drawn at.
+    """
+
+    asked: float
+    bought: float
+
+
+def better_grades(
+    modelfile: ModelFile, circuit: Circuit, catalog: Catalog
+) -> dict[str, BetterGrade]:
+    """The parts that are bought, and drawn, at a better grade than was asked for, by name."""
+    spread = spread_of(modelfile, circuit, catalog)
+    return {
+        name: BetterGrade(asked, spread.grades[name])
+        for name, asked in sorted(spread.asked.items(), key=lambda item: natural(item[0]))
+    }
+
+
+def better_grades_text(better: Mapping[str, BetterGrade]) -> str:
+    """One sentence on these parts, by grade; "" where there are none."""
+    groups: dict[BetterGrade, list[str]] = {}
+    for name, grade in better.items():
+        groups.setdefault(grade, []).append(name)
+    listed = [
+        f"{' '.join(names)} ({100 * g.bought:g} % for {100 * g.asked:g} %)"
+        for g, names in groups.items()
+    ]
+    if not listed:
+        return ""
+    return (
+        "Nobody sells these values at the grade that was asked for, so they are bought, and drawn, "
+        f"at a better one: {', '.join(listed)}."
+    )
+
+
+def once_otherwise(modelfile: ModelFile, catalog: Catalog) -> bool:
+    """Whether folders of this file may hold a bill of other grades than their study drew.
+
+    They were once made so: the cheapest part of the grade or a better one was bought, and the grade
+    that was asked for was drawn.
+    """
+    catalog, spec = modelfile.choices(catalog), modelfile.circuit
+    ways: tuple[tuple[Kind, tuple[str, ...], tuple[float, float], float], ...] = (
+        ("resistor", spec.resistors, spec.resistor_range, spec.resistor_grade),
+        ("capacitor", spec.capacitors, spec.capacitor_range, spec.capacitor_grade),
+    )
+    for kind, series, between, usual in ways:
+        stated = {
+            rule.grade
+            for rule in modelfile.spread.part
+            if rule.grade and any(name[0].upper() == kind[0].upper() for name in rule.names)
+        }
+        for grade in sorted({usual, *stated}):
+            try:
+                values = catalog.values(kind, series, *between, grade)
+            except Unreachable:
+                continue
+            for value in values.tolist():
+                cheapest = catalog.cheapest(kind, value, grade)
+                if cheapest is not None and cheapest.family.grade != grade:
+                    return True
+    return False
+
+
 def bought(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> dict[str, float]:
-    """By name, the grades that ``[[spread.part]]`` states for resistors and capacitors.
+    """By name, the grades that are asked for of single resistors and capacitors.
 
     A grade that nobody sells the value at (0 for an exact part, or one that was picked out on the
     bench) is for the study alone: the part is then bought as the others of its kind are. Elements
     of arrays are not bought one by one.
     """
-    stated = spread_of(modelfile, circuit, catalog).grades
+    spread = spread_of(modelfile, circuit, catalog)
+    stated = {**spread.grades, **spread.asked}
     inside = {name for a in arrays(modelfile, circuit, catalog) for name in a.parts}
     found = {}
     parts: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)
@@ -27,11 +104,8 @@ def bought(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> dict[str
         if grade is None or part.name in inside:
             continue
         kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
-        try:
-            catalog.part(kind, part.value, grade)
-        except Unreachable:
-            continue
-        found[part.name] = grade
+        if catalog.sold(kind, part.value, grade) is not None:
+            found[part.name] = grade
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -69,7 +70,11 @@ class _Rules:
             p.name: p for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)
         }
         self.own = dict(self._own())
-        self.own |= dict(self._of_arrays())
+        arrays = dict(self._of_arrays())
+        self.own |= arrays
+        self.elements = frozenset(arrays)
+        self.drawn = {name: self._drawn(part) for name, part in self.parts.items()}
+        self.asked = self._asked()
 
     def spread(self) -> Spread:
         rules, choice = self.rules, self.choice
@@ -98,6 +103,7 @@ class _Rules:
             ageing=self.ageing(),
             groups=(*self.networks(), *self.reels()),
             measured=measured,
+            asked=self.asked,
         )
 
     def refuse(self, key: str, found: object, expected: str) -> InputError:
@@ -178,6 +184,7 @@ class _Rules:
                 raise self.refuse(field, name, one_of(name, [*kinds, *pairs, *self.parts]))
 
     def grade(self, part: Part, rule: PartRule | None) -> float:
+        """The grade that is asked for."""
         if rule is not None and rule.grade is not None:
             return rule.grade
         if isinstance(part, Reference):
@@ -194,20 +201,48 @@ class _Rules:
             return Shape()
         return self.rules.resistors if isinstance(part, Resistor) else self.rules.capacitors
 
+    def _drawn(self, part: Part) -> float:
+        """The grade that a part is drawn at: of what is bought where its grade is asked for.
+
+        A grade at which, or better, nobody sells the value is drawn as it is asked for, and so is
+        that of an array, whose elements are not bought one by one.
+        """
+        asked = self.grade(part, self.own.get(part.name))
+        if isinstance(part, Reference) or part.name in self.elements:
+            return asked
+        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
+        sold = self.catalog.sold(kind, part.value, asked)
+        if sold is None or math.isclose(sold.family.grade, asked, rel_tol=1e-9):
+            return asked
+        return sold.family.grade
+
+    def _asked(self) -> dict[str, float]:
+        """The grade asked for, of the parts that are bought at a better one."""
+        asked = {n: self.grade(part, self.own.get(n)) for n, part in self.parts.items()}
+        return {name: grade for name, grade in asked.items() if grade != self.drawn[name]}
+
     def grades(self) -> dict[str, float]:
-        """Of the parts for which one is stated."""
+        """Of the parts for which one is stated, and of those that are bought at a better one."""
         named = [name for name, rule in self.own.items() if rule.grade is not None]
         if self.rules.reference_grade is not None:
             named += [r.name for r in self.circuit.references]
-        return {name: self.grade(self.parts[name], self.own.get(name)) for name in named}
+        return {name: self.drawn[name] for name in (*named, *self.asked)}
 
     def shapes(self) -> dict[str, Law]:
-        """Over the grade, of the parts for which one is stated."""
+        """Over the grade, of the parts for which one is stated.
+
+        A binned law is about the grade that was asked for: a part that is bought at a better one
+        lies in what was picked out, if that reaches so far.
+        """
         found = {}
-        for name, rule in self.own.items():
-            part = self.parts[name]
-            if rule.law is not None or rule.grade is not None:
-                found[name] = self.shape(part, rule).over(self.grade(part, rule))
+        for name, part in self.parts.items():
+            rule, grade = self.own.get(name), self.drawn[name]
+            shape = self.shape(part, rule)
+            stated = rule is not None and (rule.law is not None or rule.grade is not None)
+            if name in self.asked and shape.law == "binned":
+                found[name] = (Shape() if shape.inner >= grade else shape).over(grade)
+            elif stated:
+                found[name] = shape.over(grade)
         return found
 
     def tempco(self) -> dict[str, Law]:

@@ -70,6 +70,8 @@ class Spread:
     grades, shapes : of the parts that have their own. temperature : range [°C] of the board.
     tempco [1/K], ageing (relative) : by part; tempco counts where there is a temperature.
     groups : parts that track. measured : a bench's list, which goes before anything drawn.
+    asked : the grade that was asked for, of the parts that are drawn at a better one because
+    nobody sells their value at it (``Catalog.part``); what they are drawn at stands in ``grades``.
     """
 
     resistor: float
@@ -90,6 +92,7 @@ class Spread:
     ageing: Mapping[str, Law] = field(default_factory=dict)
     groups: tuple[Group, ...] = ()
     measured: Measured | None = None
+    asked: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:
@@ -98,22 +101,42 @@ class Spread:
 
     @property
     def name(self) -> str:
-        """``bench-1`` where nothing is added to it."""
-        plain = Spread(self.resistor, self.capacitor, self.offset_sigma, self.offset_limit)
+        """``bench-1`` where nothing is added to it; the grade of each part is that of what is
+        bought."""
+        plain = Spread(
+            self.resistor,
+            self.capacitor,
+            self.offset_sigma,
+            self.offset_limit,
+            grades={name: self.grades[name] for name in self.asked},
+            asked=self.asked,
+        )
         return NAME if self == plain else "model file"
 
     def as_dict(self) -> dict[str, Any]:
         """Everything that decides the boards, as JSON holds it."""
         return {"name": self.name} | {
-            f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)
+            f.name: _plain(getattr(self, f.name))
+            for f in dataclasses.fields(self)
+            if f.name != "asked"  # ``grades`` holds what is drawn
         }
 
     def with_grades(self, resistor: float | None = None, capacitor: float | None = None) -> Spread:
-        """The same spread with parts of another grade; those with a grade of their own keep it."""
+        """The same spread with parts of another grade, whether it is sold or not; those with a
+        grade of their own keep it."""
+        usual = {"R": self.resistor, "C": self.capacitor}
+        given = {"R": resistor, "C": capacitor}
+        moved = {
+            name
+            for name, asked in self.asked.items()
+            if given[name[0]] is not None and asked == usual[name[0]]
+        }
         return replace(
             self,
             resistor=self.resistor if resistor is None else resistor,
             capacitor=self.capacitor if capacitor is None else capacitor,
+            grades={name: grade for name, grade in self.grades.items() if name not in moved},
+            asked={name: grade for name, grade in self.asked.items() if name not in moved},
         )
 
     def coordinates(self, circuit: Circuit) -> tuple[str, ...]:

@@ -99,9 +99,9 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
     InputError : an unknown part of the catalogue or of the circuit, or a choice of the contract
         that this version does not build.
     """
-    opamp = catalog.opamp(spec.opamp)
+    opamp = catalog.opamp(spec.opamp, spec.supply)
     low, high = opamp.supply.min or 0.0, opamp.supply.max or np.inf
-    if not low <= spec.supply <= high:
+    if not opamp.takes(spec.supply):
         raise InputError(
             None, "circuit.supply", spec.supply, f"{low:g} to {high:g} V, the rails of {opamp.name}"
         )

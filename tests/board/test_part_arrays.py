@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from designer.base.errors import InputError, Unreachable
+from designer.base.errors import MISSING, InputError, Unreachable
 from designer.base.toml_writer import toml_text
 from designer.base.views import View
 from designer.board import board_notes
@@ -155,7 +155,7 @@ def test_what_no_array_can_be_is_refused(base: Synthesis) -> None:
 
     both = refused({"parts": list(four), "family": NAME, "share": 0.5})
     assert (both.field, both.found) == ("spread.network[1].share", "share and family")
-    assert refused({"parts": list(four)}).found == "nothing"
+    assert refused({"parts": list(four)}).found is MISSING
     assert refused({"parts": list(four), "family": "no such"}).field == "spread.network[1].family"
     unequal = refused({"parts": [four[0], other], "family": NAME})
     assert unequal.field in ("spread.network[1].parts", "spread.network[1].family")

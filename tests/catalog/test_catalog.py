@@ -14,11 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from designer.base.errors import InputError, Unreachable
+from designer.base.errors import InputError, InputErrors, Unreachable
 from designer.base.eseries import SERIES, eseries, series_values
 from designer.base.units import decode_value
-from designer.catalog.catalog import ENVIRONMENT, Catalog, load_catalog
+from designer.catalog.catalog import Catalog, load_catalog
 from designer.catalog.entries import PRICE_CLASSES, Figure, OpAmp
+from designer.catalog.folders import ENVIRONMENT
 
 SHIPPED = Path(__file__).resolve().parents[2] / "catalogs"
 
@@ -230,16 +231,19 @@ def test_published_numbers_both_ways(
 
 
 @given(data=st.data())
-def test_a_part_is_the_cheapest_that_fits(catalog: Catalog, data: st.DataObject) -> None:
+def test_a_part_is_the_cheapest_of_the_grade_or_a_better_one(
+    catalog: Catalog, data: st.DataObject
+) -> None:
     signal = [f for f in catalog.families if f.use == "signal"]
     family = data.draw(st.sampled_from(signal))
     value = data.draw(st.sampled_from(family.values))
-    grade = data.draw(st.floats(min_value=family.grade, max_value=0.2))
+    grade = family.grade * data.draw(st.one_of(st.just(1.0), st.floats(1.0, 20.0)))
     part = catalog.part(family.kind, value, grade)
     assert part.value == value
-    assert part.price <= family.price
-    others = [f for f in signal if f.kind == family.kind and value in f.values]
-    cheapest = min((f.price, f.grade) for f in others if f.grade <= grade)
+    fitting = [f for f in signal if f.kind == family.kind and value in f.values]
+    fitting = [f for f in fitting if f.grade <= grade]
+    same = [f for f in fitting if f.grade == grade]
+    cheapest = min((f.price, f.grade) for f in same or fitting)
     assert (part.price, part.family.grade) == cheapest
     assert (part.manufacturer, part.footprint) == (part.family.manufacturer, part.family.footprint)
     # The same value, a rounding error away.
@@ -399,9 +403,11 @@ def own_opamp(offset: str) -> str:
 
 def test_a_folder_of_ones_own_adds_parts(tmp_path: Path, catalog: Catalog) -> None:
     mine = load_catalog(folder(tmp_path / "mine", "format = 1\n" + FAMILY))
-    part = mine.part("capacitor", 10e-9, 0.01)
+    part = mine.part("capacitor", 10e-9, 0.002)
     assert part.part_number == "drawer-10n"
     assert part.family.grade == 0.002
+    # Where 1 % is asked for, 1 % is bought, and the drawer's where nobody has that.
+    assert mine.part("capacitor", 10e-9, 0.01) == catalog.part("capacitor", 10e-9, 0.01)
     # 13 nF is no E12 value: it can be asked for by name, but no series holds it.
     assert mine.part("capacitor", 13e-9, 0.01).part_number == "drawer-13n"
     assert mine.values("capacitor", ["E12"], 1e-9, 1e-6, 0.002).tolist() == [10e-9, 22e-9]
@@ -584,20 +590,20 @@ def test_a_code_that_cannot_spell_a_value(tmp_path: Path) -> None:
         (
             'typ = "3 mV", max = "10 mV", source',
             'tpy = "3 mV", source',
-            "offset",
-            "unknown key tpy",
+            "offset.tpy",
+            'did you mean "typ"?',
         ),
         ('typ = "3 mV", max = "10 mV", source', "source", "offset", "at least one number"),
-        ('typ = "3 mV", max', 'typ = "3 mA", max', "offset", "in V"),
-        (', source = "SLOS080V 6.8, magnitude"', "", "offset", "source says"),
-        ("assumed = true", "assumed = 1", "saturation", "true or false"),
+        ('typ = "3 mV", max', 'typ = "3 mA", max', "offset.typ", "in V"),
+        (', source = "SLOS080V 6.8, magnitude"', "", "offset.source", "where the figure stands"),
+        ("assumed = true", "assumed = 1", "saturation.assumed", "true or false"),
         ("offset_limit", "offset_limits", "offset_limits", 'did you mean "offset_limit"?'),
         ('supply_pins = ["4", "11"]', 'supply_pins = ["4"]', "supply_pins", "two pins"),
         ('supply_pins = ["4", "11"]', "supply_pins = [4, 11]", "supply_pins", "two pins"),
         ('output = "1"', 'output = "2"', "section", "used once"),
         ('name = "B"', 'name = "A"', "section.name", "used once"),
         ('noninverting = "3"', "noninverting = 3", "section[1].noninverting", "in quotes"),
-        ("gain = { min = 25e3", 'gain = { min = "lots"', "gain", "V/V"),
+        ("gain = { min = 25e3", 'gain = { min = "lots"', "gain.min", "V/V"),
         ("rated_supply", "rated_suply", "rated_suply", 'did you mean "rated_supply"?'),
     ],
 )
@@ -611,6 +617,102 @@ def test_wrong_opamps_are_named(
         load_catalog(mine)
     assert caught.value.field == f"opamp[1].{field}"
     assert expected in caught.value.expected
+
+
+# Everything that is wrong, at once.
+
+
+def lines_of(error: InputError) -> list[str]:
+    return [line.partition(".toml: ")[2] or line for line in str(error).splitlines()]
+
+
+def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path: Path) -> None:
+    """Two families and an op-amp: misspelt, missing, out of range, and by the rules of its kind."""
+    wrong = FAMILY.replace('sources = ["measured"]', "").replace("price = 1", "price = 9")
+    wrong = wrong.replace("grade = 0.002", "garde = 0.002")
+    odd = FAMILY.replace('name = "drawer"', 'name = "other"').replace('"13nF"', '"1.05nF"')
+    odd = odd.replace('code = "plain"', 'code = "eia3"') + "elements = 4\n"
+    opamp = own_opamp("3 mV").removeprefix("format = 1\n")
+    for old, new in (
+        (', source = "SLOS080V 6.8, magnitude"', ""),
+        ('output = "1"', 'output = "2"'),
+        ("gain = { min = 25e3", 'gain = { mni = 1, min = "lots"'),
+    ):
+        assert old in opamp
+        opamp = opamp.replace(old, new, 1)
+    mine = folder(tmp_path / "mine", f"format = 1\n{wrong}{odd}{opamp}")
+    with pytest.raises(InputErrors) as caught:
+        load_catalog(mine)
+    said = lines_of(caught.value)
+    assert [line.partition(": found")[0].partition(" is missing")[0] for line in said] == [
+        "family[1].garde",
+        "family[1].price",
+        "family[1].sources",
+        "opamp[1].offset.source",
+        "opamp[1].gain.mni",
+        "opamp[1].gain.min",
+        "family[2].elements",
+        "family[2].part_number.code",
+    ]
+    assert "family[1].sources is missing, expected a list of data sheets" in said[2]
+    assert said[3].startswith("opamp[1].offset.source is missing, expected where the figure stands")
+    assert all(p.file == str(mine / "own.toml") for p in caught.value.problems)
+    assert caught.value.exit_status == 2
+
+
+def test_every_line_of_a_csv_file_is_read(tmp_path: Path) -> None:
+    head, row = CSV.splitlines()[0], CSV.splitlines()[1]
+    rows = [row.replace("thin film", ""), row.replace("1,", "2,", 1), f"{row},more", row]
+    mine = folder(tmp_path / "mine", "\n".join([head, *rows, ""]), "reels.csv")
+    with pytest.raises(InputError) as caught:
+        load_catalog(mine)
+    said = str(caught.value).splitlines()
+    assert [line.partition("reels.csv: ")[2].split(":")[0].split(" is")[0] for line in said] == [
+        "line 2.dielectric",
+        "line 3.format",
+        "line 4",
+    ]
+
+
+def test_long_lists_of_problems_are_counted(tmp_path: Path) -> None:
+    text = "format = 1\n" + FAMILY.replace("price = 1", "price = 9") * 40
+    with pytest.raises(InputErrors) as caught:
+        load_catalog(folder(tmp_path / "mine", text))
+    assert len(caught.value.problems) == 40
+    said = str(caught.value).splitlines()
+    assert (len(said), said[-1]) == (31, "and 10 more")
+
+
+def test_figures_may_carry_any_prefix_of_their_unit(tmp_path: Path) -> None:
+    """As data sheets write them, against the same figures as plain numbers."""
+    text = own_opamp("3 mV")
+    plain = load_catalog(folder(tmp_path / "plain", text)).opamp("TL074C")
+    for key, written, bound, value in (
+        ("slew", '"9 V/µs"', "typ", 9e6),
+        ("gain", '"200 V/mV"', "typ", 200e3),
+        ("noise", '"0.02 µV/√Hz"', "typ", 2e-8),
+        ("gbw", '"5.25 MHz"', "typ", 5.25e6),
+        ("phase_margin", '"60 °"', "typ", 60.0),
+    ):
+        line = f'{key} = {{ {bound} = {written}, source = "a sheet" }}\n'
+        kept = [each for each in text.splitlines() if not each.startswith(f"{key} =")]
+        place = kept.index(next(each for each in kept if each.startswith("price =")))
+        mine = folder(tmp_path / key, "\n".join([*kept[:place], line, *kept[place:]]))
+        read = load_catalog(mine).opamp("TL074C")
+        assert getattr(read, key).nominal == value
+        assert read.offset == plain.offset
+
+
+def test_one_series_and_a_coefficient_in_ppm(tmp_path: Path) -> None:
+    text = FAMILY.replace(
+        'values = ["10nF", "13nF", 22e-9]', 'series = "E6"\nrange = ["1nF", "1µF"]'
+    )
+    for written in ('"300 ppm/K"', '"300e-6/K"', '"300 ppm/°C"', "300e-6"):
+        mine = folder(tmp_path / "mine", "format = 1\n" + text.replace("300e-6", written))
+        (family,) = [f for f in load_catalog(mine).families if f.name == "drawer"]
+        assert family.series == ("E6",)
+        assert family.values == tuple(series_values(["E6"], 1e-9, 1e-6).tolist())
+        assert family.temperature_coefficient == 300e-6
 
 
 def test_one_name_twice_in_a_folder(tmp_path: Path) -> None:

@@ -137,10 +137,10 @@ def test_limits_of_a_model_file() -> None:
     ("text", "said"),
     [
         ("[rules.swng]\nlimit = 1.0\nreason = 'x'", ["rules.swng", 'did you mean "swing"']),
-        ("[rules.swing]\nlimit = 12.0", ["rules.swing.reason", "nothing"]),
+        ("[rules.swing]\nlimit = 12.0", ["rules.swing.reason is missing"]),
         ("[rules.swing]\nlimit = 12.0\nreason = ' '", ["rules.swing.reason"]),
         ("[rules.swing]\nlimit = 12.0\nreason = 5", ["rules.swing.reason"]),
-        ("[rules.swing]\nreason = 'x'", ["rules.swing.limit", "nothing"]),
+        ("[rules.swing]\nreason = 'x'", ["rules.swing.limit is missing"]),
         ("[rules.swing]\nlimit = '12 A'\nreason = 'x'", ["rules.swing.limit", "in V"]),
         ("[rules.swing]\nlimit = -1.0\nreason = 'x'", ["rules.swing.limit", ">= 0"]),
         ("[rules.swing]\nlimit = nan\nreason = 'x'", ["rules.swing.limit"]),

@@ -141,9 +141,9 @@ WRONG = [
         "1.5",
         "from 0 to 1",
     ),
-    ('[[spread.network]]\nparts = ["R1"]', "spread.network[1].share", "nothing", "a share"),
+    ('[[spread.network]]\nparts = ["R1"]', "spread.network[1].share", "is missing", "a share"),
     ("[[spread.network]]\nparts = 3\nshare = 1", "spread.network[1].parts", "3", "a list"),
-    ("[[spread.part]]\ngrade = 0.1", "spread.part[1].names", "nothing", "a part such as"),
+    ("[[spread.part]]\ngrade = 0.1", "spread.part[1].names", "is missing", "a part such as"),
     ("[[spread.part]]\nnames = []", "spread.part[1].names", "[]", "a list of parts"),
     ('[[spread.part]]\nnames = ["R1", "R1"]', "spread.part[1].names", "R1", "once"),
     ('[[spread.part]]\nnames = "R1"\ngrade = -0.1', "spread.part[1].grade", "-0.1", "[0, 1)"),
@@ -160,7 +160,7 @@ def test_names_what_is_wrong(text: str, field: str, found: str, expected: str) -
     with pytest.raises(InputError) as caught:
         table(text)
     assert caught.value.field == field
-    assert found in str(caught.value.found)
+    assert found in str(caught.value)
     assert expected in caught.value.expected
 
 

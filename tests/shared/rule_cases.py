@@ -202,7 +202,13 @@ def _grade(grade: float) -> Subject:
     from tests.circuit.test_reduction import EXACT
 
     circuit = stage("saturation", "both", EXACT)
-    return Subject(made, circuit, base().components)
+    bought = [
+        replace(c, bought=replace(c.bought, grade=grade))
+        if c.kind == "resistor" and c.bought
+        else c
+        for c in base().components
+    ]
+    return Subject(made, circuit, bought)
 
 
 def _deviation() -> float:

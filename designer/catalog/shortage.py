@@ -1,0 +1,152 @@
+"""Why nothing of a catalogue will do, and what would: what its refusals say.
+
+A board takes parts of certain cases (``[board] mounting``), and a model file may forbid families
+(``[circuit] resistor_family``). What would do but for one of these is named with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from designer.base.errors import Unreachable
+from designer.base.eseries import series_values
+from designer.base.units import format_quantity
+from designer.catalog.entries import UNITS, Kind, Mounting, PartFamily
+
+CASES = {"smd": "surface-mounted", "tht": "through-hole"}
+"""What a board takes, in words."""
+MOST = 5
+"""Families that a message names before it counts the rest."""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """The families of one kind at a grade or better, and what keeps some of them from being bought.
+
+    families : all of them. mounting : the cases that the board takes. refused : names of those that
+    the model file forbids.
+    """
+
+    kind: Kind
+    grade: float
+    families: tuple[PartFamily, ...]
+    mounting: Mounting
+    refused: frozenset[str]
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return UNITS[self.kind]
+
+    def bars(self, family: PartFamily) -> bool:
+        """Whether it may not be bought here."""
+        cased = self.mounting in ("mixed", family.mounting)
+        return family.name in self.refused or not cased
+
+    @property
+    def values(self) -> list[float]:
+        """What may be bought, ascending."""
+        return sorted({v for f in self.families if not self.bars(f) for v in f.values})
+
+    def reason(self, families: Sequence[PartFamily]) -> str:
+        """What keeps these from being bought, after a semicolon; "" where nothing does."""
+        forbidden = [f for f in families if f.name in self.refused]
+        cased = [f for f in families if self.bars(f) and f not in forbidden]
+        said = ""
+        if cased:
+            has = "has" if len(cased) == 1 else "have"
+            said += f"; {_listed(cased)} {has} no {CASES[self.mounting]} form"
+        if forbidden:
+            said += f"; circuit.{self.kind}_family leaves out {_listed(forbidden)}"
+        return said
+
+
+def _listed(families: Sequence[PartFamily]) -> str:
+    """Families with their grades and the ranges of their values."""
+    shown = []
+    for f in families[:MOST]:
+        low, high = (format_quantity(end, UNITS[f.kind]) for end in f.range)
+        shown.append(f"{f.name} ({100 * f.grade:g} %, {low} to {high})")
+    more = f" and {len(families) - MOST} more" if len(families) > MOST else ""
+    return ", ".join(shown) + more
+
+
+def no_values(
+    offer: Offer, series: Sequence[str], limits: tuple[float, float], others: Offer
+) -> Unreachable:
+    """No value of the series within the limits can be bought: grade, range or series binds.
+
+    others : the offer at any grade.
+    """
+    kind, grade = offer.kind, offer.grade
+    wanted = set(series_values(series, *limits).tolist())
+    barred = offer.reason([f for f in offer.families if wanted & set(f.values)])
+    values = offer.values
+    if not others.values:
+        return _nothing(others)
+    if not values:
+        expected = best_grade(others) + (barred or offer.reason(offer.families))
+        return Unreachable(None, f"circuit.{kind}_grade", grade, expected)
+    on_series = [value for value in values if value in series_values(series, value, value)]
+    if not on_series:
+        expected = "a series of which values can be bought"
+        return Unreachable(None, f"circuit.{kind}s", ", ".join(series), expected)
+    low, high = (format_quantity(end, offer.unit) for end in limits)
+    first, last = (format_quantity(end, offer.unit) for end in (on_series[0], on_series[-1]))
+    expected = f"a range with values that can be bought at {grade:.4g}: within {first} to {last}"
+    return Unreachable(None, f"circuit.{kind}_range", f"{low} to {high}", expected + barred)
+
+
+def _nothing(others: Offer) -> Unreachable:
+    """No part of the kind can be bought at any grade: the model file's families, or the cases."""
+    kind, refused = others.kind, others.refused
+    would = [f for f in others.families if others.mounting in ("mixed", f.mounting)]
+    if would:
+        named = [f for f in others.families if f.name not in refused]
+        found = f"nothing but {_listed(named)}" if named else "every family forbidden"
+        expected = f"families that the board takes, such as {_listed(would)}"
+        reason = others.reason(named)
+        return Unreachable(None, f"circuit.{kind}_family", found, expected + reason)
+    if others.families:
+        expected = f'"mixed", or {kind}s in the catalogue that have such a case'
+        reason = others.reason(others.families)
+        return Unreachable(None, "board.mounting", others.mounting, expected + reason)
+    return Unreachable(None, f"circuit.{kind}s", "a catalogue without any", f"a family of {kind}s")
+
+
+def no_part(
+    offer: Offer, value: float, holding: Sequence[PartFamily], others: Offer
+) -> Unreachable:
+    """One value cannot be bought at the grade.
+
+    holding : families of the offer that have it, none of which may be bought. others : the offer
+    at any grade.
+    """
+    near = sorted(offer.values, key=lambda each: abs(math.log(each / value)))[:2]
+    shown = " or ".join(format_quantity(each, offer.unit) for each in sorted(near))
+    if not others.values:
+        return _nothing(others)
+    expected = (
+        f"a value that can be bought at this grade, such as {shown}"
+        if near
+        else f"a grade that can be bought: {best_grade(others)}"
+    )
+    found = f"{format_quantity(value, offer.unit)} at {offer.grade:.4g}"
+    return Unreachable(None, offer.kind, found, expected + offer.reason(holding))
+
+
+def best_grade(offer: Offer) -> str:
+    """The grades that may be bought, in words; some may."""
+    return f"{min(f.grade for f in offer.families if not offer.bars(f)):.4g} or more"
+
+
+def other_case(name: str, mounting: Mounting, sold: str, what: str, others: Sequence[str]) -> str:
+    """What would do where a part is sold in no case that the board takes.
+
+    sold : the mounting that it is sold in. what : parts of its sort, in words; others : the names
+    of those that have such a case.
+    """
+    instead = f"{what} that have one: {', '.join(others) or 'none'}"
+    return f'"{sold}" or "mixed": {name} has no {CASES[mounting]} case in the catalogue; {instead}'
