@@ -17,6 +17,8 @@ StageName = Literal[
     "search",
     "design",
     "kicad",
+    "deck-ltspice",
+    "deck-portable",
     "study",
     "comparison",
     "trade",
@@ -30,6 +32,8 @@ StageName = Literal[
 STAGES: tuple[StageName, ...] = get_args(StageName)
 OF_DESIGN: tuple[StageName, ...] = (
     "kicad",
+    "deck-ltspice",
+    "deck-portable",
     "study",
     "comparison",
     "trade",

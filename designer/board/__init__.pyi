@@ -38,10 +38,16 @@ from .kicad_footprint import (
     FILE_VERSION as FILE_VERSION,
 )
 from .kicad_names import (
+    LIBRARY as LIBRARY,
+)
+from .kicad_names import (
     POWER as POWER,
 )
 from .kicad_names import (
     circuit_net as circuit_net,
+)
+from .kicad_names import (
+    footprint_name as footprint_name,
 )
 from .kicad_names import (
     identifier as identifier,
@@ -53,7 +59,13 @@ from .kicad_project import (
     files as files,
 )
 from .kicad_reader import (
+    PART_NUMBER as PART_NUMBER,
+)
+from .kicad_reader import (
     BoardFile as BoardFile,
+)
+from .kicad_reader import (
+    Footprint as Footprint,
 )
 from .kicad_reader import (
     check_belongs as check_belongs,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,18 +17,9 @@ from designer.board.kicad_netlist import netlist
 from designer.board.kicad_placement import place
 from designer.board.kicad_sheet import layout, schematic, shapes, sheet_id
 from designer.board.kicad_symbols import library
+from designer.board.net_classes import net_settings
 from designer.check.first_responses import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
-
-SUMMING, SUPPLY = "summing", "supply"
-"""Net classes beside the default: an op-amp's inverting input; ground and the rails."""
-CLASSES: Mapping[str, Mapping[str, float]] = {
-    "Default": {"clearance": 0.2, "track_width": 0.25},
-    SUMMING: {"clearance": 0.3, "track_width": 0.2},
-    SUPPLY: {"clearance": 0.2, "track_width": 0.5},
-}
-"""Millimetres."""
-VIA: Mapping[str, float] = {"via_diameter": 0.6, "via_drill": 0.3}
 
 
 @dataclass(frozen=True)
@@ -83,16 +73,11 @@ def files(project: Project) -> dict[str, str]:
 def settings(name: str, circuit: Circuit) -> str:
     """The file ``.kicad_pro``: net classes, and which nets are in them."""
     summing = sorted({s.inverting for s in circuit.sections} - {GROUND})
-    patterns = [(SUMMING, kicad_net(net)) for net in summing]
-    patterns += [(SUPPLY, kicad_net(net)) for net in (GROUND, POSITIVE, NEGATIVE)]
+    supply = (GROUND, POSITIVE, NEGATIVE)
     value: dict[str, Any] = {
         "board": {"design_settings": {"defaults": {}, "rules": {}, "track_widths": []}},
         "meta": {"filename": f"{name}.kicad_pro", "version": 3},
-        "net_settings": {
-            "classes": [{"name": n, **width, **VIA} for n, width in CLASSES.items()],
-            "meta": {"version": 4},
-            "netclass_patterns": [{"netclass": n, "pattern": p} for n, p in patterns],
-        },
+        "net_settings": net_settings(map(kicad_net, summing), map(kicad_net, supply)),
         "schematic": {"legacy_lib_dir": "", "legacy_lib_list": []},
         "sheets": [[sheet_id(name), "Root"]],
         "text_variables": {},

@@ -13,7 +13,6 @@ from pathlib import Path
 from designer.base.errors import InputError
 from designer.base.natural_sort import natural
 from designer.base.sexpr import Expression, read
-from designer.base.units import parse_quantity
 from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_footprint import FILE_VERSION
@@ -28,6 +27,8 @@ LARGEST = 50_000_000
 SHOWN = 5
 """Differences that a message lists."""
 COURTYARDS = ("F.CrtYd", "B.CrtYd")
+PART_NUMBER = "MPN"
+"""The field that has a part's number, on the sheet and on the board."""
 EXPECTED = "a board of KiCad 7 to 9 (.kicad_pcb)"
 Point = tuple[float, float]
 
@@ -48,12 +49,20 @@ class Pad:
 
 @dataclass(frozen=True)
 class Footprint:
-    """reference : its designator. value : as written. courtyard : whether it has one."""
+    """reference : its designator. value : as written. courtyard : whether it has one.
+
+    library, name : of the footprint; library is "" where none is written. part_number : the field
+    ``MPN``, None where there is none. fitted : False where it is marked DNP.
+    """
 
     reference: str
     value: str
     pads: tuple[Pad, ...]
     courtyard: bool
+    library: str
+    name: str
+    part_number: str | None
+    fitted: bool
 
     @property
     def wired(self) -> bool:
@@ -85,9 +94,19 @@ class BoardFile:
     zones: tuple[str, ...]
     outline: Outline
 
+    def footprint(self, reference: str) -> Footprint | None:
+        """That of one component."""
+        return next((f for f in self.footprints if f.reference == reference), None)
+
     def pads(self, reference: str) -> tuple[Pad, ...]:
         """Pads of one component."""
-        return next((f.pads for f in self.footprints if f.reference == reference), ())
+        footprint = self.footprint(reference)
+        return () if footprint is None else footprint.pads
+
+    @property
+    def copper(self) -> bool:
+        """Whether anything is routed: a track, a via or a zone."""
+        return bool(self.tracks or self.vias or self.zones)
 
     @property
     def routed(self) -> frozenset[str]:
@@ -131,13 +150,14 @@ def read_board(path: Path) -> BoardFile:
 
 
 def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
-    """Whether a board is one of these components, of their values, on these nets.
+    """Whether a board is one of these components on these nets.
 
-    Footprints without any net, such as mounting holes, may be there besides.
+    Footprints without any net, such as mounting holes, may be there besides. Whether the parts are
+    the design's is for the rules on parts to say.
 
     Raises
     ------
-    InputError : designators, nets or values differ; says which.
+    InputError : designators or nets differ; says which.
     """
     wanted = {c.reference: c for c in components if View.BOARD in c.views}
     there: dict[str, Footprint] = {}
@@ -164,24 +184,6 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
                 differ.append(f"{reference}.{number} on {found}, not on {net or 'no net'}")
     if differ:
         raise InputError(board.path, "nets", _few(differ, "; "), "the nets of this design")
-    other = [
-        f"{reference} is {there[reference].value or 'nothing'}, not {component.value}"
-        for reference, component in wanted.items()
-        if not _same_value(there[reference].value, component)
-    ]
-    if other:
-        raise InputError(board.path, "values", _few(other), "the values of this design")
-
-
-def _same_value(words: str, component: Component) -> bool:
-    """Whether a resistor or a capacitor has its value, however that is written."""
-    unit = {"resistor": "Ω", "capacitor": "F"}.get(component.kind)
-    if unit is None or component.quantity is None:
-        return True
-    try:
-        return math.isclose(parse_quantity(words, unit), component.quantity, rel_tol=1e-6)
-    except ValueError:
-        return False
 
 
 def _few(words: Sequence[str], between: str = ", ") -> str:
@@ -211,22 +213,29 @@ def _footprint(found: Expression) -> Footprint:
     at = found.get("at")
     x, y = at.number(0), at.number(1)
     turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
+    library, _, name = found.text(0).rpartition(":")
     return Footprint(
-        _field(found, "Reference"),
-        _field(found, "Value"),
-        tuple(_pad(pad, (x, y), turn) for pad in found.all("pad")),
-        any(layer.text() in COURTYARDS for each in found.children for layer in each.all("layer")),
+        reference=_field(found, "Reference") or "",
+        value=_field(found, "Value") or "",
+        pads=tuple(_pad(pad, (x, y), turn) for pad in found.all("pad")),
+        courtyard=any(
+            layer.text() in COURTYARDS for each in found.children for layer in each.all("layer")
+        ),
+        library=library,
+        name=name,
+        part_number=_field(found, PART_NUMBER),
+        fitted=not any("dnp" in each.atoms for each in found.all("attr")),
     )
 
 
-def _field(found: Expression, name: str) -> str:
+def _field(found: Expression, name: str) -> str | None:
     for each in found.all("property"):
         if each.text(0) == name:
             return each.text(1)
     for each in found.all("fp_text"):  # KiCad 7
         if each.text(0) == name.lower():
             return each.text(1)
-    return ""
+    return None
 
 
 def _pad(found: Expression, origin: Point, turn: float) -> Pad:

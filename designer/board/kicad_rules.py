@@ -1,10 +1,11 @@
 """The rules of a board as KiCad's custom rules: the text of a ``.kicad_dru`` file.
 
 Conditions name nets, not net classes: these vanish with the project file. Of two rules that fit,
-KiCad takes the later one, so the general rule stands first. Past a syntax error KiCad drops every
-rule of the file without a word, and a condition that it does not know never holds; so
-``board_specimen`` makes a board that breaks each rule, for whoever runs them to see that they
-work.
+KiCad takes the later one, so the general rule stands first. A rule goes before a net class as well,
+so what a class asks for beyond the general rule is a rule of its own here. Past a syntax error
+KiCad drops every rule of the file without a word, and a condition that it does not know never
+holds; so ``board_specimen`` makes a board that breaks each rule, for whoever runs them to see that
+they work.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from types import MappingProxyType
 from designer.base.errors import InputError
 from designer.base.sexpr import Expression, expression, number_text, word, write_all
 from designer.board.kicad_names import kicad_net
+from designer.board.net_classes import CLASSES, SUMMING, SUPPLY
 from designer.catalog.design_rule import Override
 from designer.catalog.design_rules import BY_ID
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
@@ -44,7 +46,8 @@ class CustomRule:
     """A rule in KiCad's words. id : of the rule that it says. limit [mm], or a count.
 
     constraint : its type; least : whether the limit is from below; condition : "" for everything.
-    nets : KiCad's names of the nets that it speaks of, none for every net.
+    nets : KiCad's names of the nets that it speaks of, none for every net. usual : width [mm] that
+    KiCad's router takes under this rule, None where the rule says nothing of it.
     """
 
     id: str
@@ -53,14 +56,16 @@ class CustomRule:
     least: bool
     condition: str = ""
     nets: tuple[str, ...] = ()
+    usual: float | None = None
 
     @property
     def expression(self) -> Expression:
         """The rule for a ``.kicad_dru`` file."""
         counted = self.constraint == "via_count"
-        text = number_text(self.limit) if counted else f"{number_text(self.limit)}mm"
+        text = number_text(self.limit) if counted else _millimetres(self.limit)
         bound = expression("min" if self.least else "max", word(text))
-        parts = [expression("constraint", word(self.constraint), bound)]
+        usual = [] if self.usual is None else [expression("opt", word(_millimetres(self.usual)))]
+        parts = [expression("constraint", word(self.constraint), bound, *usual)]
         if self.condition:
             parts.append(expression("condition", self.condition))
         return expression("rule", self.id, *parts)
@@ -97,10 +102,20 @@ def board_rules(
         return found
 
     conductors, leads = spacing(2.0 * circuit.supply)
+    clearance = limit("clearance", max(conductors, MADE))
+    width = limit("supply-width")
     summing = tuple(kicad_net(net) for net in summing_nets(circuit))
     supply = tuple(kicad_net(net) for net in (POSITIVE, NEGATIVE, GROUND))
     return (
-        CustomRule("clearance", "clearance", limit("clearance", max(conductors, MADE)), True),
+        CustomRule("clearance", "clearance", clearance, True),
+        CustomRule(
+            "summing-clearance",
+            "clearance",
+            limit("summing-clearance", max(clearance, CLASSES[SUMMING]["clearance"])),
+            True,
+            _any_of(summing),
+            summing,
+        ),
         CustomRule(
             "pad-clearance",
             "clearance",
@@ -116,7 +131,13 @@ def board_rules(
             "summing-vias", "via_count", limit("summing-vias"), False, _any_of(summing), summing
         ),
         CustomRule(
-            "supply-width", "track_width", limit("supply-width"), True, _any_of(supply), supply
+            "supply-width",
+            "track_width",
+            width,
+            True,
+            _any_of(supply),
+            supply,
+            usual=max(width, CLASSES[SUPPLY]["track_width"]),
         ),
     )
 
@@ -131,6 +152,10 @@ def canary() -> CustomRule:
     return CustomRule(
         CANARY, "track_width", CANARY_LIMIT, True, f"A.Width == {number_text(CANARY_WIDTH)}mm"
     )
+
+
+def _millimetres(value: float) -> str:
+    return f"{number_text(value)}mm"
 
 
 def _any_of(nets: Sequence[str]) -> str:

@@ -225,11 +225,70 @@ RULES: tuple[Rule, ...] = (
     ),
     # The board.
     _rule(
+        "part-value",
+        "Parts whose value on the board is not the design's; values may be written in any way",
+        0, "",
+        "bom.csv of the design, and the parts of design.json",
+        "update the board from the schematic",
+        board=True,
+    ),
+    _rule(
+        "part-number",
+        "Parts with another part number (the field MPN) than the design's or its substitute's",
+        0, "",
+        "bom.csv of the design",
+        "update the board's fields from the schematic",
+        board=True,
+    ),
+    _rule(
+        "part-footprint",
+        "Parts in another footprint, or in one of another library than the project's and KiCad's",
+        0, "",
+        "bom.csv of the design",
+        "update the board from the schematic",
+        board=True,
+    ),
+    _rule(
+        "part-fitted",
+        "Parts that are marked DNP although the design needs them, and parts without the mark that "
+        "the design leaves out",
+        0, "",
+        "bom.csv of the design, which has the parts that are fitted",
+        "set the footprint's attribute as the schematic has it (board.dc_trim in the model file "
+        "decides about the trim)",
+        board=True,
+    ),
+    _rule(
+        "unconnected",
+        "Connections of nets that no copper makes yet",
+        0, "",
+        "KiCad's list of unconnected items",
+        "route these nets, and fill the zones anew",
+        board=True,
+    ),
+    _rule(
+        "short-circuit",
+        "Places where copper of two nets touches",
+        0, "",
+        "KiCad's check: shorting items, crossing tracks, zones that intersect",
+        "move the copper apart",
+        board=True,
+    ),
+    _rule(
         "clearance",
         "Copper of different nets, by the largest voltage between them",
         "IPC-2221, table 6-1, column B2, at the voltage between the rails", "mm",
         "IPC-2221, table 6-1, column B2: external conductors, uncoated, up to 3050 m",
         "move the copper apart",
+        least=True, board=True,
+    ),
+    _rule(
+        "summing-clearance",
+        "Copper of other nets from a summing node, where not both are pads",
+        0.3, "mm",
+        f"{OWN} against leakage, and the net class of the exported project; never less than the "
+        "limit of clearance",
+        "move the copper away from the summing node",
         least=True, board=True,
     ),
     _rule(

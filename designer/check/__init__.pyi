@@ -13,11 +13,20 @@ from .checked_design import (
 from .checked_design import (
     traces as traces,
 )
+from .deck_notes import (
+    circuit_notes as circuit_notes,
+)
+from .deck_notes import (
+    simulator_notes as simulator_notes,
+)
 from .first_responses import (
     FirstRun as FirstRun,
 )
 from .first_responses import (
     first_run as first_run,
+)
+from .response_runs import (
+    response_runs as response_runs,
 )
 from .simulation import (
     Simulated as Simulated,

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
 from designer.cli.app import (
     Json,
     Log,
@@ -18,10 +23,24 @@ from designer.cli.app import (
 )
 
 
+class DeckName(StrEnum):
+    """Simulators that a deck is written for."""
+
+    LTSPICE = "ltspice"
+    PORTABLE = "portable"
+
+
 @app.command()
 def export(
     model: Source,
     out: Out = None,
+    deck: Annotated[
+        list[DeckName] | None,
+        typer.Option(
+            "--deck",
+            help="Instead: a deck for another simulator, with every response. May come twice.",
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
     json: Json = False,
@@ -29,7 +48,7 @@ def export(
     quiet: Quiet = False,
     log: Log = None,
 ) -> int:
-    """The KiCad project: schematic, placed board, netlist; into the design folder."""
+    """The KiCad project: schematic, placed board, netlist; or decks; into the design folder."""
     with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import synthesise_job
         from designer.jobs.export_job import export_into
@@ -37,7 +56,14 @@ def export(
 
         options = Options(overwrite=overwrite, resume=resume)
         modelfile, folder = synthesise_job.source(model, out)
-        answer, reused = export_into(modelfile, folder, options, progress)
+        if deck:
+            from designer.jobs.deck_job import export_decks
+
+            answer, reused = export_decks(
+                modelfile, folder, [name.value for name in deck], options, progress
+            )
+        else:
+            answer, reused = export_into(modelfile, folder, options, progress)
     if json:
         print_json(answer)
     elif not quiet:

@@ -25,3 +25,6 @@ def show(answer: Mapping[str, Any]) -> None:
             print_line(console, f"{rule['id']} fails: {rule['do']}")
     count = answer["counts"]
     print_line(console, f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")
+    idle = [rule["id"] for rule in answer["rules"] if rule["status"] == NOT_RUN]
+    if idle:
+        print_line(console, f"Not run is no pass. Rules that were not looked at: {', '.join(idle)}")

@@ -33,13 +33,16 @@ Point = tuple[float, float]
 
 def specimen(rules: Sequence[CustomRule], *, breaking: bool) -> str:
     """The text of a board with one example for each rule, a tenth past its limit or a tenth inside;
-    a count is one past it, or at it."""
+    a count is one past it, or at it. One that breaks them has a short circuit as well, and like
+    every one of them connections that are open."""
     nets = ["", _A, _B]
-    nets += [net for rule in rules for net in rule.nets[:2] if net not in nets]
+    nets += [net for rule in rules for net in rule.nets[:3] if net not in nets]
     items: list[Expression] = []
     for place, rule in enumerate(rules):
         at = (20.0, 20.0 + APART * place)
         items += _example(rule, _size(rule, breaking), at, nets)
+    if breaking:
+        items += _short((20.0 + APART, 20.0), nets)
     head = [
         expression("version", FILE_VERSION),
         expression("generator", "designer"),
@@ -66,9 +69,11 @@ def _size(rule: CustomRule, breaking: bool) -> float:
 def _example(rule: CustomRule, size: float, at: Point, nets: list[str]) -> Iterator[Expression]:
     x, y = at
     net = nets.index(rule.nets[0]) if rule.nets else 0
-    if rule.constraint == "clearance" and not rule.condition:
+    if rule.constraint == "clearance" and (rule.nets or not rule.condition):
         down = y + TRACK + size
-        yield _segment((x, y), (x + 5.0, y), TRACK, nets.index(_A))
+        # Not the nets whose length and whose vias count.
+        own = nets.index(rule.nets[:3][-1]) if rule.nets else nets.index(_A)
+        yield _segment((x, y), (x + 5.0, y), TRACK, own)
         yield _segment((x, down), (x + 5.0, down), TRACK, nets.index(_B))
     elif rule.constraint == "clearance":
         for number, (name, left) in enumerate(((_A, x), (_B, x + PAD + size))):
@@ -89,6 +94,14 @@ def _example(rule: CustomRule, size: float, at: Point, nets: list[str]) -> Itera
     else:
         assert rule.constraint == "track_width"
         yield _segment((x, y), (x + 5.0, y), size, net)
+
+
+def _short(at: Point, nets: list[str]) -> Iterator[Expression]:
+    """Two pads of two nets, and a track of the second that ends on the first."""
+    x, y = at
+    for name, left in ((_A, x), (_B, x + 5.0 * PAD)):
+        yield _footprint(f"short{name}", (left, y), nets.index(name), name, PAD)
+    yield _segment((x, y), (x + 5.0 * PAD, y), TRACK, nets.index(_B))
 
 
 def _layer(number: int, name: str, kind: str) -> Expression:

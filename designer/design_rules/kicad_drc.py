@@ -3,8 +3,9 @@
 Everything happens on copies in a scratch folder, without the board's project: its severities and
 exclusions hide nothing, and its net classes are not needed. Two checks are made. One of a board
 that breaks every rule (``board_specimen``): what KiCad does not report there, it does not
-understand. One of the board itself with a track besides that breaks a rule of its own: unless that
-is reported, KiCad has dropped the rules, and nothing it says of them counts.
+understand, be it a rule of ours or one of its own. One of the board itself with a track besides
+that breaks a rule of its own: unless that is reported, KiCad has dropped the rules, and nothing it
+says of them counts.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +37,11 @@ PATIENCE = 600.0
 ASIDE = (-100.0, -100.0)
 """Where the canary's track lies [mm], from the board's uppermost, leftmost pad."""
 
+OPEN, SHORT = "unconnected", "short-circuit"
+"""Rules that KiCad's check says by itself."""
+SHORTS = frozenset({"shorting_items", "tracks_crossing", "zones_intersect"})
+"""KiCad's types of violations in which copper of two nets touches."""
+
 _RULE = re.compile(r"\(rule '([^']*)' ")
 _ACTUAL = re.compile(r"actual ([0-9.]+)")
 _MINIMUM = re.compile(r"min width ([0-9.]+) mm")
@@ -54,12 +61,16 @@ class Violation:
 @dataclass(frozen=True)
 class DesignRuleCheck:
     """version : KiCad's. misunderstood : rules that KiCad does not report when they are broken.
-    unconnected : nets of the circuit that are not all routed."""
+
+    unconnected : nets of the circuit that are not all routed, and how many connections are open on
+    each. shorts : where copper of two nets touches, in KiCad's words.
+    """
 
     version: str
     violations: tuple[Violation, ...]
     misunderstood: frozenset[str]
-    unconnected: frozenset[str]
+    unconnected: Mapping[str, int]
+    shorts: tuple[str, ...] = ()
 
 
 class CheckFailed(Exception):
@@ -96,14 +107,17 @@ def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
         text = rules_text([*rules, canary()])
         broken = report(specimen(rules, breaking=True), text, place / "specimen")
         heard = {v.rule for v in violations(broken, rules)}
+        heard |= {OPEN} if _unconnected(broken) else set()
+        heard |= {SHORT} if _shorts(broken) else set()
         answer = report(_with_canary(board), text, place / "board")
     if not any(_is_canary(v) for v in answer["violations"]):
         raise CheckFailed("KiCad has dropped the custom rules: a planted violation went unreported")
     return DesignRuleCheck(
         version,
         violations(answer, rules),
-        frozenset(rule.id for rule in rules) - heard,
+        frozenset([OPEN, SHORT, *(rule.id for rule in rules)]) - heard,
         _unconnected(answer),
+        _shorts(answer),
     )
 
 
@@ -140,7 +154,8 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
         ) from None
     except ValueError:
         raise CheckFailed("kicad-cli wrote a report that is no JSON") from None
-    if not isinstance(found, dict) or not isinstance(found.get("violations"), list):
+    lists = ("violations", "unconnected_items")
+    if not isinstance(found, dict) or not all(isinstance(found.get(n), list) for n in lists):
         raise CheckFailed("kicad-cli wrote a report of another kind")
     return found
 
@@ -181,10 +196,17 @@ def _is_canary(each: Mapping[str, Any]) -> bool:
     return each.get("type") == "track_width" and limit is not None and limit[1] == own
 
 
-def _unconnected(found: Mapping[str, Any]) -> frozenset[str]:
-    return frozenset(
-        circuit_net(net) for each in found.get("unconnected_items", []) for net in _nets(each)
+def _unconnected(found: Mapping[str, Any]) -> Mapping[str, int]:
+    """Open connections by net; both ends of one are on the same net."""
+    return Counter(
+        circuit_net(net)
+        for each in found["unconnected_items"]
+        for net in dict.fromkeys(_nets(each))
     )
+
+
+def _shorts(found: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(_where(each) for each in found["violations"] if each.get("type") in SHORTS)
 
 
 def _nets(each: Mapping[str, Any]) -> list[str]:

@@ -30,11 +30,22 @@ from designer.catalog.design_rule import (
 )
 from designer.catalog.design_rules import RULES
 from designer.circuit.netlist import NEGATIVE, POSITIVE
-from designer.design_rules.kicad_drc import CheckFailed, DesignRuleCheck, Violation, check
+from designer.design_rules import on_parts
+from designer.design_rules.kicad_drc import (
+    OPEN,
+    SHORT,
+    CheckFailed,
+    DesignRuleCheck,
+    Violation,
+    check,
+)
 
 NO_BOARD = "no board was given (--board FILE)"
+UNHEARD = "KiCad does not report a board that breaks this rule"
 MOST = 5
 """Names in a message."""
+NETS = 12
+"""Nets that are not routed in a message."""
 _READ = "read from the board file"
 COPPER = frozenset({"clearance"})
 """Rules that say nothing of a board without tracks."""
@@ -78,6 +89,8 @@ def on_board(
                 out.append(judged(rule, READ[rule.id](board, components), override))
             elif isinstance(told, str):
                 out.append(_idle(rule, rules, overrides, told))
+            elif rule.id in REPORTED:
+                out.append(judged(rule, _reported(rule, board, told), override))
             else:
                 out.append(_by_kicad(rule, said[rule.id], board, told, override))
         except NotRun as reason:
@@ -123,11 +136,44 @@ def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator
             yield Found(room, where, more=_READ)
 
 
+def unconnected(board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
+    """Open connections, with the nets that they are on.
+
+    Raises
+    ------
+    NotRun : nothing is routed at all.
+    """
+    count = sum(told.unconnected.values())
+    if count and not board.copper:
+        nets = len(told.unconnected)
+        raise NotRun(f"nothing is routed yet: {count} connections of {nets} nets are open")
+    names = [f"{POWER.get(net, net)} ({n})" for net, n in sorted(told.unconnected.items())]
+    more = f" and {len(names) - NETS} more nets" if len(names) > NETS else ""
+    yield Found(count, more=f"not routed: {', '.join(names[:NETS])}{more}" if names else "")
+
+
+def short_circuits(board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
+    """Places where copper of two nets touches."""
+    yield Found(len(told.shorts), more="; ".join(told.shorts[:MOST]))
+
+
+REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Found]]] = {
+    OPEN: unconnected,
+    SHORT: short_circuits,
+}
+"""Rules that KiCad's check says by itself, without a custom rule."""
 READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] = {
+    **on_parts.READ,
     "decoupling-distance": decoupling_distance,
     "board-outline": board_outline,
 }
-"""Rules that KiCad cannot say: they are read from the file."""
+"""Rules that KiCad is not asked about: they are read from the file."""
+
+
+def _reported(rule: Rule, board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
+    if rule.id in told.misunderstood:
+        raise NotRun(UNHEARD)
+    return REPORTED[rule.id](board, told)
 
 
 def _by_kicad(
@@ -138,13 +184,13 @@ def _by_kicad(
     override: Override | None,
 ) -> Outcome:
     if custom.id in told.misunderstood:
-        raise NotRun("KiCad does not report a board that breaks this rule")
+        raise NotRun(UNHEARD)
     mine = [v for v in told.violations if v.rule == custom.id]
     if mine:
         return _broken(rule, custom, mine, override)
     concerned = {circuit_net(net) for net in custom.nets}
     if concerned:
-        lost = sorted(concerned & told.unconnected)
+        lost = sorted(concerned & told.unconnected.keys())
         if lost:
             raise NotRun(f"not routed yet: {', '.join(POWER.get(net, net) for net in lost)}")
         if not concerned & board.routed:

@@ -28,6 +28,9 @@ from .cure_job import (
 from .cure_job import (
     cure as cure,
 )
+from .deck_job import (
+    export_decks as export_decks,
+)
 from .design_files import (
     load as load,
 )

@@ -15,6 +15,7 @@ from designer.base.errors import InputError
 from designer.base.plain_json import dumps
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import Checked
+from designer.check.deck_notes import circuit_notes
 from designer.check.first_responses import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build, terms
@@ -154,6 +155,7 @@ def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:
         title=made.modelfile.title,
         stop_time=run.stop_time,
         initial=run.initial,
+        notes=circuit_notes(made, run),
     )
     nets = [*design.circuit.state_nets, *(["fv"] if design.circuit.stops else [])]
     shown = " ".join(f"v({net})" for net in [*nets, design.circuit.generator.net])

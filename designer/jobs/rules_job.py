@@ -137,6 +137,7 @@ def _json(
         "title": made.modelfile.title,
         "board": None if board is None else board.path.name,
         "counts": count,
+        "complete": not count[NOT_RUN],
         "rules": [o.as_dict() for o in outcomes],
         "provenance": said,
         "cost": {"seconds": seconds},

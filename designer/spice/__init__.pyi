@@ -16,6 +16,9 @@ from . import (
 from . import (
     read_orbit as read_orbit,
 )
+from . import (
+    simulator_decks as simulator_decks,
+)
 from .backends import (
     ngspice_version as ngspice_version,
 )
@@ -81,4 +84,13 @@ from .simulator import (
 )
 from .simulator import (
     Waveforms as Waveforms,
+)
+from .simulator_decks import (
+    Dialect as Dialect,
+)
+from .simulator_decks import (
+    ResponseRun as ResponseRun,
+)
+from .simulator_decks import (
+    file_name as file_name,
 )

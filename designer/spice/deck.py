@@ -7,7 +7,7 @@ only through ``title_line``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,13 +51,15 @@ def write(
     rung: Rung = "ideal",
     kept_from: float = 0.0,
     stage: bool = True,
+    notes: Sequence[str] = (),
 ) -> str:
     """The deck as text, ending in a newline.
 
     initial : (states,) capacitor voltages at t = 0; discharged where None. rung : the op-amps'
     model; those with a memory start at the output voltages that belong to ``initial``. kept_from :
     time [s] before which ngspice keeps no point; what it computes is the same. stage : whether it
-    keeps the nonlinear stage's output, beside the states and the generator.
+    keeps the nonlinear stage's output, beside the states and the generator. notes : lines of a
+    comment at the top.
 
     Raises
     ------
@@ -66,6 +68,7 @@ def write(
     lines = [
         title_line(title),
         f"* designer deck, format {FORMAT}",
+        *map(comment_line, notes),
         f"{circuit.generator.name} {circuit.generator.net} 0 "
         f"SIN({_n(excitation.offset)} {_n(excitation.amplitude)} {_n(excitation.frequency)} "
         "0 0 180)",
@@ -195,11 +198,20 @@ def _diodes(circuit: Circuit, rung: Rung) -> list[str]:
 
 def title_line(text: str) -> str:
     """A title that is safe as the first line of a deck: printable ASCII words, one line."""
-    kept = "".join(
+    # A word of ours first: ngspice takes comments that begin in certain ways for commands.
+    return "* title: " + (_plain(text)[:120] or "untitled")
+
+
+def comment_line(text: str) -> str:
+    """A comment of our own words that may have a foreign name in it: printable ASCII, one line."""
+    return f"* {_plain(text)}"
+
+
+def _plain(text: str) -> str:
+    safe = "".join(
         ch if ch.isascii() and (ch.isalnum() or ch in " .,:()+-=/_") else " " for ch in text
     )
-    # A word of ours first: ngspice takes comments that begin in certain ways for commands.
-    return "* title: " + (" ".join(kept.split())[:120] or "untitled")
+    return " ".join(safe.split())
 
 
 def _n(value: float) -> str:

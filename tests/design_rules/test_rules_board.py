@@ -6,6 +6,7 @@ import contextlib
 import math
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,8 +18,9 @@ from hypothesis import strategies as st
 
 from designer.base.errors import InputError
 from designer.base.sexpr import Expression, expression, expression_text, read, read_all
+from designer.base.views import View
 from designer.board import kicad_rules
-from designer.board.component import Component
+from designer.board.component import Component, joined
 from designer.board.kicad_names import kicad_net
 from designer.board.kicad_reader import BoardFile, arc_length, check_belongs, read_board
 from designer.board.kicad_rules import CustomRule, rules_text, spacing
@@ -33,6 +35,7 @@ from tests.shared.stages import stage
 
 BY_KICAD = (
     "clearance",
+    "summing-clearance",
     "pad-clearance",
     "component-spacing",
     "summing-length",
@@ -40,7 +43,13 @@ BY_KICAD = (
     "supply-width",
 )
 """Rules whose pair is a board that breaks them in KiCad's check, and one that just keeps them."""
-BY_READING = ("decoupling-distance", "board-outline")
+BY_REPORT = ("unconnected", "short-circuit")
+"""Rules that KiCad's check says by itself: the pairs stand in
+tests/design_rules/test_rules_copper.py."""
+OF_PARTS = ("part-value", "part-number", "part-footprint", "part-fitted")
+"""Rules on the parts: the pairs stand in tests/design_rules/test_rules_parts.py."""
+BY_READING = ("decoupling-distance", "board-outline", *OF_PARTS)
+NOTHING: Mapping[str, int] = {}
 
 
 @cache
@@ -168,32 +177,6 @@ def test_pins_on_other_nets_are_named(tmp_path: Path) -> None:
     said = refused(edited(exchange), tmp_path)
     assert said.field == "nets"
     assert "R4.1 on s2, not on v1; R4.2 on v1, not on s2" in str(said)
-
-
-def valued(name: str, words: str) -> str:
-    """The board with another value written at one component."""
-
-    def change(item: Expression) -> Expression:
-        if item.name != "footprint" or reference(item) != name:
-            return item
-        value = next(p for p in item.all("property") if p.text(0) == "Value")
-        return read(
-            expression_text(item).replace(f'"Value" "{value.text(1)}"', f'"Value" "{words}"')
-        )
-
-    return edited(change)
-
-
-def test_other_values_are_named_and_other_spellings_are_not(tmp_path: Path) -> None:
-    """A board drawn before the parts were chosen anew."""
-    ohms = base().circuit.values["R4"]
-    said = refused(valued("R4", "47k"), tmp_path)
-    assert said.field == "values"
-    assert "R4 is 47k, not 36kΩ" in str(said)
-    assert ohms == 36e3
-    assert refused(valued("C903", "10k"), tmp_path).field == "values"
-    for words in ("36k", "36 kΩ", "36000"):
-        check_belongs(board_of(valued("R4", words), tmp_path), base().components)
 
 
 def test_a_mounting_hole_may_be_there_besides(tmp_path: Path) -> None:
@@ -554,7 +537,7 @@ def test_kicad_measures_the_same_distance_from_the_edge(tmp_path: Path) -> None:
 
 def test_without_a_board_nothing_is_run() -> None:
     found = on_board.without_board(custom(), {})
-    assert {o.rule.id for o in found} == {*BY_KICAD, *BY_READING}
+    assert {o.rule.id for o in found} == {*BY_KICAD, *BY_REPORT, *BY_READING}
     assert {o.status for o in found} == {NOT_RUN}
     assert all("no board" in o.found for o in found)
     assert by_id(found)["clearance"].limit_text == "at least 0.2 mm"
@@ -567,7 +550,7 @@ def test_without_kicad_only_what_is_read_is_run(
     found = rules_job.checked(base().made, board_of(drawn(), tmp_path))
     assert found.kicad is None
     of_board = {o.rule.id: o for o in found.outcomes if o.rule.scope == "board"}
-    for id_ in BY_KICAD:
+    for id_ in (*BY_KICAD, *BY_REPORT):
         assert of_board[id_].status == NOT_RUN
         assert "not installed" in of_board[id_].found
     assert {of_board[id_].status for id_ in BY_READING} == {PASS}
@@ -592,7 +575,11 @@ def program(folder: Path, script: str) -> None:
          '&& echo "[]" > "$2"; done', "another kind"),
         # A KiCad that has dropped every rule finds nothing.
         ('[ "$1" = --version ] && echo 9.0.0; while [ $# -gt 1 ]; do shift; [ "$1" = --output ] '
-         '&& echo "{\\"violations\\": []}" > "$2"; done', "dropped the custom rules"),
+         '&& echo "{\\"violations\\": [], \\"unconnected_items\\": []}" > "$2"; done',
+         "dropped the custom rules"),
+        # One that writes no list of open connections may not pass for one that has found none.
+        ('[ "$1" = --version ] && echo 9.0.0; while [ $# -gt 1 ]; do shift; [ "$1" = --output ] '
+         '&& echo "{\\"violations\\": []}" > "$2"; done', "another kind"),
     ],
 )  # fmt: skip
 def test_a_kicad_that_gives_no_answer_passes_nothing(
@@ -603,11 +590,11 @@ def test_a_kicad_that_gives_no_answer_passes_nothing(
     with pytest.raises(CheckFailed, match=said):
         kicad_drc.check(board_of(drawn(), tmp_path), custom())
     found = looked(drawn(), tmp_path)
-    assert {found[id_].status for id_ in BY_KICAD} == {NOT_RUN}
+    assert {found[id_].status for id_ in (*BY_KICAD, *BY_REPORT)} == {NOT_RUN}
 
 
-def answer(*misunderstood: str, unconnected: frozenset[str] = frozenset()) -> DesignRuleCheck:
-    """KiCad has found nothing."""
+def answer(*misunderstood: str, unconnected: Mapping[str, int] = NOTHING) -> DesignRuleCheck:
+    """KiCad has found nothing but these open connections."""
     return DesignRuleCheck("9.0.0", (), frozenset(misunderstood), unconnected)
 
 
@@ -628,12 +615,16 @@ def test_what_is_not_routed_is_not_passed(tmp_path: Path) -> None:
     for id_ in ("clearance", "summing-length", "summing-vias", "supply-width"):
         assert found[id_].status == NOT_RUN
     part = with_items(track("s1", 0.3, 5.0), track("vcc", 0.3, 5.0))
-    found = on_drawn(part, tmp_path, answer(unconnected=frozenset({"s2", "0"})))
+    found = on_drawn(part, tmp_path, answer(unconnected={"s2": 3, "0": 12}))
     assert found["clearance"].status == PASS
     assert found["summing-length"].found == "not routed yet: s2"
     assert found["supply-width"].found == "not routed yet: GND"
+    assert found["unconnected"].status == FAIL
+    assert found["unconnected"].value == 15.0
+    assert found["unconnected"].found == "15; not routed: GND (12), s2 (3)"
     found = on_drawn(part, tmp_path, answer())
     assert found["summing-length"].status == PASS
+    assert found["unconnected"].status == PASS
 
 
 def test_footprints_without_a_courtyard_leave_the_spacing_open(tmp_path: Path) -> None:
@@ -790,6 +781,15 @@ def test_the_exported_board_keeps_what_can_be_looked_at(tmp_path: Path) -> None:
     assert found["decoupling-distance"].status == PASS
     assert found["summing-length"].found.startswith("not routed yet: d1, d2, i1")
     assert found["supply-width"].found.startswith("not routed yet: GND")
+    pads = joined(c for c in base().components if View.BOARD in c.views)
+    count = sum(len(there) - 1 for there in pads.values())
+    nets = sum(len(there) > 1 for there in pads.values())
+    assert found["unconnected"].status == NOT_RUN
+    assert (
+        found["unconnected"].found
+        == f"nothing is routed yet: {count} connections of {nets} nets are open"
+    )
+    assert found["short-circuit"].status == PASS
 
 
 @pytest.mark.kicad
@@ -835,4 +835,4 @@ def test_pads_lie_where_kicad_puts_them(tmp_path: Path) -> None:
 
 
 def test_every_rule_on_a_board_stands_in_a_pair() -> None:
-    assert {*BY_KICAD, *BY_READING} == {r.id for r in RULES if r.scope == "board"}
+    assert {*BY_KICAD, *BY_REPORT, *BY_READING} == {r.id for r in RULES if r.scope == "board"}

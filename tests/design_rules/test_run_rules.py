@@ -90,7 +90,11 @@ def test_every_rule_has_a_function_and_a_pair() -> None:
     of_circuit = [rule.id for rule in RULES if rule.scope == "circuit"]
     assert list(run_rules.LOOKS) == of_circuit
     assert set(rule_cases.PAIRS) == set(of_circuit)
-    of_board = {*test_rules_board.BY_KICAD, *test_rules_board.BY_READING}
+    of_board = {
+        *test_rules_board.BY_KICAD,
+        *test_rules_board.BY_REPORT,
+        *test_rules_board.BY_READING,
+    }
     assert of_board == set(ids) - set(of_circuit)
 
 
@@ -175,7 +179,8 @@ def test_prints_and_writes_the_same_and_keeps_the_folder_whole(
         assert {"id", "status", "found", "limit", "source", "do"} <= set(rule)
         assert rule["status"] in (PASS, FAIL, NOT_RUN)
         assert all(isinstance(rule[key], str) for key in ("found", "limit", "source", "do"))
-    assert answer["counts"] == {PASS: 23, FAIL: 0, NOT_RUN: 8}
+    assert answer["counts"] == {PASS: 23, FAIL: 0, NOT_RUN: 15}
+    assert answer["complete"] is False
     assert answer["provenance"]["versions"]["designer"]
     after = _tree(design)
     assert set(after) - set(before) == {"rules.json"}
@@ -224,6 +229,29 @@ def test_a_board_is_looked_at(
     assert status["decoupling-distance"] == PASS
     assert status["clearance"] == NOT_RUN
     assert len(answer["provenance"]["settings"]["board_sha256"]) == 64
+
+
+def test_a_changed_part_is_a_finding_and_no_refusal(
+    design: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit 1, in the JUnit report; what was not looked at is skipped there and told in the end."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    board, report = tmp_path / "some.kicad_pcb", tmp_path / "junit.xml"
+    text = test_rules_board.drawn().replace('(property "Value" "36kΩ"', '(property "Value" "47k"')
+    board.write_text(text, encoding="utf-8")
+    assert entry.status(["rules", str(design), "--board", str(board), "--junit", str(report)]) == 1
+    printed = capfd.readouterr().err
+    assert "part-value fails:" in printed
+    assert "Not run is no pass." in printed.replace("\n", " ")
+    assert "unconnected" in printed[printed.index("Not run is no pass.") :]
+    suite = ElementTree.parse(report).getroot()[0]
+    assert suite.get("failures") == "1"
+    cases = {case.get("name"): case for case in suite}
+    failure = cases["part-value"].find("failure")
+    assert failure is not None
+    assert "R4 is 47k, not 36kΩ" in str(failure.get("message"))
+    skipped = {name for name, case in cases.items() if case.find("skipped") is not None}
+    assert skipped == {*test_rules_board.BY_KICAD, *test_rules_board.BY_REPORT}
 
 
 def test_bad_input_writes_nothing(

@@ -1,0 +1,129 @@
+"""Rules on the parts of a board: each one's value, number, footprint and mark against the design.
+
+They are read from the board file, without KiCad. Each counts the parts that differ and names them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from designer.base.units import parse_quantity
+from designer.base.views import View
+from designer.board.component import Component
+from designer.board.kicad_names import LIBRARY, footprint_name
+from designer.board.kicad_reader import PART_NUMBER, BoardFile, Footprint
+from designer.catalog.design_rule import Found, NotRun
+
+MOST = 5
+"""Parts that a message names."""
+LONGEST = 40
+"""Characters that a message takes of a text on the board."""
+UNITS = {"resistor": "Ω", "capacitor": "F", "trimmer": "Ω"}
+"""Kinds of parts whose value is a quantity."""
+
+Pair = tuple[Component, Footprint]
+
+
+def values(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """Parts whose value is another one. A quantity may be written in any way ("22.1k", "22k1")."""
+    pairs = [(c, f) for c, f in _pairs(board, components) if c.bought is not None]
+    yield from _count(pairs, _other_value)
+
+
+def numbers(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """Parts with another part number than the one that is to be bought, or than its substitute's.
+
+    Raises
+    ------
+    NotRun : no footprint has the field.
+    """
+    pairs = [(c, f) for c, f in _pairs(board, components) if c.bought is not None]
+    if pairs and all(f.part_number is None for _, f in pairs):
+        raise NotRun(f"no footprint has a field {PART_NUMBER}: update the board from the schematic")
+    yield from _count(pairs, _other_number)
+
+
+def footprints(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """Parts in another footprint, of the project's library or of KiCad's that has the same name."""
+    yield from _count(_pairs(board, components), _other_footprint)
+
+
+def fitted(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+    """Parts that are left out on the board and not by the design, or the other way round."""
+    yield from _count(_pairs(board, components), _other_mark)
+
+
+READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] = {
+    "part-value": values,
+    "part-number": numbers,
+    "part-footprint": footprints,
+    "part-fitted": fitted,
+}
+"""By the rule's id."""
+
+
+def _pairs(board: BoardFile, components: Sequence[Component]) -> list[Pair]:
+    wanted = ((c, board.footprint(c.reference)) for c in components if View.BOARD in c.views)
+    return [(component, there) for component, there in wanted if there is not None]
+
+
+def _count(
+    pairs: Sequence[Pair], difference: Callable[[Component, Footprint], str]
+) -> Iterator[Found]:
+    """How many parts differ, and how; nothing where there is no part at all."""
+    if not pairs:
+        return
+    differ = [f"{c.reference} {text}" for c, f in pairs if (text := difference(c, f))]
+    more = [f"and {len(differ) - MOST} more"] if len(differ) > MOST else []
+    yield Found(len(differ), more="; ".join(differ[:MOST] + more))
+
+
+def _other_value(component: Component, there: Footprint) -> str:
+    unit = UNITS.get(component.kind)
+    if unit is None or component.quantity is None:
+        same = _plain(there.value) == _plain(component.value)
+    else:
+        try:
+            found = parse_quantity(there.value, unit)
+            same = math.isclose(found, component.quantity, rel_tol=1e-6)
+        except ValueError:
+            same = False
+    return "" if same else f"is {_shown(there.value)}, not {component.value}"
+
+
+def _other_number(component: Component, there: Footprint) -> str:
+    assert component.bought is not None
+    found, wanted = there.part_number or "", component.bought.part_number
+    # A substitute is written with its maker in front.
+    if found == wanted or (found and component.bought.substitute.endswith(f" {found}")):
+        return ""
+    return f"is ordered as {_shown(found)}, not {wanted}"
+
+
+def _other_footprint(component: Component, there: Footprint) -> str:
+    library = component.footprint.rpartition(":")[0]
+    name = footprint_name(component.footprint)
+    if there.name != name:
+        return f"is in {_shown(there.name)}, not in {name}"
+    if there.library not in (LIBRARY, library):
+        return f"is of the library {_shown(there.library)}, not of {LIBRARY} or {library}"
+    return ""
+
+
+def _other_mark(component: Component, there: Footprint) -> str:
+    if there.fitted == component.fitted:
+        return ""
+    return (
+        "is marked DNP" if component.fitted else "is not marked DNP, and the design leaves it out"
+    )
+
+
+def _plain(text: str) -> str:
+    return "".join(text.split()).casefold()
+
+
+def _shown(text: str) -> str:
+    """A text of the board in a message: printable, of a bounded length."""
+    shown = "".join(ch if ch.isprintable() else "?" for ch in text[:LONGEST])
+    return f"{shown}…" if len(text) > LONGEST else shown or "nothing"
