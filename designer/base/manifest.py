@@ -18,6 +18,7 @@ StageName = Literal[
     "design",
     "kicad",
     "study",
+    "measured",
     "comparison",
     "trade",
     "confirmation",
@@ -31,6 +32,7 @@ STAGES: tuple[StageName, ...] = get_args(StageName)
 OF_DESIGN: tuple[StageName, ...] = (
     "kicad",
     "study",
+    "measured",
     "comparison",
     "trade",
     "confirmation",
@@ -38,6 +40,9 @@ OF_DESIGN: tuple[StageName, ...] = (
     "rules",
 )
 """Stages that depend on the design, and on it alone."""
+REPLACED = ("without ", "blame budget ")
+"""How items of an input's list begin that may give way to another: what is not there may come, and
+a budget may grow."""
 State = Literal["new", "same", "more", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000
 
@@ -98,14 +103,18 @@ class Manifest:
 
 
 def grown(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
-    """Whether the inputs differ by longer lists alone."""
+    """Whether the inputs differ by longer lists alone, and by what may give way (`REPLACED`)."""
     if known.keys() != wanted.keys():
         return False
     return all(
         mine == theirs
-        or (isinstance(mine, list) and isinstance(theirs, list) and set(mine) <= set(theirs))
+        or (isinstance(mine, list) and isinstance(theirs, list) and _lasting(mine) <= set(theirs))
         for mine, theirs in ((known[key], wanted[key]) for key in known)
     )
+
+
+def _lasting(items: list[Any]) -> set[Any]:
+    return {i for i in items if not (isinstance(i, str) and i.startswith(REPLACED))}
 
 
 def file_hash(name: str, content: bytes) -> str:

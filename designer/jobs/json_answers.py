@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.model.find_responses import ModelResponse
     from designer.model.model_file import ModelFile
 
-STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "maps")
+STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "blame", "boards", "maps")
 """What ``run`` prints of a study beside its responses."""
 
 

@@ -105,8 +105,8 @@ def _yield_picture(data: ReportData) -> Picture | None:
         labels, yields = [*labels, "all on one board"], [*yields, data.all_on_one_board]
     return Picture(
         _uri(study_plots.yield_chart(labels, yields)),
-        "Yield of each response with its 95 % interval, and counts of ok, lost, grazing, failed; "
-        "the figures are in the table.",
+        f"Yield of each response {'among all boards' if data.census else 'with its 95 % interval'}"
+        ", and counts of ok, lost, grazing, failed; the figures are in the table.",
     )
 
 
