@@ -22,7 +22,7 @@ from designer.base.checks import cores
 from designer.base.plain_json import dumps
 from designer.base.proportion import wilson
 from designer.check.synthesis_result import synthesise
-from designer.jobs.study_job import SPICE_TIMEOUT
+from designer.jobs.study_stage import SPICE_TIMEOUT
 from designer.model.model_file import ModelFile, read_model_file
 from designer.spice import convergence_aids, numerics_gate
 from designer.spice.pool import SpicePool

@@ -20,6 +20,7 @@ StageName = Literal[
     "deck-ltspice",
     "deck-portable",
     "study",
+    "measured",
     "comparison",
     "trade",
     "confirmation",
@@ -35,6 +36,7 @@ OF_DESIGN: tuple[StageName, ...] = (
     "deck-ltspice",
     "deck-portable",
     "study",
+    "measured",
     "comparison",
     "trade",
     "confirmation",
@@ -42,6 +44,9 @@ OF_DESIGN: tuple[StageName, ...] = (
     "rules",
 )
 """Stages that depend on the design, and on it alone."""
+REPLACED = ("without ", "blame budget ")
+"""How items of an input's list begin that may give way to another: what is not there may come, and
+a budget may grow."""
 State = Literal["new", "same", "more", "unfinished", "other"]
 _MAX_MANIFEST = 20_000_000
 
@@ -102,14 +107,18 @@ class Manifest:
 
 
 def grown(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
-    """Whether the inputs differ by longer lists alone."""
+    """Whether the inputs differ by longer lists alone, and by what may give way (`REPLACED`)."""
     if known.keys() != wanted.keys():
         return False
     return all(
         mine == theirs
-        or (isinstance(mine, list) and isinstance(theirs, list) and set(mine) <= set(theirs))
+        or (isinstance(mine, list) and isinstance(theirs, list) and _lasting(mine) <= set(theirs))
         for mine, theirs in ((known[key], wanted[key]) for key in known)
     )
+
+
+def _lasting(items: list[Any]) -> set[Any]:
+    return {i for i in items if not (isinstance(i, str) and i.startswith(REPLACED))}
 
 
 def file_hash(name: str, content: bytes) -> str:

@@ -11,7 +11,8 @@ import logging
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -32,6 +33,11 @@ class Progress:
     def note(self, text: str) -> None:
         """Something that a user ought to know."""
         LOG.warning("%s", text)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """While something else is printed on standard error."""
+        yield
 
     def __enter__(self) -> Self:
         return self
@@ -130,6 +136,17 @@ class Terminal(Progress):
     def note(self, text: str) -> None:
         super().note(text)
         self._bars.console.print(text, markup=False, highlight=False)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        self._finish()
+        self._bars.stop()
+        for task in self._bars.task_ids:  # they stand above, and are not to be drawn again
+            self._bars.remove_task(task)
+        try:
+            yield
+        finally:
+            self._bars.start()
 
     def __enter__(self) -> Self:
         self._bars.start()

@@ -59,7 +59,14 @@ Out = Annotated[
 ]
 
 
-Samples = Annotated[int, typer.Option("--samples", metavar="N", help="Boards in the study.")]
+Samples = Annotated[
+    int | None,
+    typer.Option(
+        "--samples",
+        metavar="N",
+        help="Boards in the study [200, all of a list, or the folder's own].",
+    ),
+]
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]

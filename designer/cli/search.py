@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,7 +21,6 @@ from designer.cli.app import (
     Overwrite,
     Quiet,
     Resume,
-    Seed,
     Source,
     Verbose,
     app,
@@ -28,6 +29,7 @@ from designer.cli.app import (
     session,
 )
 from designer.cli.tolerance import StudyRung
+from designer.cli.verbs import OwnSeed
 
 if TYPE_CHECKING:
     from designer.jobs.cure_job import CureResult
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 4000
 """Boards of the final study; as ``search_job.SAMPLES``."""
+SEED = 1
+"""Of a search or a cure that nobody says anything else of; as ``study.SEED``."""
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
 
@@ -68,7 +72,7 @@ def search(
             "--rung", help="Of the final study; auto: by a trade that is in the folder. [auto]"
         ),
     ] = None,
-    seed: Seed = 1,
+    seed: OwnSeed = None,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -81,9 +85,15 @@ def search(
     with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs.options import Options
 
-        count = SAMPLES if samples is None else samples
         said = StudyRung.AUTO if rung is None else rung
-        options = Options(seed, jobs, count, overwrite, resume, rung=said.value)
+        options = Options(
+            SEED if seed is None else seed,
+            jobs,
+            SAMPLES if samples is None else samples,
+            overwrite,
+            resume,
+            rung=said.value,
+        )
         options.check()
         if not model.exists():
             raise InputError(model, "MODEL|DIR", MISSING, "a model file or a design folder")
@@ -91,7 +101,8 @@ def search(
             for name, given in (("--samples", samples), ("--rung", rung)):
                 if given is not None:
                     raise InputError(None, name, given, "no such option with a design folder")
-            result = _cured(model, out, wanted, budget, without or [], options, progress)
+            cure = {"yield": wanted, "budget": budget, "without": without, "seed": seed}
+            result = _cured(model, out, cure, options, progress)
             if json:
                 print_json(result.answer)
             elif not quiet:
@@ -103,9 +114,10 @@ def search(
             if value not in (None, []):
                 expected = "a design folder to cure; a model file gets its highest yield"
                 raise InputError(None, name, value, expected)
-        from designer.jobs import search_job, synthesise_job
+        from designer.jobs import folder_numbers, search_job, synthesise_job
 
         modelfile, folder = synthesise_job.source(model, out)
+        options = folder_numbers.of_search(folder, options, {"samples": samples, "seed": seed})
         command = partial(Options.command, verb="search", model=model, out=out)
         outcome = search_job.search_into(modelfile, folder, options, progress, command)
     if json:
@@ -122,22 +134,29 @@ def search(
 def _cured(
     folder: Path,
     out: Path | None,
-    wanted: float | None,
-    budget: float | None,
-    without: list[str],
+    given: Mapping[str, Any],
     options: Options,
     progress: Progress,
 ) -> CureResult:
+    """given : the options of a cure by their names, None where there is none; then it is that of
+    the folder's own cure, if there is one."""
+    from designer.base.design_folder import Folder, is_design_folder
+    from designer.jobs import folder_numbers
     from designer.jobs.cure_job import cure
 
-    if wanted is None:
+    limits = () if options.overwrite else ("budget", "without")
+    known: dict[str, Any] = {}
+    if is_design_folder(folder):
+        known = folder_numbers.own(Folder(folder), "cure", ("yield", "seed"), limits)
+    asked = known | {name: value for name, value in given.items() if value is not None}
+    if "yield" not in asked:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
     return cure(
         folder,
-        target=wanted,
-        budget=budget,
+        target=asked["yield"],
+        budget=asked.get("budget"),
         out=out,
-        without=without,
-        options=options,
+        without=asked.get("without", ()),
+        options=replace(options, seed=asked.get("seed", SEED)),
         progress=progress,
     )

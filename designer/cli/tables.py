@@ -89,7 +89,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
             rate = "-" if r["rate"] is None else f"{100 * r['rate']:.1f}"
             counted = [
                 rate,
-                f"{100 * y['low']:.0f}–{100 * y['high']:.0f}",
+                _interval(y, y),
                 str(y["lost"]),
                 str(y["grazing"]),
                 str(y["failed"]),
@@ -105,6 +105,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
             *counted,
         )
     console.print(table)
+    _boards(console, answer)
     for r in answer["responses"]:
         for doubt in doubts(_with_its_figures(r)):
             print_line(console, f"ω = {r['omega']:g}: {doubt}")
@@ -114,12 +115,32 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         problem = EquationCheck.read(answer["equation_check"]).problem
         if problem:
             print_line(console, problem)
+    blame_status(answer)
     if answer.get("until") is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
         print_line(
             console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}"
         )
     _further(console, answer)
+
+
+def _boards(console: Console, answer: Mapping[str, Any]) -> None:
+    """One row for each measured board, where the study is of all of them."""
+    rows = answer.get("boards")
+    if not rows:
+        return
+    heads = [f"{r['omega']:g} {r['expected'] or '-'}" for r in answer["responses"]]
+    table = new_table(f"All {len(rows)} boards", "board", *heads, "all of them", gap=1)
+    for row in rows:
+        add_row(table, row["board"], *(cell or "-" for cell in row["cells"]), row["all"] or "-")
+    console.print(table)
+
+
+def blame_status(answer: Mapping[str, Any]) -> None:
+    """One line about a blame that is not whole; none where it is."""
+    status = answer.get("blame") or {}
+    if status.get("reason"):
+        print_line(new_console(), f"Blame {status['status']}: {status['reason']}")
 
 
 def _further(console: Console, answer: Mapping[str, Any]) -> None:
@@ -145,7 +166,7 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
             differ = c["disagreement"]
             cells += [
                 _percent(c["estimate"]),
-                f"{100 * c['low']:.0f}–{100 * c['high']:.0f}",
+                _interval(c, r["yield"]),
                 f"{differ['count']} of {differ['asked']}",
             ]
         add_row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
@@ -158,6 +179,13 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
     ]
     if said:
         print_line(console, f"All on one board: {', '.join(said)}")
+
+
+def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
+    """Of a share in per cent; of all boards there are, which have none, how many they are."""
+    if counted.get("census") and ends["low"] == ends["high"]:
+        return f"all {counted['samples']}"
+    return f"{100 * ends['low']:.0f}–{100 * ends['high']:.0f}"
 
 
 def _percent(rate: float | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,7 +15,6 @@ from designer.cli.app import (
     Overwrite,
     Quiet,
     Resume,
-    Seed,
     Source,
     Verbose,
     app,
@@ -23,6 +22,10 @@ from designer.cli.app import (
     print_json,
     session,
 )
+from designer.cli.verbs import OwnSeed
+
+BOARDS, SEED = 100, 1
+"""Of a trade that nobody says anything else of; as ``yields.BOARDS`` and ``study.SEED``."""
 
 
 @app.command()
@@ -30,12 +33,14 @@ def trade(
     model: Source,
     out: Out = None,
     boards: Annotated[
-        int,
+        int | None,
         typer.Option(
-            "--boards", metavar="N", help="Boards of each response for the yield; 0: none."
+            "--boards",
+            metavar="N",
+            help="Boards of each response for the yield; 0: none [100, or the folder's own].",
         ),
-    ] = 100,
-    seed: Seed = 1,
+    ] = None,
+    seed: OwnSeed = None,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -47,17 +52,23 @@ def trade(
     """Time and error of every rung on this design, and the cheapest for each question."""
     with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.base.checks import at_least
-        from designer.jobs import synthesise_job, trade_job
+        from designer.base.design_folder import Folder
+        from designer.jobs import folder_numbers, synthesise_job, trade_job
         from designer.model.model_file import read_model_file
 
-        at_least("--boards", boards, 0)
-        options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
-        options.check()
+        given = {"boards": boards, "seed": seed}
+        numbers: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
+        at_least("--boards", numbers.get("boards", BOARDS), 0)
+        synthesise_job.Options(numbers.get("seed", SEED), jobs).check()
         if out is None and not model.is_dir():
             modelfile, folder = read_model_file(model), None
         else:
             modelfile, folder = synthesise_job.source(model, out)
-        extent = trade_job.Extent(boards=boards)
+        if folder is not None and folder_numbers.goes_on(model, folder, resume):
+            numbers = folder_numbers.own(Folder(folder), "trade", tuple(given)) | numbers
+        seed = numbers.get("seed", SEED)
+        options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
+        extent = trade_job.Extent(boards=numbers.get("boards", BOARDS))
         answer, _ = trade_job.answer(modelfile, folder, options, extent, progress)
     if json:
         print_json(answer)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from designer.base.errors import InputError
+from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.cli.app import (
     VERBS,
@@ -43,12 +44,28 @@ STUDY_KEYS = (
     "until",
     "narrow",
     "all_on_one_board",
+    "blame",
+    "boards",
     "equation_check",
     "responses",
     "maps",
     "provenance",
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
+
+
+OwnSeed = Annotated[
+    int | None,
+    typer.Option("--seed", metavar="N", help="Of the random numbers [1, or the folder's own]."),
+]
+WithBlame = Annotated[
+    bool | None,
+    typer.Option("--blame/--no-blame", help="Which part is to blame [yes, or as the folder has]."),
+]
+BlameBudget = Annotated[
+    int | None,
+    typer.Option("--blame-budget", metavar="STEPS", help="Of the work on the blame [20000]."),
+]
 
 
 def dispatch(arguments: list[str]) -> int:
@@ -74,8 +91,10 @@ def _designer(
 def run(
     model: Source,
     out: Out = None,
-    samples: Samples = 200,
-    seed: Seed = 1,
+    samples: Samples = None,
+    blame: WithBlame = None,
+    blame_budget: BlameBudget = None,
+    seed: OwnSeed = None,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -86,15 +105,20 @@ def run(
 ) -> int:
     """Everything: parts, circuit, check in ngspice, yield, report."""
     with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.jobs import search_job, study_job, synthesise_job
+        from designer.jobs import folder_numbers, search_job, study_job, synthesise_job
         from designer.jobs.options import Options
 
-        options = Options(seed, jobs, samples, overwrite, resume)
+        given = {"samples": samples, "seed": seed, "until": None}
+        given |= {"blamed": blame, "blame_budget": blame_budget}
+        said: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
+        options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **said)
         options.check()
         modelfile, folder = synthesise_job.source(model, out)
+        options = folder_numbers.of_study(model, folder, modelfile, options, given)
         modelfile = search_job.chosen(modelfile, folder, options, progress)
         command = partial(Options.command, verb="run", model=model, out=out)
-        outcome = study_job.run_into(modelfile, folder, options, progress, command)
+        shown = partial(print_early, progress=progress, verb="run", silent=json or quiet)
+        outcome = study_job.run_into(modelfile, folder, options, progress, command, shown)
     return print_answer(outcome, json, quiet, "run")
 
 
@@ -263,23 +287,41 @@ def new(
 def print_answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
     answer = outcome.answer
     if verb == "tolerance":
-        answer = {**{k: answer[k] for k in STUDY_KEYS}, "cost": answer["cost"]["study"]}
+        answer = {k: answer[k] for k in STUDY_KEYS if k in answer} | {
+            "cost": answer["cost"]["study"]
+        }
     if json:
         print_json(answer)
     elif not quiet:
         from designer.cli import tables
 
-        shows: dict[str, Callable[[dict[str, Any]], None]] = {
-            "run": tables.run,
-            "synthesise": tables.synthesised,
-            "tolerance": tables.tolerance,
-        }
-        shows[verb](answer)
+        if outcome.shown:
+            tables.blame_status(answer)
+        else:
+            _shown(answer, verb)
         if "comparison" in answer:
             tables.compared(answer["comparison"])
         if outcome.folder is not None:
             tables.files(outcome.folder, outcome.reused)
     return 0 if outcome.satisfied else 1
+
+
+def print_early(answer: Mapping[str, Any], progress: Progress, verb: str, silent: bool) -> None:
+    """The tables of an answer whose yields stand, while the work goes on."""
+    if not silent:
+        with progress.aside():
+            _shown(answer, verb)
+
+
+def _shown(answer: Mapping[str, Any], verb: str) -> None:
+    from designer.cli import tables
+
+    shows: dict[str, Callable[[Mapping[str, Any]], None]] = {
+        "run": tables.run,
+        "synthesise": tables.synthesised,
+        "tolerance": tables.tolerance,
+    }
+    shows[verb](answer)
 
 
 # The verbs that stand in files of their own register themselves.

@@ -2,6 +2,9 @@ from . import (
     bifurcation_job as bifurcation_job,
 )
 from . import (
+    folder_numbers as folder_numbers,
+)
+from . import (
     origin as origin,
 )
 from . import (
@@ -36,6 +39,9 @@ from .design_files import (
 )
 from .export_job import (
     export_into as export_into,
+)
+from .measured_job import (
+    measured_into as measured_into,
 )
 from .options import (
     Options as Options,

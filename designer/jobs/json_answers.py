@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.model.model_file import ModelFile
     from designer.spread.part_grades import BetterGrade
 
-STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "maps")
+STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "blame", "boards", "maps")
 """What ``run`` prints of a study beside its responses."""
 
 

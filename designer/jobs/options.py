@@ -22,7 +22,8 @@ class Options:
 
     until, rung, tuned, reached, maps : as ``study.tolerance``. trimmed : whether the model file has
     a trimmer fitted, whose layer every study has. cluster : address of a Dask
-    scheduler, or None.
+    scheduler, or None. blamed : whether the blame is worked out; blame_budget : its steps, None
+    for ``blame_extent.BUDGET``. measured : list of boards that are studied instead of random ones.
     """
 
     seed: int = SEED
@@ -37,6 +38,9 @@ class Options:
     trimmed: bool = False
     maps: tuple[Over, ...] = ()
     cluster: str | None = None
+    blamed: bool = True
+    blame_budget: int | None = None
+    measured: Path | None = None
 
     def check(self) -> None:
         """InputError for a number that cannot be."""
@@ -48,6 +52,11 @@ class Options:
         if self.cluster is not None and not self.cluster.startswith(("tcp://", "tls://")):
             raise InputError(None, "--cluster", self.cluster, "a scheduler's address, tcp://…")
         at_least("--seed", self.seed, 0)
+        if self.blame_budget is not None:
+            at_least("--blame-budget", self.blame_budget, 1)
+            if not self.blamed:
+                expected = "no such option with --no-blame"
+                raise InputError(None, "--blame-budget", self.blame_budget, expected)
         if self.jobs is not None:
             at_least("--jobs", self.jobs, 1)
 
@@ -59,7 +68,11 @@ class Options:
         """
         said = ["designer", verb, _base(model)]
         said += [] if out is None else ["--out", _base(out)]
-        said += ["--samples", str(self.samples), "--seed", str(self.seed)]
+        if self.measured is None:
+            said += ["--samples", str(self.samples)]
+        else:
+            said += ["--measured", _base(self.measured)]
+        said += ["--seed", str(self.seed)]
         if verb in ("tolerance", "search"):
             said += [] if self.rung == "auto" else ["--rung", self.rung]
         if verb == "tolerance":
@@ -67,6 +80,10 @@ class Options:
             said += ["--tuned"] if self.tuned else []
             said += ["--reached"] if self.reached else []
             said += [word for over in self.maps for word in ("--map", over)]
+        if verb in ("tolerance", "run"):
+            said += [] if self.blamed else ["--no-blame"]
+            if self.blame_budget is not None:
+                said += ["--blame-budget", str(self.blame_budget)]
         return shlex.join(said)
 
 

@@ -34,7 +34,8 @@ from designer.jobs.options import Options
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import SEARCH
 from designer.jobs.study_folder import FolderStores
-from designer.jobs.study_job import SPICE_TIMEOUT, run_into
+from designer.jobs.study_job import run_into
+from designer.jobs.study_stage import SPICE_TIMEOUT
 from designer.jobs.synthesise_job import Outcome, design_inputs, grade_inputs, made_from, model_file
 from designer.model.model_file import ModelFile, naming
 from designer.spice import numerics_gate

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
+from designer.base.manifest import StageName
 from designer.model.tuning_bands import Bands
 from designer.yields.blame_analysis import Blame
+from designer.yields.blame_pieces import Pieces
 from designer.yields.layers import CHUNK, SEARCH
 from designer.yields.ngspice_sampling import Hearing
 from designer.yields.power_up_yield import Reached
@@ -32,6 +34,11 @@ SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
 TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
 MAPS, MAP = "maps.json", "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
+WITHOUT_BLAME, BLAME_BUDGET = "without blame", "blame budget "
+BOARDS = "boards.csv"
+"""A row for each measured board."""
+PIECES = "study-pieces.npz"
+"""What is known of a blame and of maps that are not whole."""
 
 
 def layers_of(options: Options) -> list[str]:
@@ -45,13 +52,29 @@ def layers_of(options: Options) -> list[str]:
     names |= {"tuned"} if options.tuned else set()
     names |= {"trimmed"} if options.trimmed else set()
     names |= {"reached"} if options.reached else set()
+    names |= set() if options.blamed else {WITHOUT_BLAME}
+    if options.blamed and options.blame_budget is not None:
+        names.add(f"{BLAME_BUDGET}{options.blame_budget}")
     return sorted(names)
 
 
-def merged(folder: Folder, inputs: Mapping[str, Any], options: Options) -> Options:
+def blamed(layers: Iterable[str]) -> bool:
+    """Whether a study of these layers has a blame."""
+    return WITHOUT_BLAME not in layers
+
+
+def blame_budget(layers: Iterable[str]) -> int | None:
+    """The largest budget among these layers; None where none is stated."""
+    budgets = [int(n.removeprefix(BLAME_BUDGET)) for n in layers if n.startswith(BLAME_BUDGET)]
+    return max(budgets, default=None)
+
+
+def merged(
+    folder: Folder, inputs: Mapping[str, Any], options: Options, name: StageName = "study"
+) -> Options:
     """The options with every layer that the folder's study has already, if it is one of the same
-    inputs otherwise: a study gets more layers, it loses none."""
-    stage = folder.manifest.stages.get("study") if folder.manifest else None
+    inputs otherwise: a study gets more layers, it loses none. name : of the study's stage."""
+    stage = folder.manifest.stages.get(name) if folder.manifest else None
     known = {} if stage is None else stage.inputs
     if {k: v for k, v in known.items() if k != "layers"} != dict(inputs):
         return options
@@ -61,23 +84,37 @@ def merged(folder: Folder, inputs: Mapping[str, Any], options: Options) -> Optio
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
     maps = tuple(over for over in OVERS if f"{MAP}{over}" in names)
     tuned, reached = "tuned" in names, "reached" in names
-    return replace(options, rung=rung, tuned=tuned, reached=reached, maps=maps)
+    has_blame = stage is not None and stage.complete and blamed(known["layers"])
+    with_blame = options.blamed or has_blame
+    return replace(
+        options,
+        rung=rung,
+        tuned=tuned,
+        reached=reached,
+        maps=maps,
+        blamed=with_blame,
+        blame_budget=blame_budget(names) if with_blame else None,
+    )
 
 
-def study_files(options: Options, responses: int) -> list[str]:
-    """What the stage writes; a name that ends in "/" is a folder of blocks."""
+def study_files(options: Options, responses: int, census: bool = False) -> list[str]:
+    """What the stage writes; a name that ends in "/" is a folder of blocks. census : whether it is
+    of all the boards of a list."""
     maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
     maps += [MAPS] if maps else []
     names = layers_of(options)
     folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "trimmed": TRIMMED}
     folders["reached"] = REACHED
     places = [f"{place}/" for name, place in folders.items() if name in names]
-    return [TOLERANCE, *REPORTS, KEPT, *maps, *places]
+    pieces = [PIECES] if options.blamed or options.maps else []
+    boards = [BOARDS] if census else []
+    return [TOLERANCE, *REPORTS, KEPT, *boards, *pieces, *maps, *places]
 
 
 class FolderStores(Stores):
     """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
-    is told of blocks that are of another study. kept : where the blame is."""
+    is told of blocks that are of another study. kept : where the blame is; pieces : where what is
+    known of one that is not whole. prefix : of the names in the folder, "" or ending in "/"."""
 
     def __init__(
         self,
@@ -85,8 +122,11 @@ class FolderStores(Stores):
         guard: Callable[[], None],
         note: Callable[[str], None] = lambda _: None,
         kept: Kept | None = None,
+        pieces: Kept | None = None,
+        prefix: str = "",
     ) -> None:
         self._root, self._guard, self._note, self._kept = root, guard, note, kept
+        self._pieces, self._prefix = pieces, prefix
         self._stores: dict[str, BlockStore[Any]] = {}
 
     def samples(self, plan: StudyPlan) -> BlockStore[Answer]:
@@ -106,13 +146,29 @@ class FolderStores(Stores):
         more = {"recipes": [r.as_dict() for r in recipes]}
         return self._store(plan, REACHED, Reached, "reached", SEARCH, more)
 
-    def blame(self, plan: StudyPlan) -> Blame | None:
-        return None if self._kept is None else self._kept.get("blame", blame_hash(plan))
+    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
+        if self._kept is None:
+            return None
+        found: Blame | None = self._kept.get("blame", blame_hash(plan))
+        if found is None or (found.share < 1.0 and (found.budget or 0) < budget):
+            return None
+        return found
 
     def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
         if self._kept is not None:
             self._guard()
             self._kept.put("blame", blame_hash(plan), replace(found, seconds=0.0))
+
+    def blame_pieces(self, plan: StudyPlan) -> Pieces:
+        return self._pieces_of(blame_hash(plan))
+
+    def maps(self, plan: StudyPlan) -> Pieces:
+        return self._pieces_of(study_hash(plan, "maps"))
+
+    def _pieces_of(self, key: str) -> Pieces:
+        if self._pieces is None:
+            return Pieces()
+        return _FolderPieces(self._pieces, key, self._guard)
 
     @property
     def names(self) -> Iterable[str]:
@@ -131,15 +187,31 @@ class FolderStores(Stores):
         if folder not in self._stores:
             self._stores[folder] = BlockStore(
                 self._root,
-                folder,
+                self._prefix + folder,
                 row,
                 study_hash(plan, layer, more),
                 omegas=[q.spec.omega for q in plan.questions],
+                labels=plan.labels,
                 size=size,
                 guard=self._guard,
                 note=self._note,
             )
         return self._stores[folder]
+
+
+class _FolderPieces(Pieces):
+    """Pieces of what ``key`` decides, in a file."""
+
+    def __init__(self, file: Kept, key: str, guard: Callable[[], None]) -> None:
+        self._file, self._key, self._guard = file, key, guard
+
+    def get(self, name: str) -> Any | None:
+        return self._file.get(name, self._key)
+
+    def put(self, values: Mapping[str, Any]) -> None:
+        if values:
+            self._guard()
+            self._file.put_all(values, self._key)
 
 
 def write_maps(folder: Folder, study: Study, provenance: Mapping[str, Any]) -> None:

@@ -6,44 +6,34 @@ Nothing here prints; ``cli.verbs`` does.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from designer.base.checks import at_least, cores
-from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
+from designer.base.design_folder import Folder
 from designer.base.manifest import StageName
-from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import synthesis_result
-from designer.check.checked_design import Checked
-from designer.check.synthesis_result import Synthesis, synthesise
+from designer.check.synthesis_result import synthesise
 from designer.jobs import design_files, kicad_files, rung_choice
 from designer.jobs.design_files import load
-from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
-from designer.jobs.origin import provenance
-from designer.jobs.study_folder import FolderStores, layers_of, merged, study_files, write_maps
-from designer.jobs.study_json import study_json
+from designer.jobs.study_folder import layers_of, merged, study_files
+from designer.jobs.study_stage import SPICE_TIMEOUT as SPICE_TIMEOUT
+from designer.jobs.study_stage import Help, Place, Stage, checks, satisfied
 from designer.jobs.synthesise_job import Outcome, bills_are_of_old, design_inputs, standing_inputs
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spice import equation_check
-from designer.spice.equation_check import EquationCheck
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.spice.simulator import SimulationFailed
-from designer.synthesis.tie_break import SOLVER
-from designer.yields.layers import Here, Runner
 from designer.yields.run_result import RunResult
-from designer.yields.study import SAMPLES, SEED, Study
-from designer.yields.study_cache import KEPT, Kept
-from designer.yields.study_identity import RULES, checks_hash
-from designer.yields.tolerance_study import check, tolerance
+from designer.yields.study import SAMPLES, SEED
+from designer.yields.tolerance_study import tolerance
 
-SPICE_TIMEOUT = 900.0
-"""The longest that one run of ngspice may take in a study, s: a way of thousands of periods."""
+PLACE = Place()
+"""Of the study of random boards."""
 
 
 def run_into(
@@ -52,10 +42,12 @@ def run_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
+    shown: Callable[[Mapping[str, Any]], None] = lambda _: None,
 ) -> Outcome:
     """The verbs ``run`` and ``tolerance``: design, check, study, report.
 
-    command : the command line as the report states it (``Options.command``).
+    command : the command line as the report states it (``Options.command``). shown : is given the
+    answer once its yields stand and are written, where blame or maps take time after that.
 
     Raises
     ------
@@ -70,10 +62,10 @@ def run_into(
     wanted |= standing_inputs(folder, modelfile, catalog, progress)
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
     if not todo:
-        answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
-        return Outcome(answer, _satisfied(answer), out, True)
+        answer = PLACE.answer(folder)
+        return Outcome(answer, satisfied(answer), out, True)
     began = time.perf_counter()
-    with _Help.of(options, progress) as help_:
+    with Help.of(options, progress) as help_:
         progress.stage("responses of the model, parts")
         if "design" in todo:
             made = synthesis_result.synthesise(modelfile, catalog)
@@ -93,134 +85,20 @@ def run_into(
             ):
                 design_files.renew_bills(folder, made)
         design_seconds = time.perf_counter() - began
-        result, blocks = _studied(folder, made, options, help_, progress)
-    result.cost["design_seconds"] = design_seconds
-    said = result.provenance
-    if result.study.maps:
-        write_maps(folder, result.study, said)
-    folder.write(TOLERANCE, dumps(study_json(result.study, said, result.cost, result.equations)))
-    progress.stage("report")
-    from designer.report.data import ReportData
-    from designer.report.write import write_report  # matplotlib is not needed before this
-
-    data = ReportData.of(result, command(options), design_files.starts(folder))
-    write_report(data, *(folder / name for name in REPORTS))
-    assert folder.manifest is not None
-    folder.manifest.provenance = said
-    folder.finish("study", blocks)
-    answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
-    return Outcome(answer, _satisfied(answer), out, False, result)
-
-
-@dataclass(frozen=True)
-class _Help:
-    """What a study is helped by. pool : None where ngspice is not asked. runner : who computes
-    blocks."""
-
-    jobs: int
-    pool: SpicePool | None
-    runner: Runner
-
-    @classmethod
-    @contextmanager
-    def of(cls, options: Options, progress: Progress) -> Iterator[_Help]:
-        """What these options need, found before anything is written.
-
-        Raises
-        ------
-        EnvironmentMissing : it is not there.
-        """
-        jobs = cores() if options.jobs is None else options.jobs
-        with ExitStack() as stack:
-            pool = None
-            if options.rung != "exact":
-                progress.stage("ngspice")
-                pool = stack.enter_context(SpicePool(jobs, timeout=SPICE_TIMEOUT))
-                require_ngspice(pool)
-            runner: Runner = Here(jobs)
-            if options.cluster is not None:
-                from designer.yields.dask_runner import Cluster
-
-                progress.stage(f"cluster {options.cluster}")
-                runner = stack.enter_context(Cluster(options.cluster))
-            yield cls(jobs, pool, runner)
-
-
-def _studied(
-    folder: Folder, made: Synthesis, options: Options, help_: _Help, progress: Progress
-) -> tuple[RunResult, Iterable[str]]:
-    """Checks and study of a design in its folder, and the files of the study's blocks."""
-    ready = time.perf_counter()
-    kept = Kept(folder / KEPT, lambda content: folder.write(KEPT, content))
-    equations, checked = _checks(folder, made, help_.pool, kept, progress)
-    if checked[0].gate is not None and checked[0].gate.passed:
-        folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
-        kicad_files.settle(folder, made, checked[0])
-    gated = time.perf_counter()
-    guard = folder.watch()
-    stores = FolderStores(folder.path, guard, progress.note, kept)
-    study = tolerance(
-        made,
-        samples=options.samples,
-        until=options.until,
-        rung=options.rung,
-        tuned=options.tuned,
-        reached=options.reached,
-        maps=options.maps,
-        seed=options.seed,
-        jobs=help_.jobs,
-        pool=help_.pool,
-        checked=checked,
-        stores=stores,
-        runner=help_.runner,
-        progress=progress,
-    )
-    guard()
-    kept.forget_unused()
-    cost = {
-        "check_seconds": gated - ready,
-        "study_seconds": time.perf_counter() - gated,
-        "blame_seconds": 0.0 if study.blame is None else study.blame.seconds,
-        "maps_seconds": sum(found.seconds for found in study.maps),
-        "jobs": float(help_.jobs),
-    }
-    result = RunResult(
-        made.modelfile,
-        made.catalog,
-        made.found,
-        made.design,
-        checked,
-        study,
-        _study_provenance(made, study, options),
-        cost,
-        equations,
-    )
-    return result, stores.names
-
-
-def _checks(
-    folder: Folder, made: Synthesis, pool: SpicePool | None, kept: Kept, progress: Progress
-) -> tuple[EquationCheck | None, tuple[Checked, ...]]:
-    """What ngspice says of the design's equations and of its nominal responses, or said before."""
-    if pool is None:
-        return None, check(made, None, progress)
-    assert folder.manifest is not None
-    key = checks_hash(folder.manifest.files[DESIGN][1], pool.version)
-    equations: EquationCheck | None = kept.get("equations", key)
-    if equations is None:
-        progress.stage("ngspice, equation check")
-        equations = equation_check.check(made.design, made.found, pool)
-        if not any(finding.reason for finding in equations.findings):
-            kept.put("equations", key, equations)
-    if not equations.passed:
-        progress.note(equations.problem)
-    gates = kept.get("gates", key)
-    checked = check(made, pool, progress, gates)
-    met = tuple(c.gate for c in checked)
-    # A run without an answer is asked again the next time.
-    if gates is None and not any(g and isinstance(g.read, SimulationFailed) for g in met):
-        kept.put("gates", key, met)
-    return equations, checked
+        ready = time.perf_counter()
+        kept = PLACE.kept(folder)
+        checked = checks(folder, made, help_.pool, kept, progress)
+        first = checked[1][0]
+        if first.gate is not None and first.gate.passed:
+            folder.rewrite("circuit.cir", design_files.circuit_deck(made, first))
+            kicad_files.settle(folder, made, first)
+        seconds = time.perf_counter() - ready
+        stage = Stage(
+            folder, PLACE, made, options, command(options), progress, shown, design_seconds
+        )
+        result = stage.done(checked, kept, help_, seconds)
+    answer = PLACE.answer(folder)
+    return Outcome(answer, satisfied(answer), out, False, result, shown=stage.early)
 
 
 def _study_wanted(
@@ -236,42 +114,10 @@ def _study_wanted(
     }
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     options = merged(folder, inputs, options)
-    files = study_files(options, len(modelfile.responses))
+    labels = () if modelfile.measured is None else modelfile.measured.labels
+    files = study_files(options, len(modelfile.responses), len(labels) == options.samples)
     wanted["study"] = ({**inputs, "layers": layers_of(options)}, files)
     return wanted, options
-
-
-def _study_provenance(made: Synthesis, study: Study, options: Options) -> dict[str, Any]:
-    return provenance(
-        made.modelfile,
-        made.catalog.hash,
-        seed=options.seed,
-        settings={
-            "highs": SOLVER,
-            "rules": RULES,
-            "rung": options.rung,
-            "ngspice": [
-                {"omega": c.model.omega, **c.gate.as_dict()}
-                for c in study.checked
-                if c.gate is not None
-            ],
-        },
-        spread=study.plan.spread.as_dict(),
-    )
-
-
-def _satisfied(answer: Mapping[str, Any]) -> bool:
-    right = answer["equation_check"] is None or answer["equation_check"]["passed"]
-    return right and all(
-        r["found"] and r["engines_agree"] and _trusted(r.get("trust", {}))
-        for r in answer["responses"]
-    )
-
-
-def _trusted(said: Mapping[str, Any]) -> bool:
-    """Of the engines' answers, where each has one (null: it has none); a yield says only how far
-    it is known. Older folders say nothing."""
-    return all(engine["trusted"] is True for name, engine in said.items() if name != "yield")
 
 
 def run(

@@ -11,6 +11,7 @@ import numpy as np
 
 from designer.base.plain_json import FORMAT
 from designer.check.checked_design import Checked
+from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
 from designer.yields.ngspice_sampling import Hearing, Outcome
 from designer.yields.power_up_yield import Reached
@@ -37,6 +38,7 @@ def study_json(
     return {
         "format": FORMAT,
         "samples": study.plan.samples,
+        "boards": measured_table.rows(study),
         "until": study.until,
         "narrow": study.narrow,
         "all_on_one_board": {
@@ -45,6 +47,7 @@ def study_json(
             "trimmed": _yield(study.all_trimmed),
             "reached": _yield(study.all_reached),
         },
+        "blame": study.blame_status.as_dict(),
         "equation_check": None if equations is None else equations.as_dict(),
         "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
         "maps": [_map(found) for found in study.maps],
@@ -74,8 +77,8 @@ def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
         "margins": margins(answers),
         "agreement": _agreement(answers, study.heard_of(index)),
         "combined": _combined(study.combined[index]),
-        "tuned": tuned_json(study.tuned_of(index)),
-        "trimmed": trimmed_json(study.trimmed_of(index)),
+        "tuned": tuned_json(study.tuned_of(index), study.plan.census),
+        "trimmed": trimmed_json(study.trimmed_of(index), study.plan.census),
         "reached": _reached(study, index),
         "blame": _blame(study, index),
         "trust": {
@@ -102,17 +105,18 @@ def _yield(counted: Yield | None) -> dict[str, Any] | None:
         "samples": counted.samples,
         "low": low,
         "high": high,
+        **({"census": True} if counted.census else {}),
     }
 
 
-def tuned_json(rows: Sequence[Tuned]) -> dict[str, Any] | None:
+def tuned_json(rows: Sequence[Tuned], census: bool = False) -> dict[str, Any] | None:
     """What exists within the bands, and under ``bench`` what the bench procedure finds."""
     if not rows:
         return None
     bench = Counter(r.bench_verdict for r in rows)
-    found = Yield(*(bench[verdict] for verdict in ORDER))
+    found = Yield(*(bench[verdict] for verdict in ORDER), census=census)
     return {
-        **_counted(count(rows)),
+        **_counted(count(rows, census)),
         "tries": sum(r.tries for r in rows),
         "unanswered": sum(r.unanswered for r in rows),
         "followed": sum(r.followed for r in rows),
@@ -126,12 +130,12 @@ def tuned_json(rows: Sequence[Tuned]) -> dict[str, Any] | None:
     }
 
 
-def trimmed_json(rows: Sequence[Trimmed]) -> dict[str, Any] | None:
+def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> dict[str, Any] | None:
     """What the boards show with their trimmers set; at_end : boards that would turn further."""
     if not rows:
         return None
     return {
-        **_counted(count(rows)),
+        **_counted(count(rows, census)),
         "reasons": _reasons(rows),
         "at_end": sum(r.at_end for r in rows),
     }
@@ -143,7 +147,7 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
     if not rows or study.recipes is None:
         return None
     return {
-        **_counted(count(rows)),
+        **_counted(count(rows, study.plan.census)),
         "reasons": _reasons(rows),
         "clipped_at_start": sum(r.clipped for r in rows),
         "recipe": study.recipes[study.asked.index(index)].as_dict(),

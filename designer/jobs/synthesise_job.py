@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,8 @@ class Outcome:
     """What a verb answers: the JSON object, and whether the answer is yes.
 
     folder : None where nothing was to be written. reused : whether the folder held the answer
-    already. result : None where it was reused.
+    already. result : None where it was reused. shown : whether what stands in the answer beside
+    blame and maps was shown before they were worked out.
     """
 
     answer: dict[str, Any]
@@ -53,12 +54,21 @@ class Outcome:
     folder: Path | None
     reused: bool
     result: RunResult | None = None
+    shown: bool = False
 
 
 def model_file(path: Path) -> ModelFile:
-    """Read a model file; a design folder's has its measured values from the folder's own copy."""
-    inside = path.name == MODEL and is_design_folder(path.parent)
-    return read_model_file(path, measured=path.parent / MEASURED if inside else None)
+    """Read a model file; a design folder's has its measured values from the folder's own copy, and
+    where it states no title that of the file it was copied from."""
+    if path.name != MODEL or not is_design_folder(path.parent):
+        return read_model_file(path)
+    found = read_model_file(path, measured=path.parent / MEASURED)
+    if found.title != path.stem or not (path.parent / DESIGN).is_file():
+        return found
+    title = Folder(path.parent).json(DESIGN).get("title")
+    if not isinstance(title, str) or len(title.splitlines()) != 1:
+        return found
+    return replace(found, title=title)
 
 
 def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:

@@ -73,6 +73,9 @@ from .measured_values import (
 from .measured_values import (
     Measured as Measured,
 )
+from .measured_values import (
+    read_measured as read_measured,
+)
 from .mechanics import (
     SecondOrderSystem as SecondOrderSystem,
 )

@@ -56,6 +56,11 @@ class Measured:
     lines: Mapping[str, int] = field(default_factory=dict)
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the boards; empty where the list is of one board without a name."""
+        return () if self.boards == ("",) else self.boards
+
+    @property
     def sha256(self) -> str:
         """Hash of the file."""
         return hashlib.sha256(self.content).hexdigest()

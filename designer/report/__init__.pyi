@@ -11,6 +11,9 @@ from . import (
     comparison as comparison,
 )
 from . import (
+    measured_table as measured_table,
+)
+from . import (
     simulate_plots as simulate_plots,
 )
 from .bifurcation_plots import (

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, ON_LIGHT, new_figure, say, styled
-from designer.yields.blame_analysis import ResponseBlame, Subject
+from designer.yields.blame_analysis import ResponseBlame
+from designer.yields.blame_replay import Subject
 
 PARTS_SHOWN = 16
 INDICES_SHOWN = 8

@@ -86,6 +86,7 @@ class ReportData:
                 recipes=result.study.recipes or (),
                 blame=result.study.blame,
                 maps=result.study.maps,
+                status=result.study.blame_status,
             ),
         )
 
@@ -105,6 +106,11 @@ class ReportData:
                 del free[number]
             found.append(number)
         return tuple(found)
+
+    @property
+    def census(self) -> bool:
+        """Whether the study's boards are all the boards there are."""
+        return self.plan is not None and self.plan.census
 
     @property
     def ngspice_asked(self) -> bool:
@@ -138,4 +144,4 @@ class ReportData:
         """Boards that show every response; None unless each was asked of each board."""
         if len(self.checked) < 2 or None in self.question_of or not self.answers:
             return None
-        return all_on_one(self.answers)
+        return all_on_one(self.answers, self.census)

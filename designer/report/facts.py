@@ -8,6 +8,7 @@ from typing import Any
 from designer.base.figure_style import EXACT
 from designer.circuit.design import Design
 from designer.model.sketch import sketch
+from designer.report import boards as report_boards
 from designer.report import design_tables, model_page, tables, tolerance, words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
@@ -55,6 +56,8 @@ def facts(data: ReportData) -> dict[str, Any]:
         "provenance_table": tables.provenance_table(data),
         "command": data.command,
         "glossary": _GLOSSARY,
+        "board_table": report_boards.table(data),
+        "all_boards": data.census,
         **tolerance.facts(data),
     }
 
@@ -170,16 +173,21 @@ def _yield_words(data: ReportData) -> list[str]:
     failed = sum(y.failed for _, y in rows)
     if failed:
         said.append(f"{words.plural(failed, 'run')} gave no answer, which the yields leave out.")
-    if samples < FEW:
+    if samples < FEW and not data.census:
         said.append(f"So few samples ({samples}) leave wide intervals.")
     left = len(data.checked) - len(rows)
     if left:
         said.append(f"{words.plural(left, 'response')} could not be studied.")
+    if data.census:
+        boards = f"All {samples} measured boards" if samples > 1 else "The measured board"
+        return [f"{boards}, simulated: " + " ".join(said)]
     return [f"Component spread, {samples} simulated boards: " + " ".join(said)]
 
 
 def _of_a_thousand(y: Yield) -> str:
     low, high = (round(1000 * v) for v in y.interval)
+    if y.census:
+        return f"{round(1000 * y.rate)} by share"
     return f"about {round(1000 * y.rate)} (95 % interval {low} to {high})"
 
 
@@ -202,23 +210,30 @@ def _tiles(data: ReportData) -> list[tuple[str, str]]:
     if known:
         least = min(known, key=lambda y: y.rate)
         low, high = words.span(*least.interval)
+        within = words.limits(least, f"{low} to {high}\u00a0%")
         what = "yield" if len(known) == 1 else "least yield"
-        out.append((f"{100 * least.rate:.0f} %", f"{what} ({low} to {high}\u00a0%)"))
+        out.append((f"{100 * least.rate:.0f} %", f"{what} ({within})"))
     whole = data.all_on_one_board
     if whole is not None and math.isfinite(whole.rate):
         low, high = words.span(*whole.interval)
-        out.append((f"{100 * whole.rate:.0f} %", f"all on one board ({low} to {high}\u00a0%)"))
+        within = words.limits(whole, f"{low} to {high}\u00a0%")
+        out.append((f"{100 * whole.rate:.0f} %", f"all on one board ({within})"))
     return out
 
 
 def _study_note(data: ReportData) -> str:
     if data.plan is None:
         return "No tolerance study was made."
+    status = data.layers.status
+    blame = "" if status is None else status.sentence
+    limits = "Intervals are Wilson's, at 95 %."
+    if data.census:
+        limits = "These are all the boards there are, so their shares have no interval."
     varies = words_of(data.plan.spread, data.design.circuit)
     return (
         f"{words.plural(data.plan.samples, 'board')}, seed {data.plan.seed}: {varies}. "
         "Boards run as built: the generator stays at the settings above. Verdicts are those of "
-        "the exact circuit. Intervals are Wilson's, at 95 %."
+        f"the exact circuit. {limits}" + (f" {blame}" if blame else "")
     )
 
 

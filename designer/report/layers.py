@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from designer.yields.blame_analysis import Blame
+from designer.yields.blame_status import BlameStatus
 from designer.yields.verdict import Verdict
 from designer.yields.yield_maps import YieldMap
 
@@ -88,6 +89,7 @@ class Layers:
     """What a study has beside its answers as built; empty or None where it was not asked.
 
     tuned, trimmed, reached : rows of all questions. combined : by response. recipes : by question.
+    status : how much of the blame there is; None where nobody says.
     """
 
     tuned: Sequence[Benched] | None = None
@@ -97,3 +99,4 @@ class Layers:
     recipes: Sequence[Start] = ()
     blame: Blame | None = None
     maps: Sequence[YieldMap] = ()
+    status: BlameStatus | None = None

@@ -117,8 +117,8 @@ def _yield_picture(data: ReportData, page: InlineSvg) -> Picture | None:
     return _picture(
         page,
         study_plots.yield_chart(labels, yields),
-        "Yield of each response with its 95 % interval, and counts of ok, lost, grazing, failed; "
-        "the figures are in the table.",
+        f"Yield of each response {'among all boards' if data.census else 'with its 95 % interval'}"
+        ", and counts of ok, lost, grazing, failed; the figures are in the table.",
     )
 
 

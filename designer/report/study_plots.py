@@ -55,7 +55,8 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
         axes.set_xticks([0, 25, 50, 75, 100])
     left.set_xlim(-2.0, 118.0)
     left.spines["bottom"].set_bounds(0.0, 100.0)
-    left.set_xlabel("yield with its 95 % interval [%]")
+    every = any(y is not None and y.census for y in yields)
+    left.set_xlabel("yield, of all boards [%]" if every else "yield with its 95 % interval [%]")
     right.set_xlabel("share of the samples [%]; counts inside")
     met = [v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)]
     if met:

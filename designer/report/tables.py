@@ -205,7 +205,7 @@ def _per_thousand(y: Yield) -> str:
     low, high = (round(1000 * v) for v in y.interval)
     if not math.isfinite(y.rate):
         return words.NONE
-    return f"{round(1000 * y.rate)} ({low} to {high})"
+    return f"{round(1000 * y.rate)} ({words.limits(y, f'{low} to {high}')})"
 
 
 def _reasons(answers: Sequence[Answer]) -> str:

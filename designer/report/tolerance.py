@@ -14,7 +14,8 @@ from designer.report import words
 from designer.report.data import ReportData
 from designer.report.layers import Benched, Both, Judged
 from designer.report.tables import Table
-from designer.yields.blame_analysis import Blame, ResponseBlame, Subject
+from designer.yields.blame_analysis import Blame, ResponseBlame
+from designer.yields.blame_replay import Subject
 from designer.yields.joint_yield import all_on_one
 from designer.yields.ngspice_sampling import Kind
 from designer.yields.verdict import Verdict, Yield, count
@@ -57,16 +58,14 @@ def _kinds(data: ReportData) -> Table | None:
     columns.append(("as built", lambda i: _share(data.yield_of(i))))
     if layers.tuned is not None:
         rows, benched = layers.tuned, [_Bench(r) for r in layers.tuned]
-        columns.append(("tuned", lambda i: _share(_count(rows, data.question_of[i]))))
-        columns.append(
-            ("tuned on the bench", lambda i: _share(_count(benched, data.question_of[i])))
-        )
+        columns.append(("tuned", lambda i: _share(_count(data, rows, i))))
+        columns.append(("tuned on the bench", lambda i: _share(_count(data, benched, i))))
     if layers.trimmed is not None:
         trimmed = layers.trimmed
-        columns.append(("trimmed", lambda i: _share(_count(trimmed, data.question_of[i]))))
+        columns.append(("trimmed", lambda i: _share(_count(data, trimmed, i))))
     if layers.reached is not None:
         reached = layers.reached
-        columns.append(("reached", lambda i: _share(_count(reached, data.question_of[i]))))
+        columns.append(("reached", lambda i: _share(_count(data, reached, i))))
     if any(c is not None for c in layers.combined):
         columns.append(("both engines together", lambda i: _both(layers.combined[i])))
     if len(columns) == 1 or not data.checked:
@@ -111,7 +110,7 @@ def _whole(data: ReportData) -> dict[str, str]:
     out = {"as built": _share(data.all_on_one_board)}
 
     def whole(rows: Iterable[Judged]) -> str:
-        return _share(all_on_one(rows))
+        return _share(all_on_one(rows, data.census))
 
     if data.layers.tuned is not None:
         out["tuned"] = whole(data.layers.tuned)
@@ -123,22 +122,28 @@ def _whole(data: ReportData) -> dict[str, str]:
     return out
 
 
-def _count(rows: Iterable[Judged], question: int | None) -> Yield | None:
-    return None if question is None else count(r for r in rows if r.question == question)
+def _count(data: ReportData, rows: Iterable[Judged], response: int) -> Yield | None:
+    question = data.question_of[response]
+    if question is None:
+        return None
+    return count((r for r in rows if r.question == question), data.census)
 
 
 def _share(counted: Yield | None) -> str:
     if counted is None or not math.isfinite(counted.rate):
         return words.NONE
     low, high = counted.interval
-    said = f"{100 * counted.rate:.3g} % ({100 * low:.3g} to {100 * high:.3g})"
+    within = words.limits(counted, f"{100 * low:.3g} to {100 * high:.3g}")
+    said = f"{100 * counted.rate:.3g} % ({within})"
     return said + (f", {counted.failed} failed" if counted.failed else "")
 
 
 def _both(both: Both | None) -> str:
     if both is None:
         return words.NONE
-    said = f"{100 * both.estimate:.3g} % ({100 * both.low:.3g} to {100 * both.high:.3g})"
+    said = f"{100 * both.estimate:.3g} %"
+    if both.low < both.high:  # not so where all the boards there are were asked
+        said += f" ({100 * both.low:.3g} to {100 * both.high:.3g})"
     if both.undecided:
         said += (
             f", {both.undecided} without an answer in ngspice: {100 * both.if_lost:.3g} % if these "
@@ -223,7 +228,7 @@ def _avoided(data: ReportData) -> Table | None:
                 words.name(c),
                 str(b.lost),
                 ", ".join(map(_saved, groups)) or words.NONE,
-                ", ".join(map(_saved, parts)) or "none by itself",
+                ", ".join(map(_saved, parts)) or b.skipped or "none by itself",
             )
         )
     if not rows:

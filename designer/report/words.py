@@ -11,6 +11,7 @@ from designer.base.units import format_quantity
 from designer.check.checked_design import Checked
 from designer.check.trust import WORDS
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.yields.verdict import Yield
 
 NONE = "–"
 
@@ -66,6 +67,12 @@ def coefficient(name: str) -> str:
 
 def _pretty(state: str) -> str:
     return state.replace("''", "″").replace("'", "′").translate(_SUBSCRIPTS)
+
+
+def limits(counted: Yield, figures: str) -> str:
+    """An interval beside a share, given in ``figures``; of a census, which has none, the number
+    of its boards."""
+    return f"all {plural(counted.samples, 'board')}" if counted.census else figures
 
 
 def yes(value: bool | None) -> str:

@@ -20,10 +20,22 @@ from .blame_analysis import (
     ResponseBlame as ResponseBlame,
 )
 from .blame_analysis import (
+    blame as blame,
+)
+from .blame_extent import (
+    BUDGET as BUDGET,
+)
+from .blame_pieces import (
+    Pieces as Pieces,
+)
+from .blame_replay import (
     Subject as Subject,
 )
-from .blame_analysis import (
-    blame as blame,
+from .blame_status import (
+    BlameStage as BlameStage,
+)
+from .blame_status import (
+    BlameStatus as BlameStatus,
 )
 from .dask_runner import (
     Cluster as Cluster,
@@ -36,6 +48,9 @@ from .exact_rung import (
 )
 from .joint_yield import (
     all_on_one as all_on_one,
+)
+from .joint_yield import (
+    worst as worst,
 )
 from .layers import (
     CHUNK as CHUNK,

@@ -14,62 +14,25 @@ Three answers for each response, each with what it cost:
 
 from __future__ import annotations
 
-import re
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from designer.base.plain_json import plain
-from designer.base.proportion import wilson
-from designer.circuit.board_arrays import Boards
-from designer.circuit.ensemble import Ensemble
-from designer.circuit.netlist import Capacitor, Reference, Resistor, Section
-from designer.spread.board_quantities import exact_in, quantities
-from designer.spread.spread import draw_many
 from designer.yields import margins as smooth
+from designer.yields.blame_extent import extent_of
+from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_replay import KEPT, LOST, replay
+from designer.yields.blame_replay import Subject as Subject
 from designer.yields.corners import Corner, worst_corners
 from designer.yields.margins import Margin, Prediction
 from designer.yields.sobol import Index, sobol
-from designer.yields.verdict import Answer, StudyPlan, Verdict, judge
+from designer.yields.verdict import Answer, StudyPlan, Verdict
 
-LOST, KEPT = 50, 20
-"""Boards of each response that are replayed: lost ones, and ok ones, in order of the samples."""
 SHOWN_LIMITS = 4
-DRAWN = 256
-"""Boards, at least, from which the standard deviations of the quantities are taken."""
-
-_DEAD_ZONE = re.compile(r"R[2-9]\d\d[AB]?")
-
-
-@dataclass(frozen=True)
-class Subject:
-    """A part or a group that was made exact, and what became of the boards.
-
-    kind : "resistor", "capacitor", "op-amp", "reference", "supply" or "group". avoided of replayed
-    lost boards were ok then; caused of kept ok boards were lost. Boards without an answer count in
-    neither.
-    """
-
-    name: str
-    kind: str
-    avoided: int
-    replayed: int
-    caused: int
-    kept: int
-
-    @property
-    def share(self) -> float:
-        """Of the losses, avoided; nan where nothing was replayed."""
-        return self.avoided / self.replayed if self.replayed else float("nan")
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Two-sided 95 % Wilson interval of the share."""
-        return wilson(self.avoided, self.replayed)
+NOTHING_LOST = "no board was lost, so none was replayed"
 
 
 @dataclass(frozen=True)
@@ -86,7 +49,8 @@ class ResponseBlame:
 
     lost : boards of the study. subjects : most losses avoided first, groups among them. there : of
     ``sought`` lost boards, those on which the response exists and the nominal orbit leads
-    elsewhere. limited_by : one sentence.
+    elsewhere. limited_by : one sentence. skipped : why boards were not replayed, or no more than a
+    few; "" where they were.
     """
 
     question: int
@@ -99,12 +63,14 @@ class ResponseBlame:
     there: int
     corner: Corner | None
     limited_by: str
+    skipped: str = ""
 
 
 @dataclass(frozen=True)
 class Blame:
     """The blame of every question. attractors, orbits : sought and followed; seconds : wall time,
-    all that may differ between equal runs."""
+    all that may differ between equal runs. budget : steps that were allowed, None where all were;
+    share : of the whole work, what was done within it."""
 
     responses: tuple[ResponseBlame, ...]
     samples: int
@@ -112,6 +78,8 @@ class Blame:
     attractors: int
     orbits: int
     seconds: float
+    budget: int | None = None
+    share: float = 1.0
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; an undefined number is None."""
@@ -134,14 +102,18 @@ def blame(
     *,
     lost: int = LOST,
     kept: int = KEPT,
+    budget: int | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
+    pieces: Pieces | None = None,
 ) -> Blame:
     """Blame the parts for the losses among these answers (as built, exact rung).
 
     answers : of any of the plan's samples, in any order. lost, kept : boards of each response that
-    are replayed, at most. progress : called once an attractor that was sought or an orbit that was
-    followed. The same answers give the same blame but for ``seconds``.
+    are replayed, at most. budget : steps of the work, see ``blame_extent``; all of it if None.
+    progress : called once for each of the extent's steps. pieces : what is known of this very
+    blame, and where the rest goes as it is found. The same answers and budget give the same blame
+    but for ``seconds``.
     """
     began = time.perf_counter()
     spent = Counter[str]()
@@ -153,18 +125,33 @@ def blame(
 
         return step
 
-    count = 1 + max((a.sample for a in answers), default=0)
-    boards = draw_many(plan.circuit, plan.spread, plan.seed, range(max(count, DRAWN)))
-    rows = [
-        sorted((a for a in answers if a.question == i), key=lambda a: a.sample)
-        for i in range(len(plan.questions))
-    ]
-    subjects = _replay(plan, boards, rows, (lost, kept), jobs, count_as("attractors"))
+    pieces = Pieces() if pieces is None else pieces
+    extent = extent_of(plan, answers, budget, lost=lost, kept=kept)
+    boards, rows = extent.boards, extent.rows
+    subjects, cut = replay(
+        plan,
+        boards,
+        extent.replays,
+        extent.made,
+        extent.hopeless,
+        pieces,
+        jobs,
+        count_as("attractors"),
+    )
     found = smooth.margins(
-        plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=count_as("orbits")
+        plan.circuit,
+        plan.questions,
+        boards,
+        rows,
+        only=extent.crossings,
+        jobs=jobs,
+        progress=count_as("orbits"),
+        pieces=pieces,
     )
     indices = sobol(plan.circuit, plan.spread, found, plan.seed)
-    corners = worst_corners(plan, found, indices, jobs, count_as("attractors"))
+    corners = worst_corners(plan, found, indices, jobs, count_as("attractors"), pieces)
+    for _ in range(extent.steps - spent.total()):  # what turned out not to be needed
+        progress()
     responses = []
     for i, row in enumerate(rows):
         number = sum(a.verdict is Verdict.LOST for a in row)
@@ -181,96 +168,35 @@ def blame(
                 there=found[i].there,
                 corner=corners[i],
                 limited_by=_sentence(row, subjects[i], indices[i], found[i]),
+                skipped=_skipped(row, subjects[i], cut[i]),
             )
         )
     return Blame(
         tuple(responses),
-        count,
+        1 + max((a.sample for a in answers), default=0),
         plan.seed,
         spent["attractors"],
         spent["orbits"],
         time.perf_counter() - began,
+        None if extent.share >= 1.0 else budget,
+        extent.share,
     )
 
 
-def _replay(
-    plan: StudyPlan,
-    boards: Boards,
-    rows: Sequence[Sequence[Answer]],
-    most: tuple[int, int],
-    jobs: int,
-    progress: Callable[[], None],
-) -> list[tuple[Subject, ...]]:
-    tasks = [
-        (i, a.sample, a.verdict)
-        for i, row in enumerate(rows)
-        if any(a.verdict is Verdict.LOST for a in row)
-        for verdict, limit in ((Verdict.LOST, most[0]), (Verdict.OK, most[1]))
-        for a in [a for a in row if a.verdict is verdict][:limit]
-    ]
-    out: list[list[Subject]] = [[] for _ in rows]
-    samples = sorted({sample for _, sample, _ in tasks})
-    place = {sample: k for k, sample in enumerate(samples)}
-    drives = [q.excitation.drive for q in plan.questions]
-    for name, kind, changed in _exact_ones(boards.take(samples)) if samples else ():
-        orbits = Ensemble(changed).settle(
-            [place[sample] for _, sample, _ in tasks],
-            [drives[i] for i, _, _ in tasks],
-            np.array([plan.questions[i].start.start for i, _, _ in tasks]),
-            jobs=jobs,
-            progress=progress,
-        )
-        tally = Counter[tuple[int, Verdict, Verdict]]()
-        for (i, _, before), orbit in zip(tasks, orbits, strict=True):
-            question = plan.questions[i]
-            tally[i, before, judge(orbit, question.spec, question.start)[0]] += 1
-        for i in {i for i, _, _ in tasks}:
-            replayed, kept = (
-                sum(tally[i, before, now] for now in Verdict if now is not Verdict.FAILED)
-                for before in (Verdict.LOST, Verdict.OK)
-            )
-            avoided, caused = (
-                tally[i, Verdict.LOST, Verdict.OK],
-                tally[i, Verdict.OK, Verdict.LOST],
-            )
-            out[i].append(Subject(name, kind, avoided, replayed, caused, kept))
-    return [tuple(sorted(row, key=lambda s: (-s.avoided, s.caused, s.name))) for row in out]
-
-
-def _exact_ones(boards: Boards) -> list[tuple[str, str, Boards]]:
-    """Every part that differs between these boards, and the groups, each made exact."""
-    circuit = boards.circuit
-    differing = {q.part for q in quantities(circuit, boards)}
-    differing |= {s.name for s in circuit.sections if s.name in boards.low}
-    kinds = {p.name: _KINDS[type(p)] for p in circuit.parts if type(p) in _KINDS}
-    kinds |= {rail.name: "supply" for rail in circuit.rails}
-    out = [(n, k, boards.exact([n])) for n, k in kinds.items() if n in differing]
-
-    def group(name: str, parts: Sequence[str]) -> None:
-        parts = [p for p in parts if p in differing]
-        if len(parts) > 1:
-            out.append((name, "group", boards.exact(parts)))
-
-    if len({q.part for q in quantities(circuit, boards) if q.group == "offset"}) > 1:
-        out.append(("all offsets", "group", exact_in(boards, ("offset",))))
-    if boards.low:
-        out.append(("all output limits", "group", exact_in(boards, ("low", "high"))))
-    resistors = [r.name for r in circuit.resistors]
-    dead_zone = [n for n in resistors if _DEAD_ZONE.fullmatch(n)]
-    group("resistors of the dead zone", dead_zone)
-    group("all other resistors", [n for n in resistors if n not in dead_zone])
-    group("all capacitors", [c.name for c in circuit.capacitors])
-    group("all references", [r.name for r in circuit.references])
-    group("both supplies", [rail.name for rail in circuit.rails])
-    return out
-
-
-_KINDS: dict[type, str] = {
-    Resistor: "resistor",
-    Capacitor: "capacitor",
-    Section: "op-amp",
-    Reference: "reference",
-}
+def _skipped(row: Sequence[Answer], subjects: Sequence[Subject], cut: bool) -> str:
+    """Why the boards of one question were not replayed, or not all of them."""
+    lost = [a for a in row if a.verdict is Verdict.LOST]
+    if not lost:
+        return NOTHING_LOST
+    if not cut:
+        return ""
+    causes = {a.reason for a in lost}
+    cause = f" ({causes.pop()})" if len(causes) == 1 else ""
+    replayed = max((s.replayed for s in subjects), default=0)
+    return (
+        f"every board is lost{cause}, and no part or group that was made exact saves one of the "
+        f"first {replayed}, so no more were replayed"
+    )
 
 
 def _sentence(

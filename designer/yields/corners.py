@@ -18,6 +18,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.board_quantities import column
 from designer.spread.spread import BOARD
+from designer.yields.blame_pieces import Pieces, counted
 from designer.yields.margins import Margin
 from designer.yields.sobol import Index
 from designer.yields.verdict import StudyPlan, Verdict, judge
@@ -52,45 +53,68 @@ def worst_corners(
     indices: Sequence[Sequence[Index]],
     jobs: int,
     progress: Callable[[], None],
+    pieces: Pieces | None = None,
 ) -> list[Corner | None]:
     """For each question the corners of its ``CORNER`` largest indices, on the exact rung; None
-    where nothing limits. progress : called once an attractor.
+    where nothing limits. progress : called once an attractor. pieces : what is known already, and
+    where the rest goes.
     """
-    places = {name: k for k, name in enumerate(plan.spread.coordinates(plan.circuit))}
+    pieces = Pieces() if pieces is None else pieces
     out: list[Corner | None] = []
-    for i, (margin, ranked) in enumerate(zip(margins, indices, strict=True)):
-        # Measured boards are in no order, so they have no ends.
-        chosen = [x.coordinate for x in ranked if x.total > 0.0 and x.coordinate != BOARD][:CORNER]
-        if not chosen:
-            out.append(None)
-            continue
-        columns = [places[name] for name in chosen]
-        picks = np.array(list(product((0, 1), repeat=len(chosen))), dtype=np.intp)
-        boards = _at(plan, columns, picks)
-        falling = _falling(plan, columns, chosen, margin)
-        question = plan.questions[i]
-        orbits = Ensemble(boards).settle(
-            range(len(boards)),
-            [question.excitation.drive] * len(boards),
-            np.tile(question.start.start, (len(boards), 1)),
-            jobs=jobs,
-            progress=progress,
-        )
-        verdicts = [judge(o, question.spec, question.start)[0] for o in orbits]
-        values = margin.of(boards)
-        worst = int(np.argmin(values))
-        out.append(
-            Corner(
-                tuple(chosen),
-                tuple("low" if end == 0 else "high" for end in picks[worst] ^ falling),
-                float(values[worst]),
-                verdicts[worst],
-                orbits[worst].response,
-                sum(v is Verdict.OK for v in verdicts),
-                len(boards),
-            )
-        )
+    for number, (margin, ranked) in enumerate(zip(margins, indices, strict=True)):
+
+        def corner(
+            step: Callable[[], None],
+            number: int = number,
+            margin: Margin = margin,
+            ranked: Sequence[Index] = ranked,
+        ) -> Corner | None:
+            return _worst(plan, number, margin, ranked, jobs, step)
+
+        # A margin of more crossings is another margin.
+        name = f"corner {number} of {margin.sought}"
+        out.append(counted(pieces, name, progress, corner))
     return out
+
+
+def _worst(
+    plan: StudyPlan,
+    number: int,
+    margin: Margin,
+    ranked: Sequence[Index],
+    jobs: int,
+    progress: Callable[[], None],
+) -> Corner | None:
+    """The corner of one question."""
+    # Measured boards are in no order, so they have no ends.
+    chosen = [x.coordinate for x in ranked if x.total > 0.0 and x.coordinate != BOARD][:CORNER]
+    if not chosen:
+        return None
+    places = {name: k for k, name in enumerate(plan.spread.coordinates(plan.circuit))}
+    columns = [places[name] for name in chosen]
+    picks = np.array(list(product((0, 1), repeat=len(chosen))), dtype=np.intp)
+    boards = _at(plan, columns, picks)
+    falling = _falling(plan, columns, chosen, margin)
+    question = plan.questions[number]
+    orbits = Ensemble(boards).settle(
+        range(len(boards)),
+        [question.excitation.drive] * len(boards),
+        np.tile(question.start.start, (len(boards), 1)),
+        jobs=jobs,
+        progress=progress,
+    )
+    verdicts = [judge(o, question.spec, question.start)[0] for o in orbits]
+    values = margin.of(boards)
+    worst = int(np.argmin(values))
+    return Corner(
+        tuple(chosen),
+        tuple("low" if end == 0 else "high" for end in picks[worst] ^ falling),
+        float(values[worst]),
+        verdicts[worst],
+        orbits[worst].response,
+        sum(v is Verdict.OK for v in verdicts),
+        len(boards),
+    )
 
 
 def _at(plan: StudyPlan, columns: Sequence[int], picks: Places) -> Boards:

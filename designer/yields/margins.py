@@ -18,7 +18,7 @@ attractors whose basin the nominal orbit lies in, and clipping.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
-from designer.yields.crossings import Crossing, crossings
+from designer.yields.blame_pieces import Pieces, counted
+from designer.yields.crossings import ROUNDS, Crossing, crossings
 from designer.yields.verdict import Answer, Question, Verdict
 
 STEP = 0.02
@@ -125,39 +126,40 @@ def margins(
     answers: Sequence[Sequence[Answer]],
     *,
     count: int = CROSSINGS,
+    only: Collection[tuple[int, int]] | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
+    pieces: Pieces | None = None,
 ) -> tuple[Margin, ...]:
     """The margin of each question.
 
     boards : drawn of the spread; answers : of each question, what became of board ``sample``.
-    count : crossings sought for each question. progress : called once an attractor or followed
-    orbit.
+    count : crossings sought for each question. only : of those the ones that are sought, as
+    (question, sample); all of them if None. progress : called once an attractor or followed
+    orbit. pieces : what is known already, and where the rest goes.
     """
     differing = quantities(circuit, boards)
-    lost = [
-        [a.sample for a in row if a.verdict is Verdict.LOST and a.sample % 2 == 0][:count]
-        for row in answers
-    ]
-    asked = [number for number, row in enumerate(lost) for _ in row]
-    met = crossings(
-        boards,
-        [sample for row in lost for sample in row],
-        asked,
-        questions,
-        jobs=jobs,
-        progress=progress,
-    )
+    pieces = Pieces() if pieces is None else pieces
+    wanted = [pair for pair in lost_boards(answers, count) if only is None or pair in only]
+    met = _met(boards, wanted, questions, pieces, jobs, progress)
     nominal = Boards.of(circuit, [nominal_board(circuit)])
     probes = _probes(nominal, differing)
     found: list[list[Limit]] = []
-    for question in questions:
+    for number, question in enumerate(questions):
         base = _Base(nominal, question, question.start)
-        found.append(_nominal_limits(base, probes, differing, boards, jobs, progress))
+
+        def at_nominal(step: Callable[[], None], base: _Base = base) -> tuple[Limit, ...]:
+            return tuple(_nominal_limits(base, probes, differing, boards, jobs, step))
+
+        found.append(list(counted(pieces, f"nominal {number}", progress, at_nominal)))
     for crossing in met:
-        limit = _crossing_limit(
-            crossing, questions[crossing.question], boards, differing, jobs, progress
-        )
+
+        def at_crossing(step: Callable[[], None], crossing: Crossing = crossing) -> Limit | None:
+            question = questions[crossing.question]
+            return _crossing_limit(crossing, question, boards, differing, jobs, step)
+
+        name = f"limit {crossing.question} {crossing.board}"
+        limit = counted(pieces, name, progress, at_crossing)
         if limit is not None:
             found[crossing.question].append(limit)
     out = []
@@ -166,6 +168,50 @@ def margins(
         own = [c for c in met if c.question == number]
         out.append(replace(margin, sought=len(own), there=sum(c.there for c in own)))
     return tuple(out)
+
+
+def lost_boards(
+    answers: Sequence[Sequence[Answer]], count: int = CROSSINGS
+) -> list[tuple[int, int]]:
+    """The lost boards of even number whose crossings are sought, as (question, sample): of each
+    question the first ``count``, question after question."""
+    return [
+        (number, sample)
+        for number, row in enumerate(answers)
+        for sample in [a.sample for a in row if a.verdict is Verdict.LOST and a.sample % 2 == 0][
+            :count
+        ]
+    ]
+
+
+def _met(
+    boards: Boards,
+    wanted: Sequence[tuple[int, int]],
+    questions: Sequence[Question],
+    pieces: Pieces,
+    jobs: int,
+    progress: Callable[[], None],
+) -> list[Crossing]:
+    """The crossing of each of these (question, sample), those that are known not sought again."""
+    known: dict[tuple[int, int], Crossing] = {}
+    for question, sample in wanted:
+        crossing = pieces.get(f"crossing {question} {sample}")
+        if crossing is not None:
+            known[question, sample] = crossing
+            for _ in range(ROUNDS):
+                progress()
+    missing = [pair for pair in wanted if pair not in known]
+    found = crossings(
+        boards,
+        [sample for _, sample in missing],
+        [question for question, _ in missing],
+        questions,
+        jobs=jobs,
+        progress=progress,
+    )
+    pieces.put({f"crossing {c.question} {c.board}": c for c in found})
+    known |= {(c.question, c.board): c for c in found}
+    return [known[pair] for pair in wanted]
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,8 @@ class BlockStore(Generic[Row]):
     row : the dataclass; its fields are str, int, float, bool or StrEnum.
     study : hash of everything that decides a row.
     omegas : of the questions; where rows have a ``question``, readers get a column ``omega``.
+    labels : names of measured boards; where there are any, readers get a column ``board``, which
+    has the name of each sample's, in turn.
     size : samples of a block.
     note : told how many blocks of another study were met.
     guard : called before each write; raises where the folder is no longer the study's.
@@ -65,6 +67,7 @@ class BlockStore(Generic[Row]):
         study: str,
         *,
         omegas: Sequence[float | None] = (),
+        labels: Sequence[str] = (),
         size: int = BLOCK,
         guard: Callable[[], None] = lambda: None,
         note: Callable[[str], None] = lambda _: None,
@@ -74,6 +77,7 @@ class BlockStore(Generic[Row]):
         self.size = size
         self._root, self._folder, self._row, self._study = root, folder, row, study
         self._omegas, self._guard, self._note = omegas, guard, note
+        self._labels = labels
         self._foreign: set[str] = set()
         self._noted = 0
         self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
@@ -145,6 +149,8 @@ class BlockStore(Generic[Row]):
         for name, kind in self._hints.items():
             plain = str if issubclass(kind, StrEnum) else kind
             columns.append((name, _TYPES[plain]))
+            if name == "sample" and self._labels:
+                columns.append(("board", pa.string()))
             if name == "question" and self._omegas:
                 columns.append(("omega", pa.float64()))
         return pa.schema(columns)
@@ -156,6 +162,8 @@ class BlockStore(Generic[Row]):
                 values[name] = str(value)
         if self._omegas:
             values["omega"] = self._omegas[values["question"]]
+        if self._labels:
+            values["board"] = self._labels[row.sample % len(self._labels)]
         return values
 
     def _row_of(self, values: dict[str, Any]) -> Row:

@@ -9,6 +9,7 @@ from functools import cached_property
 from designer.check.checked_design import Checked
 from designer.yields import two_engine_yield as combined
 from designer.yields.blame_analysis import Blame
+from designer.yields.blame_status import BlameStatus
 from designer.yields.joint_yield import all_on_one
 from designer.yields.ngspice_sampling import Hearing
 from designer.yields.power_up_yield import Reached
@@ -32,7 +33,7 @@ class Study:
     narrow : whether every interval is narrower (None where no width was asked for). tuned,
     reached : their rows; None where they were not asked for. trimmed : likewise; None where no
     trimmer is fitted. recipes : one for each question.
-    blame, maps : by question, where they were asked for.
+    blame, maps : by question, where they were asked for. blame_wanted : whether a blame was.
     """
 
     checked: tuple[Checked, ...]
@@ -49,6 +50,7 @@ class Study:
     recipes: tuple[Recipe, ...] | None = None
     blame: Blame | None = None
     maps: tuple[YieldMap, ...] = ()
+    blame_wanted: bool = True
 
     def answers_to(self, index: int) -> tuple[Answer, ...]:
         """The answers for response number ``index``, by sample."""
@@ -74,7 +76,8 @@ class Study:
     def yields(self) -> tuple[Yield | None, ...]:
         """For each response; None where it was left out."""
         return tuple(
-            count(self.answers_to(i)) if i in self.asked else None for i in range(len(self.checked))
+            count(self.answers_to(i), self.plan.census) if i in self.asked else None
+            for i in range(len(self.checked))
         )
 
     @cached_property
@@ -82,12 +85,20 @@ class Study:
         """For each response: both engines together; None where ngspice has no answer."""
         return tuple(
             combined.combine(
-                self.answers_to(i), self.heard_of(i), self.plan.questions[self.asked.index(i)]
+                self.answers_to(i),
+                self.heard_of(i),
+                self.plan.questions[self.asked.index(i)],
+                census=self.plan.census,
             )
             if i in self.asked
             else None
             for i in range(len(self.checked))
         )
+
+    @property
+    def blame_status(self) -> BlameStatus:
+        """How much of the blame there is."""
+        return BlameStatus.of(self.blame, self.blame_wanted and bool(self.asked))
 
     @property
     def all_on_one_board(self) -> Yield | None:
@@ -113,7 +124,7 @@ class Study:
     def _on_one(self, rows: Sequence[Answer | Tuned | Trimmed | Reached] | None) -> Yield | None:
         if not rows or len(self.asked) < max(len(self.checked), 2):
             return None
-        return all_on_one(rows)
+        return all_on_one(rows, self.plan.census)
 
     @cached_property
     def _answers(self) -> dict[int, tuple[Answer, ...]]:

@@ -1,6 +1,7 @@
 """What a study need not do again when it gets another layer: its checks and its blame.
 
-One file in the design folder, beside the rows: each item under a name with a hash of all that
+One file in the design folder, beside the rows, and another with the parts of a blame and of maps
+that are not whole yet: each item under a name with a hash of all that
 decides it, and it counts for that hash alone. Numbers are kept to the last bit, so that a study
 made in two goes is the one made at once. A file that cannot be read holds nothing.
 """
@@ -25,11 +26,14 @@ from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, Finding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
-from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame, Subject
+from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
+from designer.yields.blame_replay import Subject
 from designer.yields.corners import Corner
-from designer.yields.margins import Prediction
+from designer.yields.crossings import Crossing
+from designer.yields.margins import Limit, Prediction
 from designer.yields.sobol import Index
 from designer.yields.verdict import Verdict
+from designer.yields.yield_maps import Axis, YieldMap
 
 KEPT = "kept.npz"
 FORMAT = 1
@@ -37,8 +41,8 @@ _SAID = "items"
 _RECORDS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
-        Blame, Corner, EquationCheck, Finding, GateResult, Index, NearLimit, Orbit, Prediction,
-        Read, ResponseBlame, SolverSettings, Subject,
+        Axis, Blame, Corner, Crossing, EquationCheck, Finding, GateResult, Index, Limit, NearLimit,
+        Orbit, Prediction, Read, ResponseBlame, SolverSettings, Subject, YieldMap,
     )
 }  # fmt: skip
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}
@@ -62,8 +66,12 @@ class Kept:
 
     def put(self, name: str, key: str, value: Any) -> None:
         """Keep it, in the place of any other of this name."""
-        self._items[name] = (key, value)
-        self._used.add(name)
+        self.put_all({name: value}, key)
+
+    def put_all(self, values: Mapping[str, Any], key: str) -> None:
+        """Keep several that one key decides."""
+        self._items |= {name: (key, value) for name, value in values.items()}
+        self._used.update(values)
         self._write(_bytes(self._items))
 
     def forget_unused(self) -> None:

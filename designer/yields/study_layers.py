@@ -15,6 +15,8 @@ from designer.model.tuning_bands import Bands
 from designer.spice.pool import SpicePool
 from designer.yields import layers, ngspice_sampling
 from designer.yields.blame_analysis import Blame, blame
+from designer.yields.blame_extent import BUDGET, extent_of
+from designer.yields.blame_pieces import Pieces
 from designer.yields.layers import Runner
 from designer.yields.ngspice_sampling import NOMINAL_SAMPLES, Ask, Hearing
 from designer.yields.power_up_yield import Reached
@@ -58,11 +60,20 @@ class Stores:
     def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached] | None:
         return None
 
-    def blame(self, plan: StudyPlan) -> Blame | None:
+    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
+        """The whole blame, or one of this budget at least."""
         return None
 
     def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
         pass
+
+    def blame_pieces(self, plan: StudyPlan) -> Pieces:
+        """Where the finished parts of a blame are."""
+        return Pieces()
+
+    def maps(self, plan: StudyPlan) -> Pieces:
+        """Where the finished yield maps are."""
+        return Pieces()
 
 
 @dataclass(frozen=True)
@@ -75,6 +86,7 @@ class Work:
     runner: Runner
     said: Progress
     rung: RungName
+    blame_budget: int = BUDGET
 
     def made(self, study: Study) -> Study:
         """A study of the plan's samples."""
@@ -181,21 +193,34 @@ class Work:
 
     def blamed(self, study: Study) -> Study:
         """With the parts that the losses come from."""
-        found = self.stores.blame(study.plan)
-        if found is None:
-            step = self.said.stage("blame")
-            found = blame(study.plan, study.answers, jobs=self.jobs, progress=step)
-            self.stores.keep_blame(study.plan, found)
+        plan, answers, budget = study.plan, study.answers, self.blame_budget
+        found = blame(
+            plan,
+            answers,
+            budget=budget,
+            jobs=self.jobs,
+            progress=self.said.stage("blame", extent_of(plan, answers, budget).steps),
+            pieces=self.stores.blame_pieces(plan),
+        )
+        self.stores.keep_blame(plan, found)
         return replace(study, blame=found)
+
+    def known_blame(self, study: Study) -> Blame | None:
+        """The blame of the study where it is stored; None where it has to be worked out."""
+        return self.stores.blame(study.plan, self.blame_budget)
 
     def mapped(self, study: Study, overs: Sequence[Over]) -> Study:
         """With a yield map of each response over each of these settings."""
-        maps = []
+        maps, pieces = [], self.stores.maps(study.plan)
         for over in overs:
             for number, index in enumerate(study.asked):
-                step = self.said.stage(f"yield map over {over}, response {index + 1}")
                 b = study.checked[index].model.b
-                found = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
+                name = f"map {over} {number} {b!r}"
+                found = pieces.get(name)
+                if found is None:
+                    step = self.said.stage(f"yield map over {over}, response {index + 1}")
+                    found = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
+                    pieces.put({name: replace(found, seconds=0.0)})
                 maps.append(found)
         return replace(study, maps=tuple(maps))
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from designer.base.checks import at_least, cores
 from designer.base.progress import Progress
@@ -15,6 +16,7 @@ from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spread.spread import NO_BANDWIDTH
 from designer.yields import layers, study_plan
+from designer.yields.blame_extent import BUDGET
 from designer.yields.layers import Runner
 from designer.yields.study import SAMPLES, SEED, Study
 from designer.yields.study_layers import RungName, Stores, Work
@@ -49,6 +51,7 @@ def tolerance(
     tuned: bool = False,
     reached: bool = False,
     blamed: bool = True,
+    blame_budget: int = BUDGET,
     maps: Sequence[Over] = (),
     seed: int = SEED,
     jobs: int | None = None,
@@ -57,16 +60,19 @@ def tolerance(
     stores: Stores | None = None,
     runner: Runner | None = None,
     progress: Progress | None = None,
+    standing: Callable[[Study], None] | None = None,
 ) -> Study:
     """How many boards show each response, under the spread of the model file.
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
     does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``yields.ngspice_sampling``
     says, ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted; a fitted
-    trimmer is always asked for. maps : settings over which the yield is wanted
-    (``yield_maps.OVERS``). checked : of the same design, to save the time of the gate. pool : where
-    ngspice runs; without one ngspice is not asked. stores : where rows are read from and written
-    to. runner : who computes blocks; this process if None.
+    trimmer is always asked for. blame_budget : steps of the blame (``blame_extent``). maps :
+    settings over which the yield is wanted (``yield_maps.OVERS``). checked : of the same design, to
+    save the time of the gate. pool : where ngspice runs; without one ngspice is not asked. stores :
+    where rows are read from and written to. runner : who computes blocks; this process if None.
+    standing : is given the study once its yields stand and the blame or maps are still to be worked
+    out.
     """
     need_responses(synthesis.modelfile)
     said = Progress() if progress is None else progress
@@ -88,7 +94,7 @@ def tolerance(
     )
     if plan.spread.gain_bandwidth is not None:
         said.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
-    study = Study(checked, plan, asked, left_out, (), until=until)
+    study = Study(checked, plan, asked, left_out, (), until=until, blame_wanted=blamed)
     if not asked:
         return study
     work = Work(
@@ -98,6 +104,7 @@ def tolerance(
         layers.Here(jobs) if runner is None else runner,
         said,
         rung,
+        blame_budget,
     )
     study = work.grown(study) if until is not None else work.made(study)
     if tuned:
@@ -108,6 +115,10 @@ def tolerance(
     if reached:
         study = work.reached(study)
     if blamed:
+        study = replace(study, blame=work.known_blame(study))
+    if standing is not None and (maps or (blamed and study.blame is None)):
+        standing(study)
+    if blamed and study.blame is None:
         study = work.blamed(study)
     return work.mapped(study, maps) if maps else study
 

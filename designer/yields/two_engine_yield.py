@@ -109,11 +109,16 @@ class Combined:
 
 
 def combine(
-    answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
+    answers: Sequence[Answer],
+    heard: Sequence[Hearing],
+    question: Question,
+    *,
+    census: bool = False,
 ) -> Combined | None:
     """Both engines on one question; None where ngspice has no answer from the nominal orbit.
 
-    answers, heard : of this question, by sample.
+    answers, heard : of this question, by sample. census : whether these are all the boards there
+    are; what ngspice was not asked is then all that is uncertain.
     """
     mine = {a.sample: a for a in answers if a.verdict is not Verdict.FAILED}
     theirs = {
@@ -126,7 +131,7 @@ def combine(
         return None
     ok = sum(a.verdict is Verdict.OK for a in mine.values())
     strata = tuple(_strata(list(mine.values()), theirs, heard, question))
-    estimate, low, high = interval(ok, strata)
+    estimate, low, high = interval(ok, strata, census)
     silent = {
         h.sample
         for h in heard
@@ -153,8 +158,11 @@ def combine(
     )
 
 
-def interval(ok: int, strata: Sequence[Stratum]) -> tuple[float, float, float]:
-    """Estimate and 95 % limits, from ``ok`` boards on the exact rung and the strata."""
+def interval(
+    ok: int, strata: Sequence[Stratum], census: bool = False
+) -> tuple[float, float, float]:
+    """Estimate and 95 % limits, from ``ok`` boards on the exact rung and the strata. census : the
+    boards are no sample of others."""
     total = sum(s.samples for s in strata)
     estimate = ok / total
     below = above = 0.0
@@ -166,7 +174,7 @@ def interval(ok: int, strata: Sequence[Stratum]) -> tuple[float, float, float]:
         below += share**2 * (gain_below**2 + loss_above**2)
         above += share**2 * (gain_above**2 + loss_below**2)
     estimate = min(max(estimate, 0.0), 1.0)
-    low, high = wilson(estimate * total, total)
+    low, high = (estimate, estimate) if census else wilson(estimate * total, total)
     return (
         estimate,
         max(estimate - math.sqrt((estimate - low) ** 2 + below), 0.0),

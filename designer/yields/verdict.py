@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
@@ -75,12 +75,16 @@ class Answer:
 
 @dataclass(frozen=True)
 class Yield:
-    """Counts, and the two-sided 95 % Wilson interval of ok/(samples - failed)."""
+    """Counts, and the two-sided 95 % Wilson interval of ok/(samples - failed).
+
+    census : whether these are all the boards there are; then the interval is the rate itself.
+    """
 
     ok: int
     lost: int
     grazing: int
     failed: int
+    census: bool = field(default=False, kw_only=True)
 
     @property
     def samples(self) -> int:
@@ -95,6 +99,8 @@ class Yield:
     @property
     def interval(self) -> tuple[float, float]:
         decided = self.samples - self.failed
+        if self.census and decided:
+            return self.rate, self.rate
         return wilson(self.ok, decided)
 
 
@@ -107,6 +113,21 @@ class StudyPlan:
     seed: int
     samples: int
     questions: tuple[Question, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the measured boards that the samples are, one each in turn; empty where boards
+        have no names."""
+        return () if self.spread.measured is None else self.spread.measured.labels
+
+    @property
+    def census(self) -> bool:
+        """Whether the samples are all the boards there are, once each."""
+        return len(self.labels) == self.samples
+
+    def label(self, sample: int) -> str:
+        """Name of the board that a sample is."""
+        return self.labels[sample % len(self.labels)]
 
     def blocks(self, size: int = BLOCK) -> Iterator[range]:
         """Sample indices block by block."""
@@ -121,11 +142,15 @@ class Judged(Protocol):
     def verdict(self) -> Verdict: ...
 
 
-def count(answers: Iterable[Judged]) -> Yield:
-    """The yield of a set of answers to one question."""
+def count(answers: Iterable[Judged], census: bool = False) -> Yield:
+    """The yield of a set of answers to one question. census : see ``Yield``."""
     tally = Counter(a.verdict for a in answers)
     return Yield(
-        tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
+        tally[Verdict.OK],
+        tally[Verdict.LOST],
+        tally[Verdict.GRAZING],
+        tally[Verdict.FAILED],
+        census=census,
     )
 
 

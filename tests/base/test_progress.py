@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from designer.base.progress import EVERY, Lines, Terminal, how_far, progress_for, rate
+from designer.base.progress import EVERY, Lines, Progress, Terminal, how_far, progress_for, rate
 
 
 @pytest.mark.parametrize(
@@ -79,3 +79,19 @@ def test_a_terminal_shows_a_bar_with_the_time_left(monkeypatch: pytest.MonkeyPat
     assert "5/5" in shown.getvalue()
     assert "3/3" in shown.getvalue()
     assert " left" in shown.getvalue()
+
+
+def test_what_is_printed_aside_stands_between_the_bars(capfd: pytest.CaptureFixture[str]) -> None:
+    """Bars that are done stand above it and are not drawn again; the next ones begin below."""
+    with Terminal() as progress:
+        progress.stage("boards", 2)()
+        with progress.aside():
+            print("a table", file=sys.stderr)
+        step = progress.stage("blame", 3)
+        for _ in range(3):
+            step()
+    said = capfd.readouterr().err
+    assert said.index("boards") < said.index("a table") < said.index("blame")
+    assert "boards" not in said[said.index("a table") :]
+    with Progress().aside():
+        pass

@@ -27,7 +27,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.jobs.study_job import _satisfied
+from designer.jobs.study_stage import satisfied
 from designer.model.find_responses import ModelResponse
 from designer.model.model import Dimensionless
 from designer.model.response_table import Expect, Response
@@ -329,7 +329,7 @@ def test_a_study_is_satisfied_by_what_can_be_trusted(
     """A yield says only how far it is known; an engine without an answer is no agreement."""
     said = {"model": {"trusted": True}, "circuit": {"trusted": engine}}
     row = {"found": True, "engines_agree": True, "trust": {**said, "yield": {"trusted": counted}}}
-    assert _satisfied({"equation_check": None, "responses": [row]}) is right
+    assert satisfied({"equation_check": None, "responses": [row]}) is right
 
 
 @pytest.mark.slow
@@ -370,7 +370,7 @@ def test_a_study_ends_with_it(
 
 
 @pytest.mark.parametrize(("k0", "trusted"), [(STIFFEST, False), (0.999, True)])
-def test_a_result_in_memory_is_not_satisfied(k0: float, trusted: bool) -> None:
+def test_a_result_in_memory_is_notsatisfied(k0: float, trusted: bool) -> None:
     checked = _checked(k0)
     checked.__dict__["model_trust"] = Trust(answered=True)
     nothing: Any = None

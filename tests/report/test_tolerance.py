@@ -17,7 +17,8 @@ from designer.report.tables import provenance_table
 from designer.report.tolerance import facts
 from designer.report.write import render_html, render_markdown
 from designer.yields import study_plan
-from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame, Subject
+from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
+from designer.yields.blame_replay import Subject
 from designer.yields.corners import Corner
 from designer.yields.exact_rung import block
 from designer.yields.margins import Prediction

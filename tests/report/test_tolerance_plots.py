@@ -18,7 +18,8 @@ from designer.paper.tolerance_page import readme, yield_sheet
 from designer.paper.tolerance_rows import Row
 from designer.report.blame_plots import avoided_chart, index_chart
 from designer.report.map_plots import map_chart
-from designer.yields.blame_analysis import ResponseBlame, Subject
+from designer.yields.blame_analysis import ResponseBlame
+from designer.yields.blame_replay import Subject
 from designer.yields.margins import Prediction
 from designer.yields.sobol import Index
 from designer.yields.yield_maps import Axis, YieldMap

@@ -18,7 +18,7 @@ from designer.circuit.dead_zone_kind import Sides
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
 from designer.cli import tables
-from designer.jobs.study_job import _satisfied
+from designer.jobs.study_stage import satisfied
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
@@ -259,7 +259,7 @@ def test_what_did_not_pass_is_said_again_from_the_file(
     tables.tolerance(answer)
     assert ("equation" in capsys.readouterr().err) is bool(words)
     assert EquationCheck.read(written).problem == found.problem
-    assert _satisfied(answer) is not bool(words)
+    assert satisfied(answer) is not bool(words)
 
 
 def test_a_deck_that_ngspice_cannot_solve_says_why(pool: SpicePool) -> None:

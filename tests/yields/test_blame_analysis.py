@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,11 @@ from designer.model.distributions import Uniform
 from designer.model.response_table import Expect, Response
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
 from designer.spread.spread import Group, Spread, draw_many
-from designer.yields.blame_analysis import Blame, blame
+from designer.yields import blame_replay
+from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
+from designer.yields.blame_extent import extent_of
+from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_replay import PROBE
 from designer.yields.corners import worst_corners
 from designer.yields.crossings import crossings
 from designer.yields.exact_rung import block
@@ -293,6 +299,7 @@ def test_no_loss_no_replay_and_the_nearest_limit_is_named() -> None:
     assert (found.lost, found.subjects) == (0, ())
     assert found.prediction == Prediction(4 // 2, 0, 0, 0)
     assert found.limited_by.startswith("nothing was lost; nearest is ")
+    assert found.skipped == NOTHING_LOST
     assert found.corner is not None
     assert found.corner.survived == found.corner.corners
 
@@ -310,12 +317,115 @@ def test_blame_is_the_same_on_one_core_and_says_what_it_cost() -> None:
     one = blame(few, some, lost=2, kept=1, jobs=1, progress=step)
     two = blame(few, list(reversed(some)), lost=2, kept=1, jobs=2)
     assert replace(one, seconds=0.0) == replace(two, seconds=0.0)
-    assert calls == one.attractors + one.orbits
+    assert calls == extent_of(few, some, lost=2, kept=1).steps >= one.attractors + one.orbits
     plain = one.as_dict()
     assert plain["cost"]["attractors"] == one.attractors
     first = plain["responses"][0]
     assert set(first["subjects"][0]) >= {"name", "kind", "avoided", "replayed", "low", "high"}
     assert "right" in first["prediction"]
+
+
+class _Stopped(Exception):
+    """Somebody has had enough."""
+
+
+class _Memory(Pieces):
+    """Pieces that stay."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, Any] = {}
+
+    def get(self, name: str) -> Any | None:
+        return self.known.get(name)
+
+    def put(self, values: Mapping[str, Any]) -> None:
+        self.known |= values
+
+
+def test_a_blame_that_was_interrupted_goes_on_where_it_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    few = replace(plan(2, "offsets"), samples=12)
+    some = [a for a in answers(2, "offsets") if a.sample < 12]
+    whole = blame(few, some, lost=2, kept=1, jobs=1)
+    total = extent_of(few, some, lost=2, kept=1).steps
+    pieces, steps = _Memory(), 0
+
+    def stop_late() -> None:
+        nonlocal steps
+        steps += 1
+        if steps > 0.6 * total:
+            raise _Stopped
+
+    monkeypatch.setattr(blame_replay, "TOGETHER", 1)
+    with pytest.raises(_Stopped):
+        blame(few, some, lost=2, kept=1, jobs=1, progress=stop_late, pieces=pieces)
+    before = dict(pieces.known)
+    assert {name.split()[0] for name in before} >= {"replay", "crossing"}
+    replayed: list[object] = []
+    some_again = blame_replay._some
+
+    def counted(*args: Any) -> Any:
+        replayed.append(args)
+        return some_again(*args)
+
+    monkeypatch.setattr(blame_replay, "_some", counted)
+    steps = 0
+
+    def step() -> None:
+        nonlocal steps
+        steps += 1
+
+    again = blame(few, some, lost=2, kept=1, jobs=1, progress=step, pieces=pieces)
+    assert replace(again, seconds=0.0) == replace(whole, seconds=0.0)
+    assert replayed == []
+    assert steps == total
+    assert all(pieces.known[name] is value for name, value in before.items())
+
+
+def test_a_budget_leaves_out_boards_and_says_what_share_was_done() -> None:
+    study, rows = plan(2, "offsets"), answers(2, "offsets")
+    whole = extent_of(study, rows)
+    budget = round(0.5 * whole.steps)
+    half = extent_of(study, rows, budget)
+    assert 0.4 * whole.steps < half.steps <= budget
+    assert half.share == half.steps / whole.steps
+    assert half.replays == whole.replays[: len(half.replays)]
+    assert {r.before for r in half.replays} == {Verdict.LOST, Verdict.OK}
+    assert half.made == whole.made
+    least = extent_of(study, rows, 1)
+    assert len(least.replays) == len(least.crossings) == 1
+    assert extent_of(study, rows, whole.steps).share == 1.0
+    found = blame(study, rows, budget=1, jobs=2)
+    assert found.share == least.share
+    assert {s.replayed for s in found.responses[0].subjects} <= {0, 1}
+    assert found.responses[0].subjects
+
+
+def test_a_larger_budget_does_the_rest() -> None:
+    few = replace(plan(2, "offsets"), samples=12)
+    some = [a for a in answers(2, "offsets") if a.sample < 12]
+    pieces = _Memory()
+    part = blame(few, some, lost=2, kept=1, budget=1, jobs=2, pieces=pieces)
+    assert part.share < 1.0
+    assert part.budget == 1
+    more = blame(few, some, lost=2, kept=1, budget=10**6, jobs=2, pieces=pieces)
+    whole = blame(few, some, lost=2, kept=1, jobs=2)
+    assert replace(more, seconds=0.0) == replace(whole, seconds=0.0)
+
+
+def test_where_every_board_is_lost_whatever_is_exact_few_are_replayed() -> None:
+    """Boards without any spread to speak of do what the nominal one does: not what is asked."""
+    study = plan(1, "tiny", PROBE + 4)
+    asked = replace(
+        study.questions[0], spec=replace(study.questions[0].spec, expect=Expect(1, 5, 5))
+    )
+    study = replace(study, questions=(asked,))
+    rows = block(study, range(study.samples), 2)
+    assert {a.verdict for a in rows} == {Verdict.LOST}
+    found = blame(study, rows, jobs=2).responses[0]
+    assert {s.replayed for s in found.subjects} == {PROBE}
+    assert found.skipped.startswith("every board is lost (to 1-1-1), and no part or group")
 
 
 def test_quantities_leave_out_what_does_nothing() -> None:

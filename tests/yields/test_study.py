@@ -24,12 +24,13 @@ from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.check import checked_design
 from designer.cli import entry
-from designer.jobs import study_json
-from designer.jobs.study_folder import NGSPICE
+from designer.jobs import study_json, synthesise_job
+from designer.jobs.study_folder import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
 from designer.yields import layers, ngspice_runs, study_layers
 from designer.yields.blame_analysis import blame
+from designer.yields.blame_pieces import Pieces
 from designer.yields.layers import CHUNK, Here, Samples
 from designer.yields.ngspice_sampling import Hearing, Kind, Why, ask_random
 from designer.yields.row_store import BlockStore
@@ -39,6 +40,8 @@ from designer.yields.tolerance_study import tolerance
 from designer.yields.verdict import BLOCK, Answer, Verdict
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
+from tests.yields.test_blame_analysis import _Memory
+from tests.yields.test_study_cache import MAP
 from tests.yields.test_verdict import plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -335,6 +338,35 @@ def test_only_runs_that_are_not_on_disk_are_announced(
     assert progress.stages == said
 
 
+def test_a_map_that_is_there_is_not_made_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Interrupted at the third of four maps, a study goes on with the third."""
+    p = plan()
+    pieces = _Memory()
+    made: list[tuple[str, int]] = []
+
+    def yield_map(plan: Any, number: int, over: str, b: float, **_: Any) -> Any:
+        made.append((over, number))
+        if len(made) == 3:
+            raise KeyboardInterrupt
+        return MAP
+
+    class Kept(Stores):
+        def maps(self, plan: Any) -> Pieces:
+            return pieces
+
+    monkeypatch.setattr(study_layers, "yield_map", yield_map)
+    work = Work(1, None, Kept(), Here(1), Progress(), "exact")
+    checked: Any = (SimpleNamespace(model=SimpleNamespace(b=0.25)),) * 2
+    study = Study(checked, p, (0, 1), {}, ())
+    with pytest.raises(KeyboardInterrupt):
+        work.mapped(study, ("b", "grade"))
+    assert made == [("b", 0), ("b", 1), ("grade", 0)]
+    assert len(work.mapped(study, ("b", "grade")).maps) == 4
+    assert made[3:] == [("grade", 0), ("grade", 1)]
+
+
 # ---------------------------------------------------------------------------------------------
 # On disk
 
@@ -444,6 +476,81 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
     assert asked == [14, 12]
 
 
+def test_a_model_without_a_title_has_the_same_name_in_its_folder(exact: Path) -> None:
+    """The first file's, small.toml: the names of the KiCad project are made of it."""
+    assert "title" not in SMALL
+    assert synthesise_job.source(exact, None)[0].title == "small"
+    assert (exact / "kicad" / "small.kicad_sch").is_file()
+
+
+def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
+    exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    out = tmp_path / "exact"
+    shutil.copytree(exact, out)
+    for path in out.iterdir():  # as if it had been killed before the first block
+        if path.name in ("kept.npz", "tolerance.json", "report.md", "report.html"):
+            path.unlink()
+    manifest = json.loads((out / "manifest.json").read_text())
+    manifest["stages"]["study"]["complete"] = manifest["complete"] = False
+    (out / "manifest.json").write_text(json.dumps(manifest))
+
+    def interrupted(*_: Any, **options: Any) -> Any:
+        options["pieces"].put({"nominal 0": ((), 0)})
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(study_layers, "blame", interrupted)
+        assert entry.status(["tolerance", str(out), "--resume"]) == 130
+    assert "100.0   76–100" in capfd.readouterr().err
+    early = json.loads((out / "tolerance.json").read_text())
+    assert early["responses"][0]["yield"]["samples"] == 12
+    assert early["responses"][0]["blame"] is None
+    assert early["blame"]["status"] == "not done yet"
+    assert "Blame not done yet" in (out / "report.md").read_text()
+    assert "Blame not done yet" in (out / "report.html").read_text()
+    assert (out / PIECES).exists()
+    assert entry.status(["tolerance", str(out)]) == 2
+    assert "--resume" in capfd.readouterr().err
+    (out / PIECES).unlink()  # what was put there is none of this blame
+    assert entry.status([*_words(home, out), "--resume", "--json"]) == 0
+    (line,) = [json.loads(capfd.readouterr().out)]
+    assert line["blame"] == {"status": "whole", "share": 1.0, "budget": None, "reason": ""}
+    assert _files(out) == _files(exact)
+
+
+def test_a_study_without_blame_gets_it_later_and_loses_it_never(
+    exact: Path, home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    out = tmp_path / "exact"
+    shutil.copytree(exact, out)
+    with monkeypatch.context() as patched:
+        patched.setattr(study_layers, "blame", _refused)
+        assert entry.status(["tolerance", str(out), "--no-blame", "--json"]) == 0
+        assert json.loads(capfd.readouterr().out)["blame"]["status"] == "whole"
+        assert _files(out) == _files(exact)
+        # Begun anew, of one board more.
+        words = ["tolerance", str(out), "--samples", "13", "--overwrite", "--no-blame", "-q"]
+        assert entry.status(words) == 0
+        without = json.loads((out / "tolerance.json").read_text())
+        assert without["blame"]["status"] == "left out"
+        assert "Blame left out" in (out / "report.md").read_text()
+        # The folder's own samples, and its own choice of no blame.
+        assert entry.status(["tolerance", str(out), "--json"]) == 0
+        assert json.loads(capfd.readouterr().out)["samples"] == 13
+    assert (
+        entry.status(["tolerance", str(out), "--samples", "12", "--overwrite", "--no-blame"]) == 0
+    )
+    assert entry.status(["tolerance", str(out), "--blame", "-q"]) == 0
+    assert json.loads((out / "tolerance.json").read_text())["blame"]["status"] == "whole"
+    added, whole = _files(out), _files(exact)
+    for name in ("manifest.json", "report.html", "report.md"):  # where the command line stands
+        del added[name], whole[name]
+    assert added == whole
+
+
 @pytest.mark.slow
 def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -487,6 +594,8 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
         (["--rung", "ideal"], "--rung"),
         (["--map", "zeta"], "--map"),
         (["--cluster", "localhost:8786"], "--cluster"),
+        (["--blame-budget", "0"], "--blame-budget"),
+        (["--blame-budget", "9", "--no-blame"], "--blame-budget"),
         (["--seed", "2"], "seed 1"),
         (["--samples", "13"], "samples 12"),
         (["--until", "0.5"], "until None"),

@@ -13,12 +13,15 @@ from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, Finding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
-from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame, Subject
+from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
+from designer.yields.blame_replay import Subject
 from designer.yields.corners import Corner
-from designer.yields.margins import Prediction
+from designer.yields.crossings import Crossing
+from designer.yields.margins import Limit, Prediction
 from designer.yields.sobol import Index
 from designer.yields.study_cache import Kept
 from designer.yields.verdict import Verdict
+from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared.bench_plans import question
 
 ORBIT = question(1).start
@@ -37,6 +40,12 @@ BLAMED = ResponseBlame(
     Corner(("R1",), ("low",), -0.1, Verdict.LOST, "1-1-1", 3, 4),
     "words",
 )
+CROSSING = Crossing(4, 1, 0.5, 0.75, ORBIT)
+LIMIT = Limit("a contact", "contact", 0.1 / 3.0, 2.0, np.array([0.1, -0.2]), 4)
+MAP = YieldMap(
+    "grade", 0, (Axis("grade", (0.01, 0.05)),), np.array([True, False]), np.array([3, 0]),
+    np.array([1, 4]), np.array([0, 0]), np.array([0, 0]), 4, 9, 0.01, None, (False, False), 8, 0.0,
+)  # fmt: skip
 BLAME = Blame((BLAMED,), 200, 1, 10, 20, 0.0)
 
 
@@ -58,7 +67,19 @@ def same(a: Any, b: Any) -> bool:
     return type(a) is type(b) and repr(a) == repr(b)
 
 
-@pytest.mark.parametrize("value", [ORBIT, Orbit(OrbitStatus.CLIPPED), (GATE, None), CHECK, BLAME])
+@pytest.mark.parametrize(
+    "value",
+    [
+        ORBIT,
+        Orbit(OrbitStatus.CLIPPED),
+        (GATE, None),
+        CHECK,
+        BLAME,
+        CROSSING,
+        ((LIMIT, LIMIT), 12),
+        MAP,
+    ],
+)
 def test_what_is_kept_comes_back_to_the_last_bit(value: Any, tmp_path: Path) -> None:
     path = tmp_path / "kept.npz"
     kept(path).put("it", "key", value)
