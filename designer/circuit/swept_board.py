@@ -19,6 +19,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.steady_state import Setting
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
+from designer.model.si_units import NO_UNITS, Unit
 from designer.model.swept_model import GREATEST, SMALLEST, ModelSubject
 
 BOARD_SETTINGS = ("frequency", "omega", "amplitude", "offset")
@@ -50,6 +51,7 @@ class BoardSubject:
         self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
         self.states = ("v1", "v2", "v3", "v4")
         self.units: Mapping[str, str] = UNITS
+        self.si: Mapping[str, Unit] = NO_UNITS
 
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""

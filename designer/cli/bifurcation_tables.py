@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.cli.tables import _console, _line, _row, _table, files
+from designer.model.si_units import shown, suffix
 
 LONGEST = 40
 """Lines of a table; the JSON object has them all."""
@@ -24,22 +25,35 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     wide = answer["windows"]
     widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
-    table = _table("Windows", "track", f"from{unit}", "to", "response", "symmetric", "steps")
+    si = answer.get("si_unit")
+    heads = ["from (SI)", "to (SI)"] if si else []
+    table = _table(
+        "Windows", "track", f"from{unit}", "to", *heads, "response", "symmetric", "steps"
+    )
     for w in sorted(widest, key=lambda w: (w["track"], w["from"])):
         symmetric = {True: "yes", False: "no", None: "-"}[w["symmetric"]]
-        ends = (f"{w['from']:.6g}", f"{w['to']:.6g}")
+        ends: tuple[str, ...] = (f"{w['from']:.6g}", f"{w['to']:.6g}")
+        ends += (_si(w, "from", si), _si(w, "to", si)) if si else ()
         _row(table, w["track"], *ends, w["response"], symmetric, str(w["steps"]))
     console.print(table)
     if len(wide) > len(widest):
         _line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        table = _table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
+        heads = ["(SI)"] if si else []
+        table = _table(
+            "Bifurcation points", "kind", f"{name}{unit}", *heads, "track", "what changes"
+        )
         for p in answer["points"][:LONGEST]:
             branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
             for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
-                first = ("", "") if k else (p["kind"], f"{p['value']:.9g}")
-                _row(table, *first, c["track"] or "-", c["text"])
+                first = [p["kind"], f"{p['value']:.9g}", *([_si(p, "value", si)] if si else [])]
+                _row(table, *([""] * len(first) if k else first), c["track"] or "-", c["text"])
         console.print(table)
+
+
+def _si(row: Mapping[str, Any], key: str, unit: str) -> str:
+    """A value in its SI unit, with more digits than elsewhere: ends of windows lie close."""
+    return shown(row[f"{key}_{suffix(unit)}"], unit, digits=6)
 
 
 def _map(answer: Mapping[str, Any]) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from designer.base.default_counts import SEARCH_SAMPLES, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.cli.app import (
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from designer.jobs.cure_job import CureResult
     from designer.jobs.options import Options
 
-SAMPLES = 4000
-"""Boards of the final study; as ``search_job.SAMPLES``."""
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
 
@@ -45,7 +44,7 @@ def search(
     out: Out = None,
     samples: Annotated[
         int | None,
-        typer.Option("--samples", metavar="N", help=f"Fresh boards at the end [{SAMPLES}]."),
+        typer.Option("--samples", metavar="N", help=f"Fresh boards at the end [{SEARCH_SAMPLES}]."),
     ] = None,
     wanted: Annotated[
         float | None,
@@ -68,7 +67,7 @@ def search(
             "--rung", help="Of the final study; auto: by a trade that is in the folder. [auto]"
         ),
     ] = None,
-    seed: Seed = 1,
+    seed: Seed = SEED,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -81,7 +80,7 @@ def search(
     with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer.jobs.options import Options
 
-        count = SAMPLES if samples is None else samples
+        count = SEARCH_SAMPLES if samples is None else samples
         said = StudyRung.AUTO if rung is None else rung
         options = Options(seed, jobs, count, overwrite, resume, rung=said.value)
         options.check()

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from designer.base.units import format_quantity
 from designer.catalog.catalog import Catalog
+from designer.model import si_units
 from designer.report import compare_table
 
 if TYPE_CHECKING:
@@ -43,11 +44,14 @@ def synthesised(answer: Mapping[str, Any]) -> None:
         f"{answer['distinct_values']} distinct values",
     )
     if answer["knobs"]:
-        table = _table("Generator", "ω", "expected", "frequency", "amplitude (peak, high-Z)")
-        for knob in answer["knobs"]:
+        knobs, key = answer["knobs"], "mechanism_hz"
+        heads = ("ω", *_hertz_heads(knobs, key), "expected", "frequency")
+        table = _table("Generator", *heads, "amplitude (peak, high-Z)")
+        for knob in knobs:
             _row(
                 table,
                 f"{knob['omega']:g}",
+                *_hertz(knob, knobs, key),
                 knob["expected"] or "-",
                 f"{knob['frequency_hz']:.4g} Hz",
                 f"{knob['amplitude_v_peak']:.4g} V",
@@ -63,6 +67,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         f"Responses, {answer['samples']} samples"
         + (f", spread of the {spread}" if spread == "model file" else ""),
         "ω",
+        *_hertz_heads(answer["responses"]),
         "expected",
         "model",
         "circuit",
@@ -90,6 +95,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         _row(
             table,
             f"{r['omega']:g}",
+            *_hertz(r, answer["responses"]),
             r["expected"] or "-",
             found,
             r["circuit"],
@@ -125,7 +131,8 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
     if not shown and not both:
         return
     heads = [*(f"{kind} %" for kind in shown), *(["both engines %", "95 %", "differ"] * both)]
-    table = _table("Further yields", "ω", "expected", *heads, gap=1)
+    first = ("ω", *_hertz_heads(answer["responses"]), "expected")
+    table = _table("Further yields", *first, *heads, gap=1)
     for r in answer["responses"]:
         cells = [_percent((kinds[kind](r) or {}).get("rate")) for kind in shown]
         c = r.get("combined")
@@ -138,7 +145,8 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
                 f"{100 * c['low']:.0f}–{100 * c['high']:.0f}",
                 f"{differ['count']} of {differ['asked']}",
             ]
-        _row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
+        hertz = _hertz(r, answer["responses"])
+        _row(table, f"{r['omega']:g}", *hertz, r["expected"] or "-", *cells)
     console.print(table)
     whole = answer.get("all_on_one_board") or {}
     said = [
@@ -156,27 +164,34 @@ def _percent(rate: float | None) -> str:
 
 def simulated(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
+    head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
+    responses = answer["responses"]
+    si = all("x1_max_m" in r for r in responses)
     table = _table(
-        f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice",
+        head,
         "ω",
+        *_hertz_heads(responses),
         "expected",
         "response",
         "symmetric",
         "x1 max",
         "x1 min",
+        *(["x1 max (SI)", "x1 min (SI)"] if si else []),
         "twin",
         "others",
         gap=1,
     )
-    for r in answer["responses"]:
+    for r in responses:
         _row(
             table,
             f"{r['omega']:g}",
+            *_hertz(r, responses),
             r["expected"] or "-",
             r["response"] + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
             {True: "yes", False: "no", None: "-"}[r["symmetric"]],
             "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
             "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
+            *(_metres(r[key]) for key in ("x1_max_m", "x1_min_m") if si),
             "-" if r["twin"] is None else r["twin"]["response"],
             ", ".join(o["response"] for o in r["others"]) or "-",
         )
@@ -187,6 +202,22 @@ def simulated(answer: Mapping[str, Any]) -> None:
             _line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
         for doubt in doubts({"this response": r.get("trust")}):
             _line(console, f"ω = {r['omega']:g}: {doubt}")
+
+
+def _hertz_heads(rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz") -> list[str]:
+    """The heading of the mechanism's frequency, where it is known."""
+    return ["mechanism"] if rows and all(key in row for row in rows) else []
+
+
+def _hertz(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz"
+) -> list[str]:
+    """Its cell in one of the rows."""
+    return [si_units.shown(row[key], "Hz") for _ in _hertz_heads(rows, key)]
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else si_units.shown(value, "m")
 
 
 def compared(answer: Mapping[str, Any]) -> None:

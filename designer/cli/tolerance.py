@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from designer.base.default_counts import SAMPLES, SEED
 from designer.cli.app import (
     Jobs,
     Json,
@@ -48,7 +49,7 @@ class StudyRung(StrEnum):
 def tolerance(
     model: Source,
     out: Out = None,
-    samples: Samples = 200,
+    samples: Samples = SAMPLES,
     until: Annotated[
         float | None,
         typer.Option("--until", metavar="WIDTH", help="Add boards until intervals are narrower."),
@@ -71,7 +72,7 @@ def tolerance(
         str | None,
         typer.Option("--cluster", metavar="tcp://…", help="A Dask scheduler that shares the work."),
     ] = None,
-    seed: Seed = 1,
+    seed: Seed = SEED,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from designer.base.default_counts import SEED, TRADE_BOARDS
 from designer.cli.app import (
     Jobs,
     Json,
@@ -34,8 +35,8 @@ def trade(
         typer.Option(
             "--boards", metavar="N", help="Boards of each response for the yield; 0: none."
         ),
-    ] = 100,
-    seed: Seed = 1,
+    ] = TRADE_BOARDS,
+    seed: Seed = SEED,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from designer.base.default_counts import SAMPLES, SEED
 from designer.base.errors import InputError
 from designer.base.version import __version__
 from designer.cli.app import (
@@ -74,8 +75,8 @@ def _designer(
 def run(
     model: Source,
     out: Out = None,
-    samples: Samples = 200,
-    seed: Seed = 1,
+    samples: Samples = SAMPLES,
+    seed: Seed = SEED,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -105,7 +106,7 @@ def synthesise(
     compare: Annotated[
         bool, typer.Option("--compare", help="Beside the paper's values; needs no --out.")
     ] = False,
-    seed: Seed = 1,
+    seed: Seed = SEED,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -142,13 +143,22 @@ def simulate(
         list[float] | None,
         typer.Option("--omega", metavar="W", help="Dimensionless frequency; may be repeated."),
     ] = None,
+    frequency: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--frequency",
+            metavar="F",
+            help='Frequency of a [mechanical] model, such as "10 Hz" or "62.8 rad/s"; may be '
+            "repeated.",
+        ),
+    ] = None,
     engine: Annotated[EngineName, typer.Option("--engine", help="What simulates.")] = (
         EngineName.MODEL
     ),
     rung: Annotated[
         RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
     ] = RungName.IDEAL,
-    seed: Seed = 1,
+    seed: Seed = SEED,
     plots: Annotated[
         Path | None,
         typer.Option("--plots", metavar="DIR", help="Draw each response: PNG and SVG."),
@@ -162,13 +172,22 @@ def simulate(
     quiet: Quiet = False,
     log: Log = None,
 ) -> int:
-    """The responses: those that the model file wants, or what is reached from rest at --omega."""
+    """The responses: those that the model file wants, or what is reached from rest at --omega
+    and --frequency."""
     with _session(verbose, quiet, log) as progress, _compiling(progress):
         from designer.jobs import synthesise_job
 
         synthesise_job.Options(seed, jobs).check()
         answer, found = synthesise_job.simulate_answer(
-            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
+            model,
+            tuple(omega or ()),
+            engine.value,
+            jobs,
+            progress,
+            plots,
+            overwrite,
+            rung.value,
+            frequencies=tuple(frequency or ()),
         )
     if json:
         _print_json(answer)
@@ -193,13 +212,14 @@ def catalog(
     log: Log = None,
 ) -> int:
     """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
-    with _session(verbose, quiet, log):
+    with _session(verbose, quiet, log) as progress:
         from designer.catalog.catalog import load_catalog
 
         held = load_catalog()
         if check is not None:
             from designer.spice.opamp_check import checks
 
+            progress.stage(f"{check} in ngspice")
             measured = checks(held.opamp(check))
     if check is not None:
         if json:

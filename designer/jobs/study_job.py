@@ -76,6 +76,7 @@ def run_into(
         progress.stage("responses of the model, parts")
         if "design" in todo:
             made = synthesis_result.synthesise(modelfile, catalog)
+            progress.stage("start recipes, files of the design")
             with naming(modelfile):
                 files = design_files.texts(made)
             inputs = wanted["design"][0]
@@ -93,7 +94,9 @@ def run_into(
     said = result.provenance
     if result.study.maps:
         write_maps(folder, result.study, said)
-    folder.write(TOLERANCE, dumps(study_json(result.study, said, result.cost, result.equations)))
+    scales = modelfile.mechanical
+    study = study_json(result.study, said, result.cost, result.equations, scales)
+    folder.write(TOLERANCE, dumps(study))
     progress.stage("report")
     from designer.report.data import ReportData
     from designer.report.write import write_report  # matplotlib is not needed before this

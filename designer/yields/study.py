@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from designer.base.default_counts import SAMPLES as SAMPLES
+from designer.base.default_counts import SEED as SEED
 from designer.check.checked_design import Checked
 from designer.yields import two_engine_yield as combined
 from designer.yields.blame_analysis import Blame
@@ -24,9 +26,6 @@ from designer.yields.yield_maps import YieldMap
 
 if TYPE_CHECKING:
     pass
-
-SAMPLES = 200
-SEED = 1
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from designer.base.checks import at_least, cores
+from designer.base.default_counts import SAMPLES as SAMPLES
+from designer.base.default_counts import SEED as SEED
 from designer.base.progress import Progress
 from designer.check import checked_design
 from designer.check.checked_design import Checked
@@ -16,7 +18,7 @@ from designer.spice.pool import SpicePool
 from designer.spread.spread import NO_BANDWIDTH
 from designer.yields import layers, study_plan
 from designer.yields.layers import Runner
-from designer.yields.study import SAMPLES, SEED, Study
+from designer.yields.study import Study
 from designer.yields.study_layers import RungName, Stores, Work
 from designer.yields.trimmed_yield import dc_trim
 from designer.yields.yield_maps import Over
