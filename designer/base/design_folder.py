@@ -19,11 +19,18 @@ from typing import Any
 
 from designer.base.atomic_write import partial_of
 from designer.base.errors import InputError
-from designer.base.manifest import MANIFEST as MANIFEST
-from designer.base.manifest import OF_DESIGN, Manifest, Stage, State, grown, read_manifest
-from designer.base.manifest import StageName as StageName
-from designer.base.manifest import file_hash as file_hash
-from designer.base.manifest import read_json as read_json
+from designer.base.manifest import (
+    MANIFEST as MANIFEST,
+    OF_DESIGN,
+    Manifest,
+    Stage,
+    StageName as StageName,
+    State,
+    file_hash as file_hash,
+    grown,
+    read_json as read_json,
+    read_manifest,
+)
 from designer.base.plain_json import dumps
 
 MODEL = "model.toml"

@@ -3,6 +3,11 @@
 On a terminal a bar for each stage, with rate and time left; elsewhere a line for each, and one
 more from time to time while it lasts; with ``-q`` nothing. Time left is said from a tenth of a
 stage on: the longest steps often come first, and the first of all may wait for a compiler.
+
+No stage is silent: whoever is watched (``with progress:``) says every `SILENCE` seconds how long
+the stage has lasted, how far it is, and what it works on just now, if nothing else was said. What
+is worked on comes from `doing` and `part`, which any function may call: they reach who is watched,
+or nobody. The same lines stand in the log.
 """
 
 from __future__ import annotations
@@ -13,22 +18,80 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar, Token
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
-    from rich.progress import Progress as Bars
+    from rich.progress import Progress as Bars, TaskID
 
 LOG = logging.getLogger("designer")
+EVERY = 20.0
+"""s between two lines about the steps of a stage."""
+SILENCE = 10.0
+"""s that nothing is said at most."""
+REDRAWN = 0.2
+"""s between two changes of what a terminal's bar says is worked on."""
+BEAT = 1.0
+"""s between two looks at whether it was silent too long."""
+
+
+class Stage:
+    """One stage of the work: its steps, and when something was last said about it.
+
+    total : steps, if that is known. say : takes a line about the stage.
+    """
+
+    def __init__(
+        self, total: int | None, say: Callable[[str], None], clock: Callable[[], float]
+    ) -> None:
+        self.total = total
+        self.detail = ""
+        self._say, self._clock = say, clock
+        self._began = self._last = clock()
+        self._done, self._lock = 0, threading.Lock()
+
+    def step(self) -> None:
+        """One more step is done."""
+        with self._lock:
+            self._done += 1
+            ended = self.total is not None and self._done >= self.total
+            if not ended:
+                self._report(EVERY)
+
+    def beat(self) -> None:
+        """Say how far it is, if nothing was said for too long."""
+        with self._lock:
+            self._report(SILENCE)
+
+    def _report(self, after: float) -> None:
+        now = self._clock()
+        if now - self._last < after:
+            return
+        self._last, spent = now, now - self._began
+        far = how_far(self._done, self.total, spent) if self._done else f"{duration(spent)} so far"
+        self._say(f"  {far}" + (f": {self.detail}" if self.detail else ""))
 
 
 class Progress:
     """Says nothing; what functions use that nobody watches."""
 
+    _clock: Callable[[], float] = staticmethod(time.monotonic)
+    _stage: Stage | None = None
+    _parts: tuple[str, ...] = ()
+    _ended: threading.Event | None = None
+    _token: Token[Progress | None] | None = None
+
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         """A stage begins, with ``total`` steps if that is known; call the result at each step."""
         LOG.info("%s", text)
-        return _nothing
+        self._stage = Stage(total, self._say, self._clock)
+        return self._stage.step
+
+    def doing(self, text: str) -> None:
+        """What the stage works on just now; it is only shown where the stage lasts."""
+        if self._stage is not None:
+            self._stage.detail = ", ".join(filter(None, (*self._parts, text)))
 
     def note(self, text: str) -> None:
         """Something that a user ought to know."""
@@ -39,7 +102,17 @@ class Progress:
         """While something else is printed on standard error."""
         yield
 
+    def beat(self) -> None:
+        """Say how far the stage is, if nothing was said for too long."""
+        if self._stage is not None:
+            self._stage.beat()
+
     def __enter__(self) -> Self:
+        self._stage = Stage(None, self._say, self._clock)
+        self._stage.detail = "starting"
+        self._token = _WATCHED.set(self)
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, args=(self._ended,), daemon=True).start()
         return self
 
     def __exit__(
@@ -48,11 +121,46 @@ class Progress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        return None
+        if self._ended is not None:
+            self._ended.set()
+        if self._token is not None:
+            _WATCHED.reset(self._token)
+            self._token = None
+
+    def _say(self, line: str) -> None:
+        """A line about the stage."""
+        LOG.info("%s", line)
+
+    def _watch(self, ended: threading.Event) -> None:
+        while not ended.wait(BEAT):
+            self.beat()
 
 
-EVERY = 20.0
-"""s between two lines about one stage."""
+_WATCHED: ContextVar[Progress | None] = ContextVar("watched", default=None)
+"""Who is told by `doing` and `part`."""
+
+
+def doing(text: str) -> None:
+    """Tell who is watched what is worked on just now, such as "dead zone, tables 3"."""
+    watched = _WATCHED.get()
+    if watched is not None:
+        watched.doing(text)
+
+
+@contextmanager
+def part(text: str) -> Iterator[None]:
+    """What is worked on inside belongs to this part, such as "without swing"."""
+    watched = _WATCHED.get()
+    if watched is None:
+        yield
+        return
+    above = watched._parts
+    watched._parts = (*above, text)
+    watched.doing("")
+    try:
+        yield
+    finally:
+        watched._parts = above
 
 
 class Lines(Progress):
@@ -66,25 +174,15 @@ class Lines(Progress):
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         print(f"{text} …", file=sys.stderr, flush=True)
-        super().stage(text, total)
-        began = said = self._clock()
-        done, lock = 0, threading.Lock()
-
-        def step() -> None:
-            nonlocal done, said
-            with lock:
-                done += 1
-                now = self._clock()
-                if now - said < EVERY or (total is not None and done >= total):
-                    return
-                said = now
-                print(f"  {how_far(done, total, now - began)}", file=sys.stderr, flush=True)
-
-        return step
+        return super().stage(text, total)
 
     def note(self, text: str) -> None:
         print(text, file=sys.stderr, flush=True)
         super().note(text)
+
+    def _say(self, line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+        super()._say(line)
 
 
 class Terminal(Progress):
@@ -95,11 +193,11 @@ class Terminal(Progress):
         from rich.progress import (
             BarColumn,
             MofNCompleteColumn,
+            Progress as Bars,
             SpinnerColumn,
             TextColumn,
             TimeElapsedColumn,
         )
-        from rich.progress import Progress as Bars
 
         self._bars: Bars = Bars(
             SpinnerColumn(finished_text="✓"),
@@ -111,27 +209,38 @@ class Terminal(Progress):
             console=Console(stderr=True),
         )
         self._open: list[Callable[[], None]] = []
+        self._shown: tuple[TaskID, str] | None = None
+        self._drawn = 0.0
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
-        super().stage(text, total)
+        said = super().stage(text, total)
         self._finish()
         bars, task = self._bars, self._bars.add_task(text, total=total, rate="")
+        self._shown = task, text
 
         def finish() -> None:
             steps = next(t.completed for t in bars.tasks if t.id == task)
             # Of how many was not known before: now it is.
             end = total or max(int(steps), 1)
-            bars.update(task, total=end, completed=end)
+            bars.update(task, total=end, completed=end, description=text)
 
         self._open.append(finish)
 
         def step() -> None:
+            said()
             bars.advance(task)
             now = next(t for t in bars.tasks if t.id == task)
             if now.elapsed:
                 bars.update(task, rate=pace(int(now.completed), total, now.elapsed))
 
         return step
+
+    def doing(self, text: str) -> None:
+        super().doing(text)
+        now = self._clock()
+        if self._shown is not None and self._stage is not None and now - self._drawn >= REDRAWN:
+            self._drawn, (task, name) = now, self._shown
+            self._bars.update(task, description=f"{name}: {self._stage.detail}")
 
     def note(self, text: str) -> None:
         super().note(text)
@@ -150,7 +259,7 @@ class Terminal(Progress):
 
     def __enter__(self) -> Self:
         self._bars.start()
-        return self
+        return super().__enter__()
 
     def __exit__(
         self,
@@ -160,6 +269,7 @@ class Terminal(Progress):
     ) -> None:
         if kind is None:
             self._finish()
+        super().__exit__(kind, error, trace)
         self._bars.stop()
 
     def _finish(self) -> None:
@@ -178,9 +288,14 @@ def pace(done: int, total: int | None, seconds: float) -> str:
     speed = done / seconds
     if total is None or 10 * done < total:
         return rate(speed)
-    left = round((total - done) / speed)
-    hours, minutes = divmod(left // 60, 60)
-    return f"{rate(speed)}, {hours}:{minutes:02d}:{left % 60:02d} left"
+    return f"{rate(speed)}, {duration((total - done) / speed)} left"
+
+
+def duration(seconds: float) -> str:
+    """Hours, minutes and seconds, such as "0:03:20"."""
+    whole = round(seconds)
+    hours, minutes = divmod(whole // 60, 60)
+    return f"{hours}:{minutes:02d}:{whole % 60:02d}"
 
 
 def rate(speed: float) -> str:
@@ -193,7 +308,3 @@ def progress_for(quiet: bool) -> Progress:
     if quiet:
         return Progress()
     return Terminal() if sys.stderr.isatty() else Lines()
-
-
-def _nothing() -> None:
-    return None

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 
 _PREFIXES = {
@@ -82,6 +82,15 @@ def format_quantity(value: float, unit: str = "", digits: int = 4) -> str:
     if exponent not in _PREFIX_OF:
         return f"{_plain(rounded.scaleb(-rounded.adjusted()))}e{rounded.adjusted()}{unit}"
     return f"{_plain(rounded.scaleb(-exponent))}{_PREFIX_OF[exponent]}{unit}"
+
+
+def told_apart(values: Sequence[float], digits: int, most: int = 12) -> list[str]:
+    """Each value in ``digits`` significant digits, or in as many more as tell those that differ in
+    ``most`` digits apart."""
+    different = len({f"{value:.{most}g}" for value in values})
+    while digits < most and len({f"{value:.{digits}g}" for value in values}) < different:
+        digits += 1
+    return [f"{value:.{digits}g}" for value in values]
 
 
 def encode_value(code: str, value: float) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from designer.base.arrays import Array
+from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.steady_state import Setting
 
@@ -34,6 +35,11 @@ class Subject(Protocol):
     @property
     def units(self) -> Mapping[str, str]:
         """By parameter, and by "x", "v" and "λ" for the axes of a diagram."""
+        ...
+
+    @property
+    def si(self) -> Mapping[str, Unit]:
+        """SI units of the dimensionless quantities that have one, by name."""
         ...
 
     def check(self, option: str, name: str, value: float) -> None:

@@ -65,7 +65,8 @@ def _held(subject: Subject, changed: Mapping[str, float | None]) -> Iterable[str
     for name, value in {**subject.held(changed), **changed}.items():
         if value is not None:
             unit = subject.units.get(name, "")
-            yield f"{_name(name)} = {value:.6g}" + (f" {unit}" if unit else "")
+            si = f" ({subject.si[name].text(value)})" if name in subject.si else ""
+            yield f"{_name(name)} = {value:.6g}" + (f" {unit}" if unit else "") + si
 
 
 def _name(name: str) -> str:

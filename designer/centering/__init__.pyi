@@ -3,11 +3,7 @@ from . import (
 )
 from .cure_branch import (
     KINDS as KINDS,
-)
-from .cure_branch import (
     cured as cured,
-)
-from .cure_branch import (
     kind_named as kind_named,
 )
 from .cure_measure import (
@@ -18,8 +14,6 @@ from .cure_plots import (
 )
 from .cure_result_json import (
     cure_json as cure_json,
-)
-from .cure_result_json import (
     front_csv as front_csv,
 )
 from .cure_search import (
@@ -30,8 +24,6 @@ from .cure_upgrade import (
 )
 from .design_search import (
     look as look,
-)
-from .design_search import (
     search as search,
 )
 from .memory import (
@@ -39,11 +31,7 @@ from .memory import (
 )
 from .ngspice_check import (
     LEVELS as LEVELS,
-)
-from .ngspice_check import (
     RUNG as RUNG,
-)
-from .ngspice_check import (
     Listener as Listener,
 )
 from .resolved_file import (
@@ -51,7 +39,5 @@ from .resolved_file import (
 )
 from .result_json import (
     confirmation_json as confirmation_json,
-)
-from .result_json import (
     search_json as search_json,
 )

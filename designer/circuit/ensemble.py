@@ -19,8 +19,7 @@ from designer.base.threads import parallel
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.reduction import FloatingCircuit, Reduction
-from designer.dynamics import attractors, working_modes
-from designer.dynamics import kernel_four_state as kernel
+from designer.dynamics import attractors, kernel_four_state as kernel, working_modes
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey

@@ -11,6 +11,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.schema import one_of
+from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
 from designer.circuit.design import Design
 from designer.circuit.netlist import Excitation
@@ -19,6 +20,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.steady_state import Setting
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
+from designer.model.si_units import NO_UNITS
 from designer.model.swept_model import GREATEST, SMALLEST
 
 BOARD_SETTINGS = ("frequency", "omega", "amplitude", "offset")
@@ -51,6 +53,7 @@ class BoardSubject:
         self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
         self.states = ("v1", "v2", "v3", "v4")
         self.units: Mapping[str, str] = UNITS
+        self.si: Mapping[str, Unit] = NO_UNITS
 
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""

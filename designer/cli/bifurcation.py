@@ -36,15 +36,28 @@ def bifurcation(
         ),
     ] = None,
     low: Annotated[
-        float | None, typer.Option("--from", metavar="A", help="One end of the sweep.")
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="A",
+            help='One end of the sweep; of a [mechanical] model also "10 Hz" or "0.5 mm".',
+        ),
     ] = None,
-    high: Annotated[float | None, typer.Option("--to", metavar="B", help="The other end.")] = None,
+    high: Annotated[str | None, typer.Option("--to", metavar="B", help="The other end.")] = None,
     steps: Annotated[
         int | None, typer.Option("--steps", metavar="N", help="Values, both ends included.")
     ] = None,
     omega: Annotated[
         float | None,
         typer.Option("--omega", metavar="W", help="The drive's frequency where it is not swept."),
+    ] = None,
+    frequency: Annotated[
+        str | None,
+        typer.Option(
+            "--frequency",
+            metavar="F",
+            help='The same in units, such as "10 Hz"; with --circuit the generator\'s.',
+        ),
     ] = None,
     down: Annotated[
         bool, typer.Option("--down", help="Follow the attractor downwards (the default).")
@@ -62,7 +75,7 @@ def bifurcation(
         int | None, typer.Option("--keep", metavar="N", help="Drive periods shown [30; maps 16].")
     ] = None,
     second: Annotated[
-        tuple[str, float, float, int] | None,
+        tuple[str, str, str, int] | None,
         typer.Option("--map", metavar="NAME A B N", help="A map over this parameter too."),
     ] = None,
     basins: Annotated[
@@ -94,6 +107,7 @@ def bifurcation(
             high=high,
             steps=steps,
             omega=omega,
+            frequency=frequency,
             down=down,
             up=up,
             starts=starts,

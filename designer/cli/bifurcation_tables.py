@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from designer.base.si_unit import suffix, value_text
 from designer.cli.tables import add_row, files, new_console, new_table, print_line
 
 LONGEST = 40
@@ -24,22 +25,35 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     wide = answer["windows"]
     widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
-    table = new_table("Windows", "track", f"from{unit}", "to", "response", "symmetric", "steps")
+    si = answer.get("si_unit")
+    heads = ["from (SI)", "to (SI)"] if si else []
+    table = new_table(
+        "Windows", "track", f"from{unit}", "to", *heads, "response", "symmetric", "steps"
+    )
     for w in sorted(widest, key=lambda w: (w["track"], w["from"])):
         symmetric = {True: "yes", False: "no", None: "-"}[w["symmetric"]]
-        ends = (f"{w['from']:.6g}", f"{w['to']:.6g}")
+        ends: tuple[str, ...] = (f"{w['from']:.6g}", f"{w['to']:.6g}")
+        ends += (_si(w, "from", si), _si(w, "to", si)) if si else ()
         add_row(table, w["track"], *ends, w["response"], symmetric, str(w["steps"]))
     console.print(table)
     if len(wide) > len(widest):
         print_line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        table = new_table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
+        heads = ["(SI)"] if si else []
+        table = new_table(
+            "Bifurcation points", "kind", f"{name}{unit}", *heads, "track", "what changes"
+        )
         for p in answer["points"][:LONGEST]:
             branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
             for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
-                first = ("", "") if k else (p["kind"], f"{p['value']:.9g}")
-                add_row(table, *first, c["track"] or "-", c["text"])
+                first = [p["kind"], f"{p['value']:.9g}", *([_si(p, "value", si)] if si else [])]
+                add_row(table, *([""] * len(first) if k else first), c["track"] or "-", c["text"])
         console.print(table)
+
+
+def _si(row: Mapping[str, Any], key: str, unit: str) -> str:
+    """A value in its SI unit, with more digits than elsewhere: ends of windows lie close."""
+    return value_text(row[f"{key}_{suffix(unit)}"], unit, digits=6)
 
 
 def _map(answer: Mapping[str, Any]) -> None:

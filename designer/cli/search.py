@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from designer.base.default_counts import SEARCH_SAMPLES, SEED
 from designer.base.errors import MISSING, InputError
 from designer.base.progress import Progress
 from designer.cli.app import (
@@ -35,10 +36,6 @@ if TYPE_CHECKING:
     from designer.jobs.cure_job import CureResult
     from designer.jobs.options import Options
 
-SAMPLES = 4000
-"""Boards of the final study; as ``search_job.SAMPLES``."""
-SEED = 1
-"""Of a search or a cure that nobody says anything else of; as ``study.SEED``."""
 KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
 """Of upgrades; as ``cure_branch.KINDS``."""
 
@@ -49,7 +46,7 @@ def search(
     out: Out = None,
     samples: Annotated[
         int | None,
-        typer.Option("--samples", metavar="N", help=f"Fresh boards at the end [{SAMPLES}]."),
+        typer.Option("--samples", metavar="N", help=f"Fresh boards at the end [{SEARCH_SAMPLES}]."),
     ] = None,
     wanted: Annotated[
         float | None,
@@ -89,7 +86,7 @@ def search(
         options = Options(
             SEED if seed is None else seed,
             jobs,
-            SAMPLES if samples is None else samples,
+            SEARCH_SAMPLES if samples is None else samples,
             overwrite,
             resume,
             rung=said.value,

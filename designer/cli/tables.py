@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from designer.base.si_unit import value_text
 from designer.base.units import format_quantity
 from designer.catalog.catalog import Catalog
 from designer.report import compare_table
@@ -51,11 +52,14 @@ def synthesised(answer: Mapping[str, Any]) -> None:
         f"{answer['distinct_values']} distinct values",
     )
     if answer["knobs"]:
-        table = new_table("Generator", "ω", "expected", "frequency", "amplitude (peak, high-Z)")
-        for knob in answer["knobs"]:
+        knobs, key = answer["knobs"], "mechanism_hz"
+        heads = ("ω", *_hertz_heads(knobs, key), "expected", "frequency")
+        table = new_table("Generator", *heads, "amplitude (peak, high-Z)")
+        for knob in knobs:
             add_row(
                 table,
                 f"{knob['omega']:g}",
+                *_hertz(knob, knobs, key),
                 knob["expected"] or "-",
                 f"{knob['frequency_hz']:.4g} Hz",
                 f"{knob['amplitude_v_peak']:.4g} V",
@@ -71,6 +75,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         f"Responses, {answer['samples']} samples"
         + (f", spread of the {spread}" if spread == "model file" else ""),
         "ω",
+        *_hertz_heads(answer["responses"]),
         "expected",
         "model",
         "circuit",
@@ -98,6 +103,7 @@ def tolerance(answer: Mapping[str, Any]) -> None:
         add_row(
             table,
             f"{r['omega']:g}",
+            *_hertz(r, answer["responses"]),
             r["expected"] or "-",
             found,
             r["circuit"],
@@ -156,7 +162,8 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
     if not shown and not both:
         return
     heads = [*(f"{kind} %" for kind in shown), *(["both engines %", "95 %", "differ"] * both)]
-    table = new_table("Further yields", "ω", "expected", *heads, gap=1)
+    first = ("ω", *_hertz_heads(answer["responses"]), "expected")
+    table = new_table("Further yields", *first, *heads, gap=1)
     for r in answer["responses"]:
         cells = [_percent((kinds[kind](r) or {}).get("rate")) for kind in shown]
         c = r.get("combined")
@@ -169,7 +176,8 @@ def _further(console: Console, answer: Mapping[str, Any]) -> None:
                 _interval(c, r["yield"]),
                 f"{differ['count']} of {differ['asked']}",
             ]
-        add_row(table, f"{r['omega']:g}", r["expected"] or "-", *cells)
+        hertz = _hertz(r, answer["responses"])
+        add_row(table, f"{r['omega']:g}", *hertz, r["expected"] or "-", *cells)
     console.print(table)
     whole = answer.get("all_on_one_board") or {}
     said = [
@@ -194,27 +202,34 @@ def _percent(rate: float | None) -> str:
 
 def simulated(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
+    head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
+    responses = answer["responses"]
+    si = all("x1_max_m" in r for r in responses)
     table = new_table(
-        f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice",
+        head,
         "ω",
+        *_hertz_heads(responses),
         "expected",
         "response",
         "symmetric",
         "x1 max",
         "x1 min",
+        *(["x1 max (SI)", "x1 min (SI)"] if si else []),
         "twin",
         "others",
         gap=1,
     )
-    for r in answer["responses"]:
+    for r in responses:
         add_row(
             table,
             f"{r['omega']:g}",
+            *_hertz(r, responses),
             r["expected"] or "-",
             r["response"] + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
             {True: "yes", False: "no", None: "-"}[r["symmetric"]],
             "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
             "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
+            *(_metres(r[key]) for key in ("x1_max_m", "x1_min_m") if si),
             "-" if r["twin"] is None else r["twin"]["response"],
             ", ".join(o["response"] for o in r["others"]) or "-",
         )
@@ -225,6 +240,22 @@ def simulated(answer: Mapping[str, Any]) -> None:
             print_line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
         for doubt in doubts({"this response": r.get("trust")}):
             print_line(console, f"ω = {r['omega']:g}: {doubt}")
+
+
+def _hertz_heads(rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz") -> list[str]:
+    """The heading of the mechanism's frequency, where it is known."""
+    return ["mechanism"] if rows and all(key in row for row in rows) else []
+
+
+def _hertz(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz"
+) -> list[str]:
+    """Its cell in one of the rows."""
+    return [value_text(row[key], "Hz") for _ in _hertz_heads(rows, key)]
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else value_text(value, "m")
 
 
 def compared(answer: Mapping[str, Any]) -> None:

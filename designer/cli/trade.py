@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from designer.base.default_counts import SEED, TRADE_BOARDS
 from designer.cli.app import (
     Jobs,
     Json,
@@ -24,9 +25,6 @@ from designer.cli.app import (
 )
 from designer.cli.verbs import OwnSeed
 
-BOARDS, SEED = 100, 1
-"""Of a trade that nobody says anything else of; as ``yields.BOARDS`` and ``study.SEED``."""
-
 
 @app.command()
 def trade(
@@ -37,7 +35,8 @@ def trade(
         typer.Option(
             "--boards",
             metavar="N",
-            help="Boards of each response for the yield; 0: none [100, or the folder's own].",
+            help=f"Boards of each response for the yield; 0: none "
+            f"[{TRADE_BOARDS}, or the folder's own].",
         ),
     ] = None,
     seed: OwnSeed = None,
@@ -58,7 +57,7 @@ def trade(
 
         given = {"boards": boards, "seed": seed}
         numbers: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
-        at_least("--boards", numbers.get("boards", BOARDS), 0)
+        at_least("--boards", numbers.get("boards", TRADE_BOARDS), 0)
         synthesise_job.Options(numbers.get("seed", SEED), jobs).check()
         if out is None and not model.is_dir():
             modelfile, folder = read_model_file(model), None
@@ -68,7 +67,7 @@ def trade(
             numbers = folder_numbers.own(Folder(folder), "trade", tuple(given)) | numbers
         seed = numbers.get("seed", SEED)
         options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
-        extent = trade_job.Extent(boards=numbers.get("boards", BOARDS))
+        extent = trade_job.Extent(boards=numbers.get("boards", TRADE_BOARDS))
         answer, _ = trade_job.answer(modelfile, folder, options, extent, progress)
     if json:
         print_json(answer)

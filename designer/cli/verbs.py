@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from designer.base.default_counts import SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.version import __version__
@@ -129,7 +130,7 @@ def synthesise(
     compare: Annotated[
         bool, typer.Option("--compare", help="Beside the paper's values; needs no --out.")
     ] = False,
-    seed: Seed = 1,
+    seed: Seed = SEED,
     jobs: Jobs = None,
     overwrite: Overwrite = False,
     resume: Resume = False,
@@ -166,13 +167,22 @@ def simulate(
         list[float] | None,
         typer.Option("--omega", metavar="W", help="Dimensionless frequency; may be repeated."),
     ] = None,
+    frequency: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--frequency",
+            metavar="F",
+            help='Frequency of a [mechanical] model, such as "10 Hz" or "62.8 rad/s"; may be '
+            "repeated.",
+        ),
+    ] = None,
     engine: Annotated[EngineName, typer.Option("--engine", help="What simulates.")] = (
         EngineName.MODEL
     ),
     rung: Annotated[
         RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
     ] = RungName.IDEAL,
-    seed: Seed = 1,
+    seed: Seed = SEED,
     plots: Annotated[
         Path | None,
         typer.Option("--plots", metavar="DIR", help="Draw each response: PNG and SVG."),
@@ -186,13 +196,22 @@ def simulate(
     quiet: Quiet = False,
     log: Log = None,
 ) -> int:
-    """The responses: those that the model file wants, or what is reached from rest at --omega."""
+    """The responses: those that the model file wants, or what is reached from rest at --omega
+    and --frequency."""
     with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import synthesise_job
 
         synthesise_job.Options(seed, jobs).check()
         answer, found = synthesise_job.simulate_answer(
-            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
+            model,
+            tuple(omega or ()),
+            engine.value,
+            jobs,
+            progress,
+            plots,
+            overwrite,
+            rung.value,
+            frequencies=tuple(frequency or ()),
         )
     if json:
         print_json(answer)
@@ -217,13 +236,14 @@ def catalog(
     log: Log = None,
 ) -> int:
     """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
-    with session(verbose, quiet, log):
+    with session(verbose, quiet, log) as progress:
         from designer.catalog.catalog import load_catalog
 
         held = load_catalog()
         if check is not None:
             from designer.spice.opamp_check import checks
 
+            progress.stage(f"{check} in ngspice")
             measured = checks(held.opamp(check))
     if check is not None:
         if json:

@@ -18,8 +18,13 @@ from scipy.linalg import matrix_balance
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.interruption import heed
-from designer.dynamics import kernel_four_state, kernel_modal, modal_tables, working_modes
-from designer.dynamics import kernel_general as kernel
+from designer.dynamics import (
+    kernel_four_state,
+    kernel_general as kernel,
+    kernel_modal,
+    modal_tables,
+    working_modes,
+)
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 
 STEP = 0.5

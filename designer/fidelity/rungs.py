@@ -27,8 +27,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_four_state import POINTS
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.fidelity import gate as trade_gate
-from designer.fidelity import runge_kutta
+from designer.fidelity import gate as trade_gate, runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.fidelity.gate import Run
 from designer.model.find_responses import ModelResponse
@@ -36,8 +35,7 @@ from designer.model.model import Dimensionless
 from designer.spice import numerics_gate as gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import Subject
-from designer.spice.opamp_model import RUNGS as SPICE_RUNGS
-from designer.spice.opamp_model import Rung
+from designer.spice.opamp_model import RUNGS as SPICE_RUNGS, Rung
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, Reading, read
 from designer.spice.simulator import SimulationFailed, Waveforms

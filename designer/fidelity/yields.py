@@ -28,8 +28,6 @@ from designer.yields.ngspice_runs import hear
 from designer.yields.ngspice_sampling import Ask, Kind, Why
 from designer.yields.verdict import StudyPlan, Verdict
 
-BOARDS = 400
-"""Boards of each response: with no difference at all, fewer leave room for more than 1 %."""
 REFINEMENTS = 3
 """How often ngspice's step is halved for a board at most: further than in a study, for here ngspice
 is what is measured against, and what it leaves open widens the interval both ways."""

@@ -1,25 +1,11 @@
 from . import (
     bifurcation_job as bifurcation_job,
-)
-from . import (
     folder_numbers as folder_numbers,
-)
-from . import (
     origin as origin,
-)
-from . import (
     rules_job as rules_job,
-)
-from . import (
     search_job as search_job,
-)
-from . import (
     study_job as study_job,
-)
-from . import (
     synthesise_job as synthesise_job,
-)
-from . import (
     trade_job as trade_job,
 )
 from .bifurcation_request import (
@@ -27,8 +13,6 @@ from .bifurcation_request import (
 )
 from .cure_job import (
     CureResult as CureResult,
-)
-from .cure_job import (
     cure as cure,
 )
 from .deck_job import (

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
+from designer.base.units import told_apart
 from designer.check import checked_design
 from designer.circuit.design import Design, settings
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.find_responses import ModelResponse
-from designer.model.model import STATES
+from designer.model.model import STATES, Mechanical
 from designer.model.model_file import ModelFile
 from designer.yields import study_plan
 from designer.yields.start_recipe import Recipe, hertz, volts
@@ -29,20 +30,32 @@ COLUMNS = (
     "load",
     "start",
 )
+OMEGA_DIGITS = 6
+"""Significant ones of ω where it follows from SI values; more where they tell responses apart."""
+MECHANISM = "mechanism_hz"
+"""A further column, of models with SI values."""
 LOAD = "high-Z"
 NO_RECIPE = "none: the nominal circuit does not show the wanted response"
 
 
 def setup_csv(
-    design: Design, found: Sequence[ModelResponse], recipes: Sequence[Recipe | None]
+    design: Design,
+    found: Sequence[ModelResponse],
+    recipes: Sequence[Recipe | None],
+    mechanical: Mechanical | None = None,
 ) -> str:
     """``setup.csv``, in digits that a generator takes; ``design.json`` has all of them.
 
     recipes : how to start each response; None where the nominal circuit does not show it.
+    mechanical : adds what each frequency is in the mechanism, Hz, in a last column.
     """
+    known = settings(design, found)
+    omegas = [repr(s.omega) for s in known]
+    if mechanical is not None:  # there ω follows from Hz or rad/s, and all its digits say nothing
+        omegas = told_apart([s.omega for s in known], OMEGA_DIGITS)
     rows = [
         {
-            "omega": repr(s.omega),
+            "omega": omega,
             "expect": s.expect or "",
             "frequency_hz": hertz(s.frequency_hz),
             "amplitude_v_peak": volts(s.amplitude_v_peak),
@@ -50,10 +63,11 @@ def setup_csv(
             "offset_v": repr(s.offset_v),
             "load": LOAD,
             "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
+            **({} if mechanical is None else {MECHANISM: hertz(mechanical.hertz(s.omega))}),
         }
-        for s, r, recipe in zip(settings(design, found), found, recipes, strict=True)
+        for s, omega, r, recipe in zip(known, omegas, found, recipes, strict=True)
     ]
-    return csv_text(COLUMNS, rows)
+    return csv_text(COLUMNS if mechanical is None else (*COLUMNS, MECHANISM), rows)
 
 
 def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
@@ -116,7 +130,7 @@ def _amplitudes(
             for s, v in zip(STATES, volts, strict=True)
         ]
         return [*rows, ("model force per generator volt", gain, "1/V", b)]
-    length, speed = mechanical.length_scale, mechanical.length_scale / mechanical.time_scale
+    length, speed = mechanical.length_scale, mechanical.speed_scale
     for i, (s, v) in enumerate(zip(STATES, volts, strict=True)):
         name = f"metres per volt of {s}" if i % 2 == 0 else f"metres per second per volt of {s}"
         rows.append((name, (speed if i % 2 else length) / v, "m/s/V" if i % 2 else "m/V", b))

@@ -8,16 +8,19 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from designer.base.arrays import Array
 from designer.base.checks import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
+from designer.base.si_unit import Unit
 from designer.base.version import __version__
 from designer.bifurcations import basins, captions, parameter_map, sweep, window_ends
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.store import GridStore, SweepStore, work_hash
+from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
@@ -86,7 +89,7 @@ def _subject(path: Path, request: Request, progress: Progress) -> tuple[ModelFil
             raise InputError(
                 path, "--circuit", "a model file", "a design folder (designer synthesise)"
             )
-    return modelfile, ModelSubject(modelfile.model)
+    return modelfile, ModelSubject(modelfile.model, mechanical=modelfile.mechanical)
 
 
 def _decides(plan: Plan, request: Request) -> dict[str, Any]:
@@ -132,6 +135,7 @@ def _make(
         store = None if root is None else SweepStore(root, plan.parameter, work, said)
         blocks = sum(len(plan.blocks(t)) for t in plan.tracks)
         made = sweep.run(plan, jobs, store, progress.stage(f"sweep over {plan.parameter}", blocks))
+        si = plan.subject.si.get(plan.parameter)
         points = []
         if request.points:
             count = len(window_ends.windows(made))
@@ -140,12 +144,13 @@ def _make(
         body = {
             "parameter": plan.parameter,
             "unit": plan.subject.units.get(plan.parameter, ""),
+            **({} if si is None else {"si_unit": si.name}),
             "tracks": list(plan.tracks),
             "steps": len(plan.values),
-            "windows": [w.as_dict() for w in made.windows],
+            "windows": [_with_si(w.as_dict(), si) for w in made.windows],
             "points": [
                 {
-                    **p.as_dict(),
+                    **_with_si(p.as_dict(), si),
                     "changes": [c.as_dict() for c in captions.changes(made, p)],
                 }
                 for p in points
@@ -161,8 +166,8 @@ def _make(
         grid = GridStore(root, request.kind, plan.x, plan.xs, plan.y, plan.ys, work, said)
     step = progress.stage(f"{request.kind} over {plan.x} and {plan.y}", len(plan.ys))
     body = {
-        "x": {"name": plan.x, "from": plan.xs[0], "to": plan.xs[-1], "steps": len(plan.xs)},
-        "y": {"name": plan.y, "from": plan.ys[0], "to": plan.ys[-1], "steps": len(plan.ys)},
+        "x": _grid_axis(plan.subject, plan.x, plan.xs),
+        "y": _grid_axis(plan.subject, plan.y, plan.ys),
     }
     if isinstance(plan, MapPlan):
         mapped = parameter_map.run(plan, jobs, grid, step)
@@ -179,6 +184,19 @@ def _make(
     return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.basins(
         found, name
     )
+
+
+def _grid_axis(subject: Subject, name: str, values: Array) -> dict[str, Any]:
+    axis = {"name": name, "from": values[0], "to": values[-1], "steps": len(values)}
+    return _with_si(axis, subject.si.get(name))
+
+
+def _with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
+    """The row, and the values of the swept quantity in its SI unit too, if it has one."""
+    if unit is None:
+        return row
+    keys = [key for key in ("from", "to", "value") if key in row]
+    return {**row, **{f"{key}_{unit.suffix}": row[key] * unit.scale for key in keys}}
 
 
 def _drawn(kind: StageName, figure: Any) -> dict[str, str | bytes]:

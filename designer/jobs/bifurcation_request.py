@@ -20,6 +20,7 @@ from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.steady_state import Course
 from designer.model.find_responses import check_omega
 from designer.model.model_file import ModelFile
+from designer.model.si_units import Reader
 from designer.model.swept_model import ModelSubject
 
 MOST_STEPS, MOST_STARTS, MOST_PERIODS = 100_000, 64, 1_000_000
@@ -33,24 +34,27 @@ Swept = ModelSubject | BoardSubject
 
 @dataclass(frozen=True)
 class Request:
-    """The command line: numbers in the units that the swept parameter has.
+    """The command line: numbers in the units that the swept parameter has, or texts with a unit.
 
     over : None for ω, the generator's frequency with ``circuit``, or x1 with ``basins``. low, high,
     steps : of it. second : (name, from, to, steps) of a map's or a basin's other axis. omega : the
-    drive's frequency where it is not swept. periods : (left out, kept), None for the defaults.
+    drive's frequency where it is not swept; frequency : the same as text, such as "10 Hz", of the
+    mechanism or with ``circuit`` of the generator. periods : (left out, kept), None for the
+    defaults.
     """
 
     over: str | None = None
-    low: float | None = None
-    high: float | None = None
+    low: float | str | None = None
+    high: float | str | None = None
     steps: int | None = None
     omega: float | None = None
+    frequency: str | None = None
     down: bool = False
     up: bool = False
     starts: int | None = None
     periods: int | None = None
     keep: int | None = None
-    second: tuple[str, float, float, int] | None = None
+    second: tuple[str, float | str, float | str, int] | None = None
     basins: bool = False
     circuit: bool = False
     points: bool = True
@@ -78,18 +82,16 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     if request.basins:
         return _basin_plan(request, subject, modelfile)
     over = request.over or ("frequency" if request.circuit else "omega")
-    for option, value in (("--from", request.low), ("--to", request.high)):
-        if value is None:
-            raise InputError(None, option, MISSING, f"a value of {over}")
-        subject.check("--over" if over not in subject.parameters else option, over, value)
-    low, high, steps = _axis("--from", "--to", "--steps", request.low, request.high, request.steps)
+    read = _reader(subject, modelfile)
+    first = _checked(read, subject, "--from", over, request.low)
+    last = _checked(read, subject, "--to", over, request.high)
+    low, high, steps = _axis("--from", "--to", "--steps", first, last, request.steps)
     swept = [over]
     if request.second is not None:
-        name, start, stop, count = request.second
+        name, *ends, count = request.second
         if name == over:
             raise InputError(None, "--map", name, f"another parameter than --over {over}")
-        for value in (start, stop):
-            subject.check("--map", name, value)
+        start, stop = (_checked(read, subject, "--map", name, value) for value in ends)
         ys = np.linspace(*_axis("--map", "--map", "--map", start, stop, count))
         _check_cells(steps, count)
         swept.append(name)
@@ -99,8 +101,8 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
         course = _course(request, parameter_map.COURSE)
         return MapPlan(subject, over, values, name, ys, course=course)
     if request.starts is not None:
-        ends = [{over: low}, {over: high}]
-        tracks = sweep.from_starts(subject, ends, request.starts)
+        both_ends = [{over: low}, {over: high}]
+        tracks = sweep.from_starts(subject, both_ends, request.starts)
     else:
         both = [d for d, asked in ((DOWN, request.down), (UP, request.up)) if asked]
         tracks = sweep.follow(*(both or [DOWN]))
@@ -108,6 +110,28 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
 
 
 # ---------------------------------------------------------------------------------------------
+
+
+def _reader(subject: Swept, modelfile: ModelFile) -> Reader:
+    """What reads the values of options: with the generator's units for a board."""
+    units: dict[str, str] = {}
+    if isinstance(subject, BoardSubject):
+        units = {**subject.units, **dict.fromkeys(subject.states, "V")}
+    return Reader(modelfile.model, modelfile.mechanical, units)
+
+
+def _checked(
+    read: Reader, subject: Swept, option: str, name: str, value: float | str | None
+) -> float:
+    """A value of a parameter, if it may have it."""
+    if value is None:
+        raise InputError(None, option, MISSING, f"a value of {name}")
+    if name not in subject.parameters:
+        over = "--map" if option == "--map" else "--over"
+        raise InputError(None, over, name, one_of(name, subject.parameters))
+    number = read.value(option, name, value)
+    subject.check(option, name, number)
+    return number
 
 
 def _check_options(request: Request) -> None:
@@ -170,6 +194,7 @@ def _course(request: Request, usual: Course) -> Course:
 
 def _basin_plan(request: Request, subject: Swept, modelfile: ModelFile) -> BasinPlan:
     states = subject.states
+    read = _reader(subject, modelfile)
     name, start, stop, count = request.second or (states[1], None, None, None)
     over = request.over or states[0]
     for option, state in (("--over", over), ("--map", name)):
@@ -185,11 +210,11 @@ def _basin_plan(request: Request, subject: Swept, modelfile: ModelFile) -> Basin
         reach = float(size[state])
         return np.linspace(
             *_axis(
-                "--from" if option == "--over" else option,
-                "--to" if option == "--over" else option,
-                "--steps" if option == "--over" else option,
-                -reach if low is None else low,
-                reach if high is None else high,
+                _end(option, "--from"),
+                _end(option, "--to"),
+                _end(option, "--steps"),
+                -reach if low is None else read.value(_end(option, "--from"), state, low),
+                reach if high is None else read.value(_end(option, "--to"), state, high),
                 BASIN_STEPS if steps is None else steps,
             )
         )
@@ -209,6 +234,11 @@ def _basin_plan(request: Request, subject: Swept, modelfile: ModelFile) -> Basin
     )
 
 
+def _end(axis: str, option: str) -> str:
+    """The option that gives an axis of basins its ends or steps: --map has them all."""
+    return option if axis == "--over" else axis
+
+
 def _changes(subject: Swept) -> dict[str, float]:
     if isinstance(subject, BoardSubject):
         assert subject.frequency is not None
@@ -221,22 +251,42 @@ def _at_frequency(
     request: Request, subject: Swept, modelfile: ModelFile, swept: list[str]
 ) -> Swept:
     """With the drive's frequency fixed, where it is not swept: --omega, or the first response's."""
+    option = "--omega"
+    asked: float | str | None = request.omega
+    if request.frequency is not None:
+        if asked is not None:
+            raise InputError(None, "--frequency", request.frequency, "nothing beside --omega")
+        option, asked = "--frequency", request.frequency
     if "omega" in swept or "frequency" in swept:
-        if request.omega is not None:
-            raise InputError(None, "--omega", request.omega, "nothing: the frequency is swept")
+        if asked is not None:
+            raise InputError(None, option, asked, "nothing: the frequency is swept")
         if {"omega", "frequency"} <= set(swept):
             raise InputError(None, "--map", swept[1], "not the frequency a second time")
         return subject
-    omega = request.omega
-    if omega is None:
+    read = _reader(subject, modelfile)
+    if not isinstance(subject, BoardSubject):
+        omega = _omega(option, asked, read, modelfile)
+        return ModelSubject(subject.model, omega, mechanical=subject.mechanical)
+    if isinstance(asked, str):
+        hertz = read.value(option, "frequency", asked)
+        subject.check(option, "frequency", hertz)
+    else:
+        hertz = subject.design.errors.scales.frequency(_omega(option, asked, read, modelfile))
+    return BoardSubject(subject.design, hertz, subject.amplitude, subject.offset)
+
+
+def _omega(option: str, asked: float | str | None, read: Reader, modelfile: ModelFile) -> float:
+    """The drive's dimensionless frequency: the option's, or that of the file's first response."""
+    if asked is None:
         known = [r.omega for r in modelfile.responses if r.omega is not None]
         if not known:
             raise InputError(
                 None, "--omega", MISSING, "the drive's frequency: no response of the file has one"
             )
         omega = known[0]
-    check_omega("--omega", omega)
-    if isinstance(subject, BoardSubject):
-        frequency = subject.design.errors.scales.frequency(omega)
-        return BoardSubject(subject.design, frequency, subject.amplitude, subject.offset)
-    return ModelSubject(subject.model, omega)
+    elif isinstance(asked, str):
+        omega = read.frequency(option, asked)
+    else:
+        omega = read.value(option, "omega", asked)
+    check_omega(option, omega)
+    return omega

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from designer.base.progress import doing
 from designer.board import board_notes
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill, bill_csv
@@ -31,6 +32,7 @@ def texts(made: Synthesis) -> dict[str, str]:
     """
     from designer.board import schematic_drawing  # with matplotlib, which nothing before this needs
 
+    doing("bill of materials, drawing")
     circuit, choice = board_circuit(made)
     found = components(circuit, made.catalog, choice)
     return {
@@ -59,6 +61,7 @@ def picture(made: Synthesis) -> bytes:
     """The drawing once more, as points."""
     from designer.board import schematic_drawing
 
+    doing("drawing")
     circuit, choice = board_circuit(made)
     numbers = pin_numbers(components(circuit, made.catalog, choice))
     return schematic_drawing.png(circuit, made.modelfile.title, numbers=numbers)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.circuit.design import Design
     from designer.dynamics.orbit import Orbit
     from designer.model.find_responses import ModelResponse
+    from designer.model.model import Mechanical
     from designer.model.model_file import ModelFile
     from designer.spread.part_grades import BetterGrade
 
@@ -65,6 +66,7 @@ def synthesis_json(
             {
                 "omega": s.omega,
                 "frequency_hz": s.frequency_hz,
+                **_mechanism(s.omega, modelfile.mechanical),
                 "amplitude_v_peak": s.amplitude_v_peak,
                 "offset_v": s.offset_v,
                 "expected": r.expected,
@@ -83,6 +85,11 @@ def synthesis_json(
 
 def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, dict[str, float]]:
     return {name: {"asked": g.asked, "bought": g.bought} for name, g in better.items()}
+
+
+def _mechanism(omega: float, mechanical: Mechanical | None) -> dict[str, float]:
+    """What a generator's frequency stands for in the mechanism, Hz."""
+    return {} if mechanical is None else {"mechanism_hz": mechanical.hertz(omega)}
 
 
 def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
@@ -105,21 +112,29 @@ def run_json(design: Mapping[str, Any], study: Mapping[str, Any]) -> dict[str, A
 
 
 def simulate_json(
-    simulated: Sequence[Simulated], engine: str, provenance: Mapping[str, Any], seconds: float
+    simulated: Sequence[Simulated],
+    engine: str,
+    provenance: Mapping[str, Any],
+    seconds: float,
+    mechanical: Mechanical | None = None,
 ) -> dict[str, Any]:
-    """What ``simulate`` prints."""
+    """What ``simulate`` prints; with ``mechanical`` also what that is in SI units."""
     return {
         "format": FORMAT,
         "engine": engine,
         "responses": [
             {
                 "omega": s.omega,
+                **hertz_json(s.omega, mechanical),
                 "expected": s.expected,
                 "found": s.found,
-                **orbit_json(s.orbit),
+                **orbit_json(s.orbit, mechanical),
                 "twin": _twin_json(s.twin),
                 "others": [
-                    {**orbit_json(o), "twin": _twin_json(s.twins[i] if s.twins else None)}
+                    {
+                        **orbit_json(o, mechanical),
+                        "twin": _twin_json(s.twins[i] if s.twins else None),
+                    }
                     for i, o in enumerate(s.others, start=1)
                 ],
                 "engine": s.settings,
@@ -133,8 +148,13 @@ def simulate_json(
     }
 
 
-def orbit_json(orbit: Orbit) -> dict[str, Any]:
-    """An orbit in model units."""
+def hertz_json(omega: float, mechanical: Mechanical | None) -> dict[str, float]:
+    """The frequency of a mechanism's force in Hz; nothing of a dimensionless model."""
+    return {} if mechanical is None else {"frequency_hz": mechanical.hertz(omega)}
+
+
+def orbit_json(orbit: Orbit, mechanical: Mechanical | None = None) -> dict[str, Any]:
+    """An orbit in model units; with ``mechanical`` also its extremes and impacts in SI units."""
     from designer.model.model import STATES
 
     known = len(orbit.extremes) > 0
@@ -161,6 +181,19 @@ def orbit_json(orbit: Orbit) -> dict[str, Any]:
         "penetration": orbit.penetration,
         "miss": orbit.miss,
         "reason": orbit.reason,
+        **_orbit_si(orbit, mechanical),
+    }
+
+
+def _orbit_si(orbit: Orbit, mechanical: Mechanical | None) -> dict[str, Any]:
+    if mechanical is None:
+        return {}
+    known = len(orbit.extremes) > 0
+    low, high = orbit.extremes[0] * mechanical.length_scale if known else (None, None)
+    return {
+        "x1_max_m": high,
+        "x1_min_m": low,
+        "impact_velocities_m_s": orbit.impact_velocities * mechanical.speed_scale,
     }
 
 

@@ -54,6 +54,7 @@ def beside(
     ------
     InputError : files that the manifest does not list are in the way.
     """
+    progress.stage("KiCad project")
     try:
         found = texts(made)
     except InputError as error:

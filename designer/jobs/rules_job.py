@@ -26,8 +26,7 @@ from designer.board.kicad_rules import board_rules
 from designer.catalog.catalog import load_catalog
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Outcome
 from designer.check.synthesis_result import Synthesis
-from designer.design_rules import junit, run_rules
-from designer.design_rules import on_board as rule_board
+from designer.design_rules import junit, on_board as rule_board, run_rules
 from designer.design_rules.kicad_drc import kicad_version
 from designer.design_rules.subject import Subject
 from designer.jobs.origin import provenance

@@ -51,8 +51,6 @@ from designer.yields.verdict import Answer, Verdict
 ASKED, CANDIDATES = "asked.toml", "candidates.jsonl"
 FILES = [ASKED, SEARCH, CANDIDATES]
 CONFIRMATION = "confirmation.json"
-SAMPLES = 4000
-"""Boards of the final study, at least."""
 DIFFERING = 0.05
 """Share of the confirming boards that may differ, or have no answer."""
 RULES = 5

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.checks import at_least, cores
+from designer.base.default_counts import SAMPLES, SEED
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName
 from designer.base.progress import Progress
@@ -22,14 +23,19 @@ from designer.jobs import design_files, kicad_files, rung_choice
 from designer.jobs.design_files import load
 from designer.jobs.options import Options
 from designer.jobs.study_folder import layers_of, merged, study_files
-from designer.jobs.study_stage import SPICE_TIMEOUT as SPICE_TIMEOUT
-from designer.jobs.study_stage import Help, Place, Stage, checks, satisfied
+from designer.jobs.study_stage import (
+    SPICE_TIMEOUT as SPICE_TIMEOUT,
+    Help,
+    Place,
+    Stage,
+    checks,
+    satisfied,
+)
 from designer.jobs.synthesise_job import Outcome, bills_are_of_old, design_inputs, standing_inputs
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spice import equation_check
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields.run_result import RunResult
-from designer.yields.study import SAMPLES, SEED
 from designer.yields.tolerance_study import tolerance
 
 PLACE = Place()
@@ -69,6 +75,7 @@ def run_into(
         progress.stage("responses of the model, parts")
         if "design" in todo:
             made = synthesis_result.synthesise(modelfile, catalog)
+            progress.stage("start recipes, files of the design")
             with naming(modelfile):
                 files = design_files.texts(made)
             inputs = wanted["design"][0]

@@ -11,6 +11,8 @@ import numpy as np
 
 from designer.base.plain_json import FORMAT
 from designer.check.checked_design import Checked
+from designer.jobs.json_answers import hertz_json
+from designer.model.model import Mechanical
 from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
 from designer.yields.ngspice_sampling import Hearing, Outcome
@@ -33,8 +35,10 @@ def study_json(
     provenance: Mapping[str, Any],
     cost: Mapping[str, float],
     equations: EquationCheck | None = None,
+    mechanical: Mechanical | None = None,
 ) -> dict[str, Any]:
-    """What ``tolerance`` prints and ``tolerance.json`` holds."""
+    """What ``tolerance`` prints and ``tolerance.json`` holds; with ``mechanical`` also the
+    frequencies in Hz."""
     return {
         "format": FORMAT,
         "samples": study.plan.samples,
@@ -49,7 +53,10 @@ def study_json(
         },
         "blame": study.blame_status.as_dict(),
         "equation_check": None if equations is None else equations.as_dict(),
-        "responses": [_response(c, study, i) for i, c in enumerate(study.checked)],
+        "responses": [
+            {**_response(c, study, i), **hertz_json(c.model.omega, mechanical)}
+            for i, c in enumerate(study.checked)
+        ],
         "maps": [_map(found) for found in study.maps],
         "provenance": provenance,
         "cost": dict(cost),

@@ -155,7 +155,13 @@ class Stage:
     def _write(self, result: RunResult) -> None:
         """``tolerance.json``, the boards of a list and the report, of what the study has."""
         folder, place = self.folder, self.place
-        document = study_json(result.study, result.provenance, result.cost, result.equations)
+        document = study_json(
+            result.study,
+            result.provenance,
+            result.cost,
+            result.equations,
+            result.modelfile.mechanical,
+        )
         folder.write(place.prefix + TOLERANCE, dumps(document))
         if document["boards"] is not None:
             asked = [(c.model.omega, c.model.expected) for c in result.checked]

@@ -23,6 +23,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
+from designer.base.si_unit import DIGITS
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import simulation, synthesis_result
@@ -34,6 +35,7 @@ from designer.jobs.options import Options as Options
 from designer.jobs.origin import provenance
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming, read_model_file
+from designer.model.si_units import Reader, units_of
 from designer.report import simulate_plots
 from designer.spice.opamp_model import Rung
 from designer.spread.part_grades import once_otherwise
@@ -116,6 +118,7 @@ def synthesise_into(
     if "design" in todo:
         progress.stage("responses of the model, parts")
         made = synthesis_result.synthesise(modelfile, catalog)
+        progress.stage("start recipes, files of the design")
         with naming(modelfile):
             files = design_files.texts(made)
         inputs = wanted["design"][0]
@@ -157,11 +160,13 @@ def simulate_answer(
     plots: Path | None = None,
     overwrite: bool = False,
     rung: Rung = "ideal",
+    frequencies: tuple[str, ...] = (),
 ) -> tuple[dict[str, Any], bool]:
     """The verb ``simulate``: its JSON object, and whether every wanted response was found
     and can be trusted.
 
     plots : the directory for pictures; ``overwrite`` replaces those of the same names.
+    frequencies : texts such as "10 Hz", asked after ``omegas``.
     """
     began = time.perf_counter()
     made: Synthesis | None = None
@@ -172,8 +177,12 @@ def simulate_answer(
             made = read_design(path, catalog, progress)
     else:
         modelfile = model_file(path)
+    read = Reader(modelfile.model, modelfile.mechanical)
+    omegas = tuple(read.omega("--omega", w) for w in omegas)
+    omegas += tuple(read.frequency("--frequency", f) for f in frequencies)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
-    names = simulate_plots.names([w for w in wanted if w is not None])
+    digits = simulate_plots.DIGITS if modelfile.mechanical is None else DIGITS
+    names = simulate_plots.names([w for w in wanted if w is not None], digits)
     if plots is not None:
         simulate_plots.check(plots, names, overwrite)
     simulated = simulation.simulate(
@@ -187,10 +196,12 @@ def simulate_answer(
         rung=rung,
     )
     said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine, rung))
-    answer = simulate_json(simulated, engine, said, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    answer = simulate_json(simulated, engine, said, seconds, modelfile.mechanical)
     if plots is not None:
         progress.stage("pictures")
-        answer["files"] = simulate_plots.write(plots, names, simulated, overwrite)
+        units = units_of(modelfile.mechanical)
+        answer["files"] = simulate_plots.write(plots, names, simulated, overwrite, units)
     return plain(answer), all(s.found and s.trust.trusted is True for s in simulated)
 
 

@@ -11,22 +11,21 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.checks import cores
+from designer.base.default_counts import TRADE_BOARDS
 from designer.base.design_folder import Folder
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
-from designer.fidelity import pieces as trade_pieces
-from designer.fidelity import rungs as trade_rungs
-from designer.fidelity import yields
+from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock
 from designer.fidelity.label import Label
 from designer.fidelity.pieces import CHUNK, PIECES, Pieces, read_pieces
 from designer.fidelity.rung_errors import compare
 from designer.fidelity.rungs import LEVELS, ROUNDS
 from designer.fidelity.trade_study import Response, Trade, trade
-from designer.fidelity.yields import BOARDS, BoardTrade, LeftOut, Tally
+from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.jobs import design_files
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
@@ -51,7 +50,7 @@ class Extent:
     """How much is measured. boards : of each response, none where 0. levels : of ngspice's steps.
     rounds : of timing."""
 
-    boards: int = BOARDS
+    boards: int = TRADE_BOARDS
     levels: tuple[tuple[float, float], ...] = LEVELS
     rounds: int = ROUNDS
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.base.progress import doing
 from designer.dynamics import harmonics
 from designer.dynamics.attractors import coexisting, settle, starts, twin
 from designer.dynamics.flow import Flow
@@ -77,6 +78,8 @@ def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelRespons
             )
         check_omega(f"response[{number}].omega", spec.omega)
         b = model.b if spec.b is None else spec.b
+        if len(wanted) > 1:
+            doing(f"response {number} of {len(wanted)} on the model")
         out.append(_find_one(replace(model, b=b), spec, b))
     return tuple(out)
 
@@ -109,6 +112,7 @@ def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
     stopped = {"both": (1, -1), "upper": (1,), "lower": (-1,)}[model.sides]
     states, depth, excursion, fastest = np.zeros(4), 0.0, 0.0, 0.0
     for variant, omega, orbit in runs:
+        doing(f"swing at ω = {omega:.4g}")
         system = variant.second_order().piecewise_linear()
         flow = Flow(system, Drive(omega))
         spans = [flow.run(np.zeros(system.size), 20, measure=True).extremes]

@@ -45,6 +45,17 @@ class SecondOrderSystem:
         """Number of masses."""
         return len(self.mass)
 
+    def natural_frequencies(self, *, closed: bool = False) -> Array:
+        """(n,) undamped ones, ascending, in rad per unit of time. closed : with every stop in
+        contact; else with none."""
+        stiffness = self.stiffness.copy()
+        if closed:
+            for stop in self.clearances:
+                stiffness[stop.mass, stop.mass] += stop.stiffness
+        root = np.sqrt(self.mass)
+        squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
     def state_matrix(self) -> Array:
         """(2n, 2n) A of the open system; states x1, x1', x2, x2', … as in Eq. (10)."""
         n = self.size

@@ -125,6 +125,11 @@ class Mechanical:
         return (self.P1 + self.P2) / self.K1
 
     @property
+    def speed_scale(self) -> float:
+        """Metres per second per unit of dimensionless velocity."""
+        return self.length_scale / self.time_scale
+
+    @property
     def force_scale(self) -> float:
         """Newtons per unit of dimensionless force, P1 + P2."""
         return self.P1 + self.P2
@@ -132,6 +137,10 @@ class Mechanical:
     def omega(self, Omega: float) -> float:
         """Dimensionless frequency of an excitation at ``Omega`` rad/s."""
         return Omega * self.time_scale
+
+    def hertz(self, omega: float) -> float:
+        """Frequency in Hz of an excitation at the dimensionless frequency ``omega``."""
+        return omega / (2.0 * math.pi * self.time_scale)
 
     def dimensionless(self) -> Dimensionless:
         """Eq. (3)."""

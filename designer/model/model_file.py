@@ -41,6 +41,7 @@ from designer.base.schema import (
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
+from designer.model import model_limits
 from designer.model.board_table import BoardSpec, BoardTable
 from designer.model.circuit_table import CircuitSpec, CircuitTable
 from designer.model.measured_values import Measured, read_measured
@@ -157,7 +158,9 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     InputError : anything in the text is wrong.
     """
     file = None if source is None else str(source)
-    tables = checked(_File, parse_toml(text, file), file)
+    data = parse_toml(text, file)
+    model_limits.check(data, file)
+    tables = checked(_File, data, file)
     model, mechanical = _models(tables, file)
     responses = tuple(
         response_of(table, index, mechanical, file)

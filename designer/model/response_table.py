@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import STRICT, Accepts, choice, flag, number, physical, shown, span
 from designer.model.model import Mechanical
+from designer.model.si_units import FREQUENCIES, angular_frequency
 
 Twin = Literal["either", "exact"]
 
@@ -78,17 +79,24 @@ def response_of(
     def refuse(key: str, found: object, expected: str) -> NoReturn:
         raise InputError(file, f"{place}.{key}", found, expected)
 
-    if table.omega is not None and table.Omega is not None:
-        refuse("Omega", "omega and Omega", "one of the two")
+    given = [key for key in _FREQUENCY if getattr(table, key) is not None]
+    if len(given) > 1:
+        many = {2: "two", 3: "three"}[len(given)]
+        refuse(given[-1], " and ".join(given), f"one of the {many}")
     omega = None if table.omega == "best" else table.omega
-    if table.Omega is not None:
+    angular = table.frequency if table.Omega is None else table.Omega
+    if angular is not None:
+        key = given[0]
         if mechanical is None:
-            refuse("Omega", table.Omega, "omega: Omega in rad/s needs a table [mechanical]")
-        omega = mechanical.omega(table.Omega)
+            told = table.Omega if key == "Omega" else angular / (2.0 * math.pi)
+            unit = "rad/s" if key == "Omega" else "Hz"
+            refuse(key, told, f"omega: {key} in {unit} needs a table [mechanical]")
+        omega = mechanical.omega(angular)
         if not 0.0 < omega < math.inf:
-            refuse("Omega", table.Omega, "a frequency within the range of numbers")
+            refuse(key, angular, "a frequency within the range of numbers")
     elif table.omega is None:
-        refuse("omega", MISSING, _OMEGA + ("" if mechanical is None else ", or Omega in rad/s"))
+        more = ", or Omega in rad/s, or frequency in Hz"
+        refuse("omega", MISSING, _OMEGA + ("" if mechanical is None else more))
     if table.twin == "exact" and table.expect is None:
         refuse("twin", shown(table.twin), "an expect that it can apply to")
     assert not isinstance(omega, str)
@@ -96,6 +104,8 @@ def response_of(
 
 
 _OMEGA = 'a number > 0, or "best"'
+_FREQUENCY = ("omega", "Omega", "frequency")
+"""The keys that give a response's frequency."""
 
 
 def _positive(value: float) -> bool:
@@ -109,6 +119,21 @@ def _omega() -> Accepts:
         return value if value == "best" else frequency.check(value)
 
     return Accepts(_OMEGA, check)
+
+
+def _frequency() -> Accepts:
+    """A frequency in Hz, or a text with its unit; the value is in rad/s."""
+    expected = f"a number > 0 in Hz, or text such as {FREQUENCIES}"
+
+    def check(value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError
+        angular = angular_frequency(value)
+        if not 0.0 < angular < math.inf:
+            raise ValueError
+        return angular
+
+    return Accepts(expected, check)
 
 
 def _expect() -> Accepts:
@@ -139,6 +164,7 @@ class ResponseTable(BaseModel):
     model_config = STRICT
     omega: Annotated[float | Literal["best"] | None, _omega()] = None
     Omega: Annotated[float | None, physical("rad/s")] = None
+    frequency: Annotated[float | None, _frequency()] = None
     expect: Annotated[Expect | None, _expect()] = None
     twin: Annotated[Twin, choice("either", "exact")] = "either"
     symmetric: Annotated[bool | None, flag()] = None

@@ -12,12 +12,14 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.base.schema import one_of
+from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Setting
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
-from designer.model.model import Dimensionless
+from designer.model.model import Dimensionless, Mechanical
+from designer.model.si_units import units_of
 from designer.model.swept_tables import ModalBatch
 
 MODEL_PARAMETERS = ("omega", "b", "k0", "zeta", "m", "k", "c", "f20")
@@ -28,7 +30,8 @@ class ModelSubject:
     """A model at drive frequency omega (None: it has to be among the changes).
 
     parameters : names of what can be swept. states : names. units : by parameter, and by "x", "v"
-    and "λ" for the axes of a diagram; none where dimensionless.
+    and "λ" for the axes of a diagram; none where dimensionless. mechanical : the SI values that
+    the model was made from, if it was.
     """
 
     whose: ClassVar[str] = "model"
@@ -38,6 +41,12 @@ class ModelSubject:
     states: tuple[str, ...] = ("x1", "x1'", "x2", "x2'")
     units: Mapping[str, str] = field(default_factory=dict)
     _batch: ModalBatch = field(default_factory=ModalBatch, repr=False)
+    mechanical: Mechanical | None = None
+
+    @property
+    def si(self) -> dict[str, Unit]:
+        """SI units of the quantities that have one, by name."""
+        return units_of(self.mechanical)
 
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics import kernel_modal as kernel
-from designer.dynamics import modal_tables
+from designer.dynamics import kernel_modal as kernel, modal_tables
 from designer.dynamics.kernel_modal import LAST, NODES, PARTS, TERMS, ModalTables
 from designer.dynamics.modal_tables import STEP, WORST_RESONANCE, Oscillators
 from designer.model.model import Dimensionless

@@ -41,7 +41,8 @@ b = 0.25        # clearance, > 0
 sides = "both"  # stops on both sides
 
 # The responses that the board shall show: n-p-q, with n periods of the force, p impacts on the
-# upper stop and q on the lower one in that time. Leave `expect` out to take what comes.
+# upper stop and q on the lower one in that time. Leave `expect` out to take what comes. With
+# [mechanical] the frequency may be given as Omega = 340 (rad/s) or frequency = "54 Hz" too.
 [[response]]
 omega = 1.55
 expect = "1-1-1"

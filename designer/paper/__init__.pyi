@@ -1,9 +1,5 @@
 from . import (
     reproduce_circuit as reproduce_circuit,
-)
-from . import (
     reproduce_dynamics as reproduce_dynamics,
-)
-from . import (
     reproduce_tolerance as reproduce_tolerance,
 )

@@ -23,6 +23,7 @@ from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.bifurcations.titles import NAMES, title
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
+from designer.report.si_axes import si_x, si_y
 
 BLACK, RED = "#000000", "#d40000"
 OTHERS = (
@@ -37,6 +38,8 @@ NAMED = 12
 """Responses that get a colour of their own in a map."""
 WIDE = 0.012
 """Of the sweep: narrower windows get no label."""
+SECOND_AXIS = 0.42
+"""How far below a diagram its axis in SI units stands, in heights of the lowest panel."""
 MARKS = {
     "pitchfork": ("o", "#0072b2"),
     "period-doubling": ("s", "#e69f00"),
@@ -103,6 +106,10 @@ def diagram(sweep: Sweep, points: Sequence[Mark] = (), name: str = "") -> Figure
         span = float(plan.values[-1] - plan.values[0])
         growth.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
         growth.set_xlabel(_axis(plan.subject, plan.parameter))
+        si = plan.subject.si
+        si_x(growth, si.get(plan.parameter), below=SECOND_AXIS)
+        si_y(least, si.get("x1"))
+        si_y(speed, si.get("x1'"))
         handles = _key(sweep, coloured)
         for kind in dict.fromkeys(p.kind for p in points):
             marker, colour = MARKS.get(kind, ("|", INK))
@@ -130,6 +137,8 @@ def parameter_map(made: ParameterMap, name: str = "") -> Figure:
         _grid(axes, made.cells, plan.xs, plan.ys, looks)
         axes.set_xlabel(_axis(plan.subject, plan.x))
         axes.set_ylabel(_axis(plan.subject, plan.y))
+        si_x(axes, plan.subject.si.get(plan.x))
+        si_y(axes, plan.subject.si.get(plan.y))
         _legend(axes, looks, made.counts, len(made.cells))
     return figure
 
@@ -164,6 +173,8 @@ def basins(made: Basins, name: str = "") -> Figure:
         axes.set_ylim(plan.ys[0], plan.ys[-1])
         axes.set_xlabel(_axis(plan.subject, plan.x) + " at the start")
         axes.set_ylabel(_axis(plan.subject, plan.y) + " at the start")
+        si_x(axes, plan.subject.si.get(plan.x))
+        si_y(axes, plan.subject.si.get(plan.y))
         handles.append(
             Line2D([], [], ls="", marker="o", ms=6, mfc=MUTED, mec="white", label="its strobes")
         )

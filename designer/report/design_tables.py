@@ -153,7 +153,7 @@ def scale_table(data: ReportData) -> Table:
         rows.append((f"one unit of {state}", words.quantity(float(volts), "V")))
         if mechanical is not None:
             speed = state.endswith("′")
-            scale = mechanical.length_scale / (mechanical.time_scale if speed else 1.0)
+            scale = mechanical.speed_scale if speed else mechanical.length_scale
             unit = "m/s" if speed else "m"
             rows.append((f"one volt of {state}", words.quantity(scale / float(volts), unit)))
     gain = float(np.sum(design.errors.drive_gain))

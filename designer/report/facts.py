@@ -8,8 +8,14 @@ from typing import Any
 from designer.base.figure_style import EXACT
 from designer.circuit.design import Design
 from designer.model.sketch import sketch
-from designer.report import boards as report_boards
-from designer.report import design_tables, model_page, tables, tolerance, words
+from designer.report import (
+    boards as report_boards,
+    design_tables,
+    model_page,
+    tables,
+    tolerance,
+    words,
+)
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
 from designer.spread.part_grades import better_grades_text

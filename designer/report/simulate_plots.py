@@ -8,14 +8,18 @@ is known before anything is computed.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from designer.base.errors import InputError
+from designer.base.si_unit import Unit
+from designer.base.units import told_apart
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.si_units import NO_UNITS
+from designer.report.si_axes import si_x, si_y
 
 if TYPE_CHECKING:  # matplotlib takes long to import; only drawing needs it
     from matplotlib.axes import Axes
@@ -23,6 +27,8 @@ if TYPE_CHECKING:  # matplotlib takes long to import; only drawing needs it
 
     from designer.check.simulation import Simulated
 
+DIGITS = 12
+"""Of a frequency in a file's name, at most."""
 KINDS = ("phase", "time")
 FORMATS = ("png", "svg")
 BLACK, RED = "#000000", "#d40000"
@@ -36,11 +42,14 @@ MOST_PORTRAIT = 30
 """Drive periods of a response without a period in its phase portrait."""
 
 
-def names(omegas: Sequence[float]) -> tuple[str, ...]:
-    """What the files of each response begin with; a frequency that comes again gets a number."""
+def names(omegas: Sequence[float], digits: int = DIGITS) -> tuple[str, ...]:
+    """What the files of each response begin with; a frequency that comes again gets a number.
+
+    digits : significant ones of a frequency, or as many more as tell those of this run apart.
+    """
     out: list[str] = []
-    for omega in omegas:
-        stem = name = f"omega-{omega:.12g}"
+    for text in told_apart(omegas, digits, DIGITS):
+        stem = name = f"omega-{text}"
         count = 1
         while name in out:
             count += 1
@@ -69,9 +78,16 @@ def check(folder: Path, stems: Sequence[str], overwrite: bool) -> None:
 
 
 def write(
-    folder: Path, stems: Sequence[str], simulated: Sequence[Simulated], overwrite: bool
+    folder: Path,
+    stems: Sequence[str],
+    simulated: Sequence[Simulated],
+    overwrite: bool,
+    units: Mapping[str, Unit] = NO_UNITS,
 ) -> list[str]:
-    """Write the pictures of each response that has an orbit; their names, in order."""
+    """Write the pictures of each response that has an orbit; their names, in order.
+
+    units : SI units of the model's quantities, shown beside the dimensionless values.
+    """
     from designer.base.figure_style import to_png, to_svg
 
     check(folder, stems, overwrite)
@@ -82,7 +98,7 @@ def write(
             if not response.traces:
                 continue
             for kind, draw in zip(KINDS, (portrait, time_trace), strict=True):
-                figure = draw(response)
+                figure = draw(response, units)
                 for form in FORMATS:
                     name = _file(stem, kind, form)
                     part = folder / f".{name}.part"
@@ -102,7 +118,7 @@ def write(
     return written
 
 
-def portrait(response: Simulated) -> Figure:
+def portrait(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
     """The orbit and its twin in the plane (x1, x1'); triangles where an impact begins."""
     from designer.base.figure_style import CONTACT, MUTED, axis_limits, new_figure, style
 
@@ -127,11 +143,13 @@ def portrait(response: Simulated) -> Figure:
         axes.set_ylim(*ylim)
         axes.set_xlabel("x₁")
         axes.set_ylabel("x₁′")
-        _finish(figure, axes, response)
+        si_x(axes, units.get("x1"))
+        si_y(axes, units.get("x1'"))
+        _finish(figure, axes, response, units)
     return figure
 
 
-def time_trace(response: Simulated) -> Figure:
+def time_trace(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
     """x1 over drive periods, orbit and twin; triangles where an impact begins."""
     from matplotlib.ticker import MaxNLocator
 
@@ -169,7 +187,8 @@ def time_trace(response: Simulated) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(8, integer=span > LEAST_PERIODS))
         axes.set_xlabel("drive periods t / T")
         axes.set_ylabel("x₁")
-        _finish(figure, axes, response)
+        si_y(axes, units.get("x1"))
+        _finish(figure, axes, response, units)
     return figure
 
 
@@ -214,15 +233,16 @@ def _impacts(axes: Axes, x: Any, y: Any, side: int, look: dict[str, Any]) -> Non
     )
 
 
-def _finish(figure: Figure, axes: Axes, response: Simulated) -> None:
+def _finish(figure: Figure, axes: Axes, response: Simulated, units: Mapping[str, Unit]) -> None:
     """Title and key."""
     from matplotlib.lines import Line2D
 
     from designer.base.figure_style import CONTACT, INK, MUTED
 
     wanted = f", wanted {response.expected}" if response.expected and not response.found else ""
+    hertz = f" ({units['omega'].text(response.omega)})" if "omega" in units else ""
     axes.set_title(
-        f"ω = {response.omega:.6g}: {response.orbit.response}{wanted}",
+        f"ω = {response.omega:.6g}{hertz}: {response.orbit.response}{wanted}",
         loc="left",
         weight="bold",
         color=INK,

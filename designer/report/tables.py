@@ -52,12 +52,13 @@ def _told(columns: Sequence[str], rows: Sequence[tuple[str, ...]], numeric: Sequ
 def response_table(data: ReportData) -> Table:
     return Table(
         (
-            "ω", "expected", "model", "exact circuit", "ngspice", "agree", "symmetric (model)",
-            "coexisting (model)",
+            "ω", *_mechanism_head(data), "expected", "model", "exact circuit", "ngspice", "agree",
+            "symmetric (model)", "coexisting (model)",
         ),
         tuple(
             (
                 words.number(c.model.omega),
+                *_mechanism(data, c),
                 _expected(c),
                 c.model.orbit.response + ("" if c.model.found else " (not what is wanted)"),
                 c.circuit.response,
@@ -68,7 +69,7 @@ def response_table(data: ReportData) -> Table:
             )
             for c in data.checked
         ),
-        (0,),
+        (0, *_mechanism_columns(data)),
     )  # fmt: skip
 
 
@@ -91,6 +92,7 @@ def settings_table(data: ReportData) -> Table:
         rows.append(
             (
                 words.number(c.model.omega),
+                *_mechanism(data, c),
                 words.number(c.model.b),
                 words.quantity(c.excitation.frequency, "Hz"),
                 words.quantity(c.excitation.amplitude, "V"),
@@ -101,14 +103,15 @@ def settings_table(data: ReportData) -> Table:
                 difference,
             )
         )
+    shift = len(_mechanism_columns(data))
     names = (
-        "ω", "b", "frequency", "amplitude (peak)", "shortest contact", "nearest grazing",
-        "ngspice steps per period", "method", "largest difference",
+        "ω", *_mechanism_head(data), "b", "frequency", "amplitude (peak)", "shortest contact",
+        "nearest grazing", "ngspice steps per period", "method", "largest difference",
     )  # fmt: skip
     if not any(c.gate is not None for c in data.checked):
         rows = [row[:-3] for row in rows]
         return Table(names[:-3], tuple(rows), tuple(range(len(names) - 3)))
-    return Table(names, tuple(rows), (0, 1, 2, 3, 4, 5, 6, 8))
+    return Table(names, tuple(rows), (*range(7 + shift), 8 + shift))
 
 
 def yield_table(data: ReportData) -> Table | None:
@@ -189,6 +192,21 @@ def provenance_table(data: ReportData) -> Table:
         varies = words_of(data.plan.spread, data.design.circuit)
         rows.append(("spread", f"{data.plan.spread.name}: {varies} (part by part in {TOLERANCE})"))
     return Table(("what", "value"), tuple(rows))
+
+
+def _mechanism_head(data: ReportData) -> tuple[str, ...]:
+    """The heading of the frequency in Hz that the mechanism has, where it has SI values."""
+    return () if data.modelfile.mechanical is None else ("mechanism",)
+
+
+def _mechanism_columns(data: ReportData) -> tuple[int, ...]:
+    """Where that column stands: beside ω."""
+    return () if data.modelfile.mechanical is None else (1,)
+
+
+def _mechanism(data: ReportData, c: Checked) -> tuple[str, ...]:
+    mechanical = data.modelfile.mechanical
+    return () if mechanical is None else (words.quantity(mechanical.hertz(c.model.omega), "Hz"),)
 
 
 def _expected(c: Checked) -> str:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
+from designer.base.progress import doing
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
@@ -159,7 +160,11 @@ def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> Eq
         asked = [_ac(design, rest, low, high, told=told) for rest in rests]
         return asked + [_dc(design, rest, told=told) for rest in curve]
 
-    heard = dict(pool.map(jobs(told=True)))
+    heard = {}
+    asked = jobs(told=True)
+    for number, sweep in pool.map(asked):
+        heard[number] = sweep
+        doing(f"{len(heard)} of {len(asked)} runs")
     # Told where a rectifier rests, its diodes' drop a constant, ngspice may end in vain where it
     # finds the operating point by itself.
     again = [i for i, sweep in heard.items() if _unconverged(sweep)]

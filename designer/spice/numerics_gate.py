@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from designer.base.arrays import Array
 from designer.base.doubt import Doubt
+from designer.base.progress import doing
 from designer.circuit.netlist import Board, Circuit, Excitation
 from designer.circuit.noise_gains import stages
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
-from designer.spice import convergence_aids as remedies
-from designer.spice import deck, settling_periods
+from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import Outcome, Remedy, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
@@ -304,7 +304,10 @@ def check(pool: SpicePool, subjects: Sequence[Subject], levels: int = LEVELS) ->
             tried[i].append(steps[i] * 2**level)
             trio = _trio(subjects[i].period / tried[i][-1])
             tasks += [task(subjects[i], settings, keep=True) for settings in trio]
-        found = dict(remedies.run(pool, tasks, CURES))
+        found = {}
+        for number, outcome in remedies.run(pool, tasks, CURES):
+            found[number] = outcome
+            doing(f"step size {level + 1} of at most {levels}: {len(found)} of {len(tasks)} runs")
         for k, i in enumerate(open_):
             runs = [found[3 * k + j] for j in range(3)]
             results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])

@@ -14,8 +14,7 @@ from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
 from designer.catalog.entries import OpAmp
-from designer.circuit import build as topology
-from designer.circuit import drive_resistors
+from designer.circuit import build as topology, drive_resistors
 from designer.circuit.coefficients import CoefficientErrors, CutShort, coefficient_errors
 from designer.circuit.dead_zone_kind import Zone, zone_of
 from designer.circuit.netlist import Circuit

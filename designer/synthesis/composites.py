@@ -18,6 +18,7 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT, CoefficientErrors
 from designer.circuit.resistors import Composite
 from designer.synthesis.attempt import Attempt, Order
@@ -107,7 +108,8 @@ def program_of(order: Order, made: Attempt, names: Sequence[str]) -> Program:
         return _free(order.errors(moved, swing_of(order, made)))[0] - h
 
     tables, changes, curved = {}, {}, set()
-    for name in names:
+    for number, name in enumerate(names, start=1):
+        doing(f"composites, pairs for {name} ({number} of {len(names)})")
         table = pairs_near(order.resistors, made.values[name], half)
         if not table:
             continue
@@ -178,6 +180,7 @@ def best(program: Program, used: frozenset[float]) -> dict[str, Pair]:
     most = len(program.tables)
     reached: tuple[float, dict[str, Pair]] = (float("inf"), {})
     for few in [*(n for n in FEW if n < most), most]:
+        doing(f"composites, at most {few} of {most}")
         found = model.least_error(few)
         if found is not None and found[0] < reached[0] - EXACT:
             reached = found
@@ -186,6 +189,7 @@ def best(program: Program, used: frozenset[float]) -> dict[str, Pair]:
     else:
         fewer = model.fewest(reached[0])
         reached = reached if fewer is None else (reached[0], fewer)
+    doing("composites, fewest values")
     return model.fewest_values(*reached)
 
 

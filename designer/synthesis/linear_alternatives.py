@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from designer.base.progress import part
 from designer.circuit.coefficients import EXACT
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import Limits
@@ -32,16 +33,17 @@ def best_beside(
     """
     best = first
     left = deque(_beside(linear, (0.0, float("inf"))))
-    for _ in range(TRIES):
+    for number in range(TRIES):
         if not left or not _worth_trying(order, linear, best):
             break
         between = left.popleft()
         level = max(linear.least, FIRST_LEVEL)
-        other = linear_block(order, within, wishes, between=between, level=level)
-        if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
-            continue
-        left.extend(_beside(other, between))
-        made = attempt(order, within, wishes, other)
+        with part(f"beside the first linear block ({number + 1} of at most {TRIES})"):
+            other = linear_block(order, within, wishes, between=between, level=level)
+            if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
+                continue
+            left.extend(_beside(other, between))
+            made = attempt(order, within, wishes, other)
         if isinstance(made, Attempt) and _error(made) < _error(best) - EXACT:
             best = made
     return best

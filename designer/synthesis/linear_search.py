@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array, Index
+from designer.base.progress import doing, part
 from designer.circuit.coefficients import EXACT
 from designer.synthesis.kernel_linear import Rules, Values, complete
 from designer.synthesis.linear_block import PARTS, Targets, catalogue, slice_from
@@ -119,7 +120,9 @@ def best(
     if not np.isfinite(found.error):
         return _why(found, targets, signal, resistors, capacitors, bounds, wishes)
     limit = found.error + max(wishes.slack, 0.0)
+    doing("linear block, choices of least error")
     pool, parts = pool_of(values, rules, found.parts, limit, prices, MOST_STEPS // 8)
+    doing(f"linear block, fewest values of {len(pool.parts1) + len(pool.parts2)} choices")
     chosen = select(values, rules, pool, parts, limit, prices)
     index = chosen.parts
     error = error_of(values, rules, index)
@@ -170,7 +173,9 @@ def _level(values: Values, rules: Rules, level: float, patience: int) -> Found:
     """The least error at most ``level``; each slice is searched below the best so far."""
     best, parts = np.inf, np.full(len(PARTS), -1)
     start, whole, reached, rows, steps = 0, True, -1, 0, 0
-    while start < len(values.deltas) * len(values.r):
+    slices = len(values.deltas) * len(values.r)
+    while start < slices:
+        doing(f"linear block, errors up to {level:.2g}: {start / slices:.0%} of the joins")
         below = min(level, best)
         piece = slice_from(values, rules, below, start, patience - steps)
         left = patience - steps - piece.steps
@@ -184,7 +189,7 @@ def _level(values: Values, rules: Rules, level: float, patience: int) -> Found:
         reached = max(reached, far) if len(piece.rows) else reached
         rows, steps, start = rows + len(piece.rows), steps + piece.steps + taken, piece.following
         if steps >= patience:
-            whole = whole and start == len(values.deltas) * len(values.r)
+            whole = whole and start == slices
             break
     return Found(best, parts, 0.0, whole, reached, rows, steps)
 
@@ -202,7 +207,8 @@ def _thinned(
         values = catalogue(signal[kept], capacitors)
         rules = rules_of(values, targets, bounds, wishes)
         level = max(found.empty, FIRST_LEVEL)
-        thin = _levels(values, rules, MOST_STEPS // 8, level)
+        with part(f"every {every}th resistor"):
+            thin = _levels(values, rules, MOST_STEPS // 8, level)
         found = replace(
             found,
             reached=max(found.reached, thin.reached),
@@ -240,7 +246,8 @@ def _why(
         if len(allowed) == len(signal) and kept == bounds and wanted == wishes:
             continue
         values = catalogue(allowed, capacitors)
-        again = _levels(values, rules_of(values, targets, kept, wanted), MOST_STEPS // 8)
+        with part(f"without {name}"):
+            again = _levels(values, rules_of(values, targets, kept, wanted), MOST_STEPS // 8)
         if np.isfinite(again.error):
             return Shortfall(name, found.whole)
     last = "displacement integrators" if found.reached >= 0 else "coefficients"

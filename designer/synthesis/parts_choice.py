@@ -16,6 +16,7 @@ from typing import NoReturn
 import numpy as np
 
 from designer.base.errors import InputError, Unreachable
+from designer.base.progress import doing, part
 from designer.catalog.catalog import Catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Certificate, Check, Design
@@ -87,6 +88,7 @@ def synthesise(
     if binding:
         design = replace(design, binding=_binding(wanted, reached, found))
     if spec.composites:
+        doing("composites")
         design = _with_composites(wanted, reached, design, found)
     return replace(design, seconds=time.perf_counter() - began)
 
@@ -214,6 +216,7 @@ def _verified(
     )
     needed = None
     if found and kept & {"swing", "load"}:
+        doing("voltages and currents of the finished circuit")
         board = Reduction(made.circuit, nominal_board(made.circuit))
         needed = output_loads.design_loads(design, board, found)
     amplitudes = [design.amplitude(r.b) for r in found] or [design.amplitude()]
@@ -279,9 +282,15 @@ def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> 
 
     active = [n for n in SIDE_CONDITIONS if n in kept and _acts(order, reached, n)]
     least = error - EXACT - order.spec.slack  # inside the slack an error may lie anywhere
-    if len(active) > 1 and without(kept) > least:
-        return {}
-    costs = {name: without(frozenset({name})) for name in active}
+    if len(active) > 1:
+        with part("what the side conditions cost"):
+            free = without(kept)
+        if free > least:
+            return {}
+    costs = {}
+    for number, name in enumerate(active, start=1):
+        with part(f"what {name} costs ({number} of {len(active)})"):
+            costs[name] = without(frozenset({name}))
     return {name: cost for name, cost in costs.items() if cost < least}
 
 
@@ -301,6 +310,7 @@ def _refuse(order: Order, short: Shortfall, found: Sequence[ModelResponse]) -> N
     """Raise ``Unreachable`` with what binds, the side conditions among it, and what frees it."""
     kept, what = order.spec.kept, short.what
     guilty: list[str] = []
+    doing("what leaves no choice")
     if kept and isinstance(_reach(order, frozenset(), found), Reached):
         guilty = [
             name

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array, Mask
+from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, outside
 from designer.synthesis.value_program import Ranking, Rows, choose, fewest
@@ -85,7 +86,8 @@ def size(
     lists = Lists(names, every, tie)
     best: tuple[float, Limits] | None = None
     binding, looked_at, bound = "", 0, 0.0
-    for limits, last in _limits(target):
+    for number, (limits, last) in enumerate(_limits(target), start=1):
+        doing(f"dead zone, range {number}")
         pairs, why = _pairs(target, lists, limits)
         looked_at += len(pairs)
         least = _least(target, lists, pairs)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT
 from designer.synthesis import saturating_rows, saturating_stage
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
@@ -90,7 +91,9 @@ def size(
     if target.shift[0] >= MOST_SHIFT:
         return "dead-zone bias"
     found = Search(None, 0.0, 0, "stop slope")
-    for stage in _stages(target, resistors, base, ranking.free, ties):
+    stages = _stages(target, resistors, base, ranking.free, ties)
+    for number, stage in enumerate(stages, start=1):
+        doing(f"dead zone, tables {number}")
         if stage.rescue and found.best is not None:
             break
         found = _search(target, stage, ties, ranking.free | {base}, found)
@@ -101,6 +104,7 @@ def size(
     if found.best is None:
         return found.binding
     t, least = found.best
+    doing("dead zone, fewest values")
     picked = saturating_rows.pick(t, least.error, least.u, ranking, LAST_LEVEL)
     if picked is None:
         without = replace(ranking, most=None)
@@ -251,6 +255,8 @@ def least_error(t: Tables, tolerance: float, most: float) -> Least:
         if reached >= min(best, most):
             continue
         looked_at += 1
+        if looked_at % 16 == 0:
+            doing(f"dead zone, {looked_at} values of R206, R207, R209 looked at")
         if t.shift is not None:
             least, cut = _joint_error(t, int(k), reached, min(best, most))
             floor = min(floor, reached) if cut else floor

@@ -14,6 +14,7 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
+from designer.base.progress import doing
 from designer.circuit.scale_fit import minimax
 from designer.synthesis.kernel_linear import Rules, Values, gather
 from designer.synthesis.linear_block import PARTS, residuals_of, slice_from
@@ -86,8 +87,9 @@ def pool_of(
     best, fewest = parts.copy(), int(kinds_of(rules, parts[None, :])[0])
     first, second, label = [_rows_of(best, FIRST)], [_rows_of(best, SECOND)], 1
     labels1, labels2 = [np.zeros(1, dtype=np.int64)], [np.zeros(1, dtype=np.int64)]
-    start, whole = 0, True
-    while start < len(values.deltas) * len(values.r) and patience > 0:
+    start, whole, slices = 0, True, len(values.deltas) * len(values.r)
+    while start < slices and patience > 0:
+        doing(f"choices of least error, {start / slices:.0%}")
         fewer = rules._replace(most=min(rules.most, fewest))
         piece = slice_from(values, fewer, limit, start, patience)
         groups = np.zeros((GROUPS, 2), dtype=np.int64)
@@ -115,7 +117,7 @@ def pool_of(
         label, start = label + n, piece.following
         whole = whole and full and not piece.cut
         patience -= piece.steps + taken
-    whole = whole and start == len(values.deltas) * len(values.r)
+    whole = whole and start == slices
     pool = Pool(
         np.concatenate(first),
         np.concatenate(labels1),

@@ -24,8 +24,7 @@ from designer.base.plain_json import plain
 from designer.yields import margins as smooth
 from designer.yields.blame_extent import extent_of
 from designer.yields.blame_pieces import Pieces
-from designer.yields.blame_replay import KEPT, LOST, replay
-from designer.yields.blame_replay import Subject as Subject
+from designer.yields.blame_replay import KEPT, LOST, Subject as Subject, replay
 from designer.yields.corners import Corner, worst_corners
 from designer.yields.margins import Margin, Prediction
 from designer.yields.sobol import Index, sobol

@@ -17,8 +17,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
-from designer.spice import convergence_aids as remedies
-from designer.spice import numerics_gate
+from designer.spice import convergence_aids as remedies, numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import Subject
 from designer.spice.opamp_model import Rung

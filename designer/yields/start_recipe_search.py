@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from designer.base.progress import doing, part
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation, nominal_board
@@ -55,7 +56,11 @@ def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
     """A recipe for each question of the plan; its seed and number of samples do not matter."""
     nominal = Ensemble(Boards.of(plan.circuit, [nominal_board(plan.circuit)]))
     sample = Ensemble(draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL))
-    return tuple(_find(question, nominal, sample, jobs) for question in plan.questions)
+    found = []
+    for number, question in enumerate(plan.questions, start=1):
+        with part(f"start recipe of response {number} of {len(plan.questions)}"):
+            found.append(_find(question, nominal, sample, jobs))
+    return tuple(found)
 
 
 def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Recipe]:
@@ -163,6 +168,7 @@ def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) ->
     bench = _Bench(question, nominal, sample, tuple(able), jobs)
     tried: list[_Trials] = []
     for option in candidates(question, nominal.reduction(0).system()):
+        doing(str(option.way))
         known = bench.on_nominal(_Trials(replace(option, boards=BOARDS, able=len(able))))
         if all(known.nominal):
             known = bench.on_boards(known)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
 from designer.check.checked_design import Checked
 from designer.yields import two_engine_yield as combined
 from designer.yields.blame_analysis import Blame
@@ -19,9 +20,6 @@ from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
 from designer.yields.verdict import Answer, StudyPlan, Yield, count
 from designer.yields.yield_maps import YieldMap
-
-SAMPLES = 200
-SEED = 1
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from designer.base.checks import at_least, cores
+from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
 from designer.base.progress import Progress
 from designer.check import checked_design
 from designer.check.checked_design import Checked
@@ -18,7 +19,7 @@ from designer.spread.spread import NO_BANDWIDTH
 from designer.yields import layers, study_plan
 from designer.yields.blame_extent import BUDGET
 from designer.yields.layers import Runner
-from designer.yields.study import SAMPLES, SEED, Study
+from designer.yields.study import Study
 from designer.yields.study_layers import RungName, Stores, Work
 from designer.yields.trimmed_yield import dc_trim
 from designer.yields.yield_maps import Over

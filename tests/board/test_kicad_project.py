@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from designer.base.sexpr import Expression, read, read_all
 from designer.base.views import View

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from designer.catalog.catalog import load_catalog
-from designer.circuit import build, paper_values
-from designer.circuit import terms as matching
+from designer.circuit import build, paper_values, terms as matching
 from designer.circuit.netlist import Circuit, Excitation, Resistor, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from designer.circuit.terms import Condition, Quantity, Term, conditions, inverted_states, terms
 

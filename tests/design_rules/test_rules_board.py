@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from designer.base.errors import InputError
 from designer.base.sexpr import Expression, expression, expression_text, read, read_all

@@ -6,16 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.reduction import Reduction
-from designer.dynamics import kernel_four_state as kernel
-from designer.dynamics import working_modes
+from designer.dynamics import kernel_four_state as kernel, working_modes
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.spread import Spread, draw, draw_many

@@ -6,8 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem

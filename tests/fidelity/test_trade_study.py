@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
@@ -23,8 +22,7 @@ from designer.base.progress import Progress
 from designer.cli import entry
 from designer.dynamics.kernel_four_state import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.fidelity import gate as trade_gate
-from designer.fidelity import pieces, rungs, yields
+from designer.fidelity import gate as trade_gate, pieces, rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock
 from designer.fidelity.label import Label
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, alike, compare, difference

@@ -36,8 +36,7 @@ from designer.yields.ngspice_sampling import Hearing, Kind, ask_random
 from designer.yields.run_result import RunResult
 from designer.yields.study import Study
 from designer.yields.verdict import Verdict
-from tests.shared.paper_cases import PAPER as EXAMPLE
-from tests.shared.paper_cases import synthesised
+from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 
 HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
 VOID = {"meta", "img", "link", "br", "hr", "input"}

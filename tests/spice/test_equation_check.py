@@ -25,8 +25,7 @@ from designer.model.model_file import parse_model_file
 from designer.spice.equation_check import FLOOR, EquationCheck, Finding, check, explained, transfer
 from designer.spice.pool import SpicePool
 from tests.shared.paper_cases import synthesised
-from tests.shared.stages import bought, one_sided, rectifier, stage
-from tests.shared.stages import model as stage_model
+from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
 
 COARSE = """
 format = 1

@@ -31,8 +31,7 @@ from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT, circuit_of
-from tests.shared.paper_cases import OMEGA, synthesised
-from tests.shared.paper_cases import subject as exact_parts
+from tests.shared.paper_cases import OMEGA, subject as exact_parts, synthesised
 from tests.shared.stages import PAPER, stage
 from tests.spice.test_rectifier_ngspice import SCALED
 

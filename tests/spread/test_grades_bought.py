@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError, Unreachable
@@ -41,8 +40,7 @@ from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.jobs.test_stage_files import design_of
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
-from tests.shared.stages import bought as nearest_sold
-from tests.shared.stages import rectifier, stage
+from tests.shared.stages import bought as nearest_sold, rectifier, stage
 
 CATALOG = load_catalog()
 E24 = nearest_sold(EXACT)

@@ -8,8 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Excitation, Resistor, nominal_board

@@ -1,0 +1,85 @@
+"""What a model file cannot say: systems beyond two masses in a chain with stops on the first.
+
+Keys of such systems are named before anything else is checked, so that nobody looks for a misspelt
+key where the tool knows no such thing. The limits stand in docs/model-file.md.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from designer.base.errors import InputError
+
+KNOWN = (
+    "this version knows two masses in a chain with stops on the first, at one distance, and forces "
+    "of one frequency on the masses"
+)
+WHERE = "docs/model-file.md, Limits"
+TABLES = {
+    "mass": "a list of masses",
+    "masses": "a list of masses",
+    "spring": "a list of springs",
+    "springs": "a list of springs",
+    "damper": "a list of dampers",
+    "dampers": "a list of dampers",
+    "clearance": "a list of clearances",
+    "clearances": "a list of clearances",
+    "stop": "a list of stops",
+    "stops": "a list of stops",
+    "force": "a list of forces",
+    "forces": "a list of forces",
+    "base": "base motion",
+    "friction": "friction",
+}
+"""Top-level keys of other systems, and what each would be."""
+OF_A_MODEL = (
+    (r"[A-Za-z]+_?([3-9]|[1-9]\d+)", "a third mass"),
+    (r"[Bb]_?[12]|[Bb]_?(upper|lower)|gap\w*|clearances?", "a second clearance"),
+    (r"[Kk]_?0_?([12]|upper|lower)", "a second clearance"),
+    (r"base\w*|[YZ]0?|[xy]_?base|[xy]_?g(round)?", "base motion"),
+    (r"friction\w*|mu", "friction"),
+    (r"[Cc]_?0", "damping in the stops"),
+    (r"cubic\w*|law|alpha|beta|gamma", "a nonlinear spring"),
+    (r"[Ff]_?0|preload\w*|constant|gravity|g", "a constant force"),
+)
+"""Patterns of keys of ``[model]`` and ``[mechanical]``, and what each would be."""
+MODELS = {
+    "model": frozenset("m k k0 c zeta f20 b sides".split()),
+    "mechanical": frozenset("M1 M2 C1 C2 K0 K1 K2 B P1 P2 sides".split()),
+}
+"""The keys that the two tables have."""
+
+
+def check(data: Mapping[str, object], file: str | None) -> None:
+    """Refuse a model file that describes a system that this version does not know.
+
+    Raises
+    ------
+    InputError : it has such a key; says what is known, and where the limits stand.
+    """
+    number = data.get("format")
+    if type(number) is int and number > 1:
+        expected = f"1, the format that this version reads: {KNOWN} ({WHERE})"
+        raise InputError(file, "format", number, expected)
+    for key, what in TABLES.items():
+        if key in data:
+            raise InputError(file, key, f"a table {key!r}", _unknown(key, what))
+    for table, known in MODELS.items():
+        content = data.get(table)
+        if isinstance(content, Mapping):
+            _check_model(table, [str(key) for key in content if key not in known], file)
+
+
+def _check_model(table: str, keys: list[str], file: str | None) -> None:
+    """Refuse the first of the unknown keys that is of another system."""
+    for key in keys:
+        for pattern, what in OF_A_MODEL:
+            if re.fullmatch(pattern, key, re.ASCII):
+                raise InputError(
+                    file, f"{table}.{key}", f"unknown key {key!r}", _unknown(key, what)
+                )
+
+
+def _unknown(key: str, what: str) -> str:
+    return f"a model without {what}: {KNOWN}; {key} is not known ({WHERE})"

@@ -1,0 +1,155 @@
+"""Units of the user: SI values under ``[mechanical]``, the model's dimensionless ones, both ways.
+
+The tool computes with dimensionless quantities. Here a text such as "10 Hz" or "0.5 mm" becomes
+one of them, and they become Hz, m and m/s again. The scales are those of `Mechanical`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from designer.base.errors import InputError
+from designer.base.si_unit import Unit, value_text
+from designer.base.units import parse_quantity
+from designer.model.model import Dimensionless, Mechanical
+
+ANGULAR = "rad/s"
+FREQUENCIES = '"10 Hz" or "62.8 rad/s"'
+"""How a frequency may be written."""
+FAR_ABOVE, FAR_BELOW = 5.0, 100.0
+"""A plain ω is far out of a model's range above the first times its highest natural frequency (the
+stops closed), and below its lowest one (the stops open) over the second."""
+NAMES = {"omega": "Hz", "b": "m", "x1": "m", "x1'": "m/s", "x2": "m", "x2'": "m/s"}
+"""SI units of the model's quantities; the others have none."""
+
+
+def units_of(mechanical: Mechanical | None) -> dict[str, Unit]:
+    """The SI units of a model's quantities, by name; none of a model without SI values."""
+    if mechanical is None:
+        return {}
+    scales = {"Hz": mechanical.hertz(1.0), "m": mechanical.length_scale}
+    scales["m/s"] = mechanical.speed_scale
+    return {quantity: Unit(name, scales[name]) for quantity, name in NAMES.items()}
+
+
+NO_UNITS: Mapping[str, Unit] = {}
+"""Of a model without SI values."""
+
+
+def angular_frequency(value: str | float) -> float:
+    """rad/s of a frequency: a number is in Hz, a text in its unit ("10 Hz", "62.8 rad/s").
+
+    Raises
+    ------
+    ValueError : not a finite number, or not one in these units.
+    """
+    if isinstance(value, str) and value.rstrip().endswith(ANGULAR):
+        return parse_quantity(value, ANGULAR)
+    return 2.0 * math.pi * parse_quantity(value, "Hz")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Reads the values that options give, for one model or one of its boards."""
+
+    model: Dimensionless
+    """What plain numbers are of."""
+    mechanical: Mechanical | None = None
+    """What texts with SI units are of; None: they are refused."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Of a board, the units that plain numbers have, by parameter."""
+
+    def frequency(self, option: str, text: str) -> float:
+        """The dimensionless frequency of a text such as "10 Hz".
+
+        Raises
+        ------
+        InputError : no frequency within the range of numbers, or a model without SI values.
+        """
+        try:
+            angular = angular_frequency(text)
+        except ValueError:
+            angular = 0.0
+        if not 0.0 < angular < math.inf:
+            raise InputError(None, option, text, f"a frequency > 0 such as {FREQUENCIES}")
+        return self._scales(option, text).omega(angular)
+
+    def omega(self, option: str, omega: float) -> float:
+        """A plain dimensionless frequency, if it can be meant so.
+
+        Raises
+        ------
+        InputError : far out of the range of a model with SI values, whose user may have meant
+            rad/s. Both readings are named, and how to give each.
+        """
+        if self.mechanical is None or not 0.0 < omega < math.inf:
+            return omega
+        low, high = natural_frequencies(self.model)
+        if low / FAR_BELOW <= omega <= FAR_ABOVE * high:
+            return omega
+        hertz, meant = value_text(self.mechanical.hertz(omega), "Hz"), self.mechanical.omega(omega)
+        text = "--frequency" if option == "--omega" else option
+        raise InputError(
+            None,
+            option,
+            f"{omega:g}",
+            f"ω near the model's natural frequencies, {low:.3g} to {high:.3g}: {omega:g} "
+            f"dimensionless would be {hertz}, give {text} '{hertz}' for that; {omega:g} rad/s is "
+            f"ω = {meant:.3g}, give {text} '{omega:g} rad/s' or {option} {meant:.3g} for that",
+        )
+
+    def value(self, option: str, name: str, value: str | float) -> float:
+        """The value of a parameter or state: a plain number as it is, a text in its unit.
+
+        name : such as "omega", "b", "x1" or, of a board, "amplitude".
+
+        Raises
+        ------
+        InputError : neither, or a frequency that cannot be meant so (`omega`).
+        """
+        try:
+            plain = float(value)
+        except ValueError:
+            return self._with_unit(option, name, str(value))
+        return self.omega(option, plain) if name == "omega" and not self.units else plain
+
+    def _with_unit(self, option: str, name: str, text: str) -> float:
+        if name in self.units:
+            return _quantity(option, text, self.units[name])
+        if name == "omega" and not self.units:
+            return self.frequency(option, text)
+        unit = None if self.units else NAMES.get(name)
+        if unit is None:
+            raise InputError(None, option, text, f"a number: {name} has no unit")
+        length = _quantity(option, text, unit)
+        return length / units_of(self._scales(option, text))[name].scale
+
+    def _scales(self, option: str, text: str) -> Mechanical:
+        if self.mechanical is None:
+            raise InputError(
+                None,
+                option,
+                text,
+                "a dimensionless number: a value with a unit needs a model file with a table "
+                "[mechanical]",
+            )
+        return self.mechanical
+
+
+def natural_frequencies(model: Dimensionless) -> tuple[float, float]:
+    """The lowest undamped one with the stops open, and the highest with them closed."""
+    system = model.second_order()
+    closed = system.natural_frequencies(closed=True)
+    return float(system.natural_frequencies()[0]), float(closed[-1])
+
+
+def _quantity(option: str, text: str, unit: str) -> float:
+    """A text that ends in the unit."""
+    try:
+        if not text.rstrip().endswith(unit):
+            raise ValueError
+        return parse_quantity(text, unit)
+    except ValueError:
+        raise InputError(None, option, text, f"a number, or a text in {unit}") from None

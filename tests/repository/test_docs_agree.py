@@ -1,0 +1,207 @@
+"""What the docs say of options, defaults and files is what the code has, and is said once."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from designer.base import default_counts, design_folder
+from designer.base.progress import SILENCE
+from designer.bifurcations import parameter_map
+from designer.board.bom_layouts import file_of
+from designer.centering import ngspice_check, places
+from designer.cli import app
+from designer.dynamics.steady_state import Course
+from designer.jobs import bifurcation_request, board_files, trade_job
+from designer.model import find_responses, si_units
+from designer.model.board_table import BoardSpec
+from designer.spice import numerics_gate
+from designer.yields import (
+    blame_replay,
+    layers,
+    ngspice_runs,
+    ngspice_sampling,
+    sobol,
+    study_layers,
+)
+from designer.yields.study_cache import KEPT
+from designer.yields.verdict import BLOCK
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+CONTRACT = (DOCS / "contract.md").read_text("utf-8")
+ROOT = typer.main.get_command(app.app)
+VERBS = {name: verb for name, verb in ROOT.commands.items() if not verb.hidden}  # type: ignore[attr-defined]
+COMMON = {"-h", "--help"}
+
+
+def options(verb: str) -> dict[str, object]:
+    """Every spelling of a verb's options, with the default."""
+    found: dict[str, object] = {}
+    for option in VERBS[verb].params:
+        if option.param_type_name == "option":
+            names = [*option.opts, *option.secondary_opts]
+            found |= dict.fromkeys(names, option.default)
+    return {name: value for name, value in found.items() if name not in COMMON}
+
+
+def section(title: str) -> str:
+    return CONTRACT.split(f"\n## {title}\n", 1)[1].split("\n## ", 1)[0]
+
+
+def verbs_of_the_contract() -> dict[str, set[str]]:
+    """The options that the table of verbs gives each verb, over all of its rows."""
+    found: dict[str, set[str]] = {}
+    for row in re.findall(r"^\| `(designer .*?) \|", section("Verbs"), re.MULTILINE):
+        verb = row.split()[1].rstrip("`")
+        found.setdefault(verb, set()).update(re.findall(r"--[a-z-]+", row))
+    return found
+
+
+def test_the_contract_lists_the_verbs_that_there_are() -> None:
+    assert verbs_of_the_contract().keys() == VERBS.keys()
+
+
+@pytest.mark.parametrize("verb", sorted(VERBS))
+def test_the_contract_names_the_options_that_there_are(verb: str) -> None:
+    said, there = verbs_of_the_contract()[verb], options(verb)
+    assert said <= there.keys()
+    general = re.search(r"^Options: (.*)$", section("Verbs"), re.MULTILINE)
+    assert general is not None
+    everywhere = set(re.findall(r"--?[a-z-]+", general[1]))
+    longer = {"--verbose", "--quiet", "--points"}  # of -v, -q and --no-points
+    assert set(there) - said - everywhere - longer == set()
+
+
+SEEDED = sorted(verb for verb in VERBS if "--seed" in options(verb) and verb != "reproduce")
+
+
+@pytest.mark.parametrize(
+    ("verb", "option", "default"),
+    [
+        ("run", "--samples", default_counts.SAMPLES),
+        ("tolerance", "--samples", default_counts.SAMPLES),
+        ("trade", "--boards", default_counts.TRADE_BOARDS),
+        *((verb, "--seed", default_counts.SEED) for verb in SEEDED),
+    ],
+)
+def test_a_default_is_one_constant(verb: str, option: str, default: int) -> None:
+    assert options(verb)[option] == default
+
+
+def test_the_defaults_of_the_library_are_those_of_the_commands() -> None:
+    from designer.jobs.options import Options
+    from designer.jobs.trade_job import Extent
+
+    assert Extent().boards == default_counts.TRADE_BOARDS
+    assert (Options().samples, Options().seed) == (default_counts.SAMPLES, default_counts.SEED)
+
+
+SAID: list[tuple[str, str, object]] = [
+    ("contract.md", r"`--seed N` \((\d+)\)", default_counts.SEED),
+    ("contract.md", r"`--samples N` \((\d+); `search`", default_counts.SAMPLES),
+    ("contract.md", r"`--samples N` \(\d+; `search` (\d+)\)", default_counts.SEARCH_SAMPLES),
+    ("contract.md", r"fresh boards \(`--samples`, (\d+)\)", default_counts.SEARCH_SAMPLES),
+    ("contract.md", r"`--boards` of each response \((\d+)\)", default_counts.TRADE_BOARDS),
+    ("contract.md", r"exact circuit, in blocks of (\d+)", BLOCK),
+    ("contract.md", r"about samples, in blocks of (\d+)", layers.CHUNK),
+    ("contract.md", r"their rows, in blocks of (\d+)\b", layers.SEARCH),
+    ("contract.md", r"`omega` is from ([\d.]+) to", find_responses.SLOWEST),
+    ("contract.md", r"`omega` is from [\d.]+ to (\d+)\.", find_responses.FASTEST),
+    ("contract.md", r"above (\d+) times the model's highest", si_units.FAR_ABOVE),
+    ("contract.md", r"at least every (\w+) seconds", {10.0: "ten"}[SILENCE]),
+    ("trade.md", r"spread \((\d+) of each response if", default_counts.TRADE_BOARDS),
+    ("tolerance.md", r"`--samples N` says it, (\d+) if", default_counts.SAMPLES),
+    ("tolerance.md", r"the first (\d+) boards of each", ngspice_sampling.OWN_SAMPLES),
+    ("tolerance.md", r"the first (\d+) from the nominal", ngspice_sampling.NOMINAL_SAMPLES),
+    ("tolerance.md", r"the (\d+) boards that are nearest", ngspice_sampling.BOUNDARY_SAMPLES),
+    ("tolerance.md", r"up to (\d+) periods are run", ngspice_runs.MOST_PERIODS),
+    ("tolerance.md", r"in blocks of (\d+) until", BLOCK),
+    ("tolerance.md", r"ngspice are added (\d+) at a time", study_layers.MORE_NOMINAL),
+    ("tolerance.md", r"It ends at ([\d ]+) boards", study_layers.MOST_UNTIL),
+    ("tolerance.md", r"boards and (\d+) of them in ngspice", study_layers.MOST_NOMINAL),
+    ("tolerance.md", r"are on disk at once: (\d+) boards", BLOCK),
+    ("tolerance.md", r"trimmed one, (\d+) in ngspice", layers.CHUNK),
+    ("tolerance.md", r"in ngspice, (\d+) of the others", layers.SEARCH),
+    ("ngspice.md", r"The first (\d+) boards of each response", ngspice_sampling.OWN_SAMPLES),
+    ("ngspice.md", r"is defined: the first (\d+) boards", ngspice_sampling.NOMINAL_SAMPLES),
+    ("ngspice.md", r"A way of more than (\d+) periods", ngspice_runs.MOST_PERIODS),
+    ("ngspice.md", r"as many steps as (\d+) periods", ngspice_runs.MOST_AGAIN),
+    ("ngspice.md", r"`discarded_periods`\), at most (\d+)", numerics_gate.MOST_DISCARDED),
+    ("blame.md", r"the first (\d+) of a response, in order", blame_replay.LOST),
+    ("blame.md", r"Up to (\d+) boards that were ok", blame_replay.KEPT),
+    ("blame.md", r"on (\d+) base samples", sobol.CUBE),
+    ("search.md", r"scanned with (\d+) boards", places.SCAN),
+    ("search.md", r"again with (\d+), and around", places.SOME),
+    ("search.md", r"with (\d+) boards as long as", places.MANY),
+    ("search.md", r"about those of (\d+) boards", ngspice_check.LISTENED),
+    ("bifurcations.md", r"At each value (\d+) drive periods", Course().settle),
+    ("bifurcations.md", r"and (\d+) are shown \(`--keep`\)", Course().keep),
+    ("bifurcations.md", r"from rest, (\d+) periods left out", parameter_map.COURSE.settle),
+    ("bifurcations.md", r"left out and (\d+) looked at", parameter_map.COURSE.keep),
+    ("bifurcations.md", r"deflections, (\d+) × ", bifurcation_request.BASIN_STEPS),
+    ("bifurcations.md", r"has (\d+) million points at most", bifurcation_request.MOST_CELLS / 1e6),
+]
+"""Page, what it says (the number in a group), and what the code has."""
+
+
+@pytest.mark.parametrize(("page", "pattern", "value"), SAID)
+def test_a_number_in_the_docs_is_the_code_s(page: str, pattern: str, value: object) -> None:
+    text = re.sub(r"\s+", " ", (DOCS / page).read_text("utf-8"))
+    found = re.findall(pattern, text)
+    assert found, f"{page} does not say it so any more"
+    for said in found:
+        if isinstance(value, str):
+            assert said == value
+        else:
+            assert float(said.replace(" ", "")) == value
+
+
+@pytest.mark.parametrize(
+    ("option", "usual", "maps"),
+    [
+        ("--periods", Course().settle, parameter_map.COURSE.settle),
+        ("--keep", Course().keep, parameter_map.COURSE.keep),
+    ],
+)
+def test_the_help_of_bifurcation_has_its_defaults(option: str, usual: int, maps: int) -> None:
+    (found,) = [p for p in VERBS["bifurcation"].params if option in p.opts]
+    assert f"[{usual}; maps {maps}]" in str(getattr(found, "help", ""))
+
+
+def files_of_the_contract() -> list[str]:
+    table = section("Design folder").split("\n\n")
+    (rows,) = [t for t in table if t.startswith("| File |")]
+    first = [row.split(" | ")[0] for row in rows.splitlines()[2:]]
+    return [name for cell in first for name in re.findall(r"`([^`]+)`", cell)]
+
+
+def test_no_file_is_listed_twice() -> None:
+    said = files_of_the_contract()
+    assert sorted(said) == sorted(set(said))
+
+
+def test_the_files_that_are_written_are_listed() -> None:
+    written = {
+        *design_folder.DESIGN_FILES,
+        *design_folder.REPORTS,
+        design_folder.TOLERANCE,
+        design_folder.COMPARISON,
+        *design_folder.COMPARISON_PICTURES,
+        board_files.BILL,
+        board_files.NOTES,
+        board_files.DRAWING,
+        board_files.PICTURE,
+        KEPT,
+        file_of("NAME"),
+        *trade_job.NAMES,
+    }
+    assert written <= set(files_of_the_contract())
+
+
+def test_the_layouts_of_the_bill_are_called_alike_everywhere() -> None:
+    for page in DOCS.glob("*.md"):
+        names = set(re.findall(r"\bbom-([\w]+)\.csv", page.read_text("utf-8")))
+        assert names <= {"NAME", *BoardSpec().bom}, page
