@@ -9,7 +9,7 @@ from designer.base.natural_sort import natural
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
-from designer.catalog.catalog import Catalog, Kind, Use
+from designer.catalog.catalog import Catalog, Kind, OpAmp, Use
 from designer.catalog.entries import Rating
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.circuit.netlist import (
@@ -290,7 +290,7 @@ class _Lister:
             role="; ".join(dict.fromkeys(s.role for s in used)),
             stage=next(iter(stages), SUPPLY),
             views=View.EVERYWHERE,
-            description=f"op-amp, {opamp.sections} sections, {_spare(opamp.sections - len(used))}",
+            description=f"op-amp, {_sections(opamp)}, {_spare(opamp.sections - len(used))}",
             bought=Bought(
                 opamp.manufacturer,
                 opamp.part_number,
@@ -326,6 +326,10 @@ class _Lister:
             near=near,
             parts=(part.name,),
         )
+
+
+def _sections(opamp: OpAmp) -> str:
+    return "1 section" if opamp.sections == 1 else f"{opamp.sections} sections"
 
 
 def _spare(count: int) -> str:

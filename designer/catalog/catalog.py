@@ -207,11 +207,11 @@ class Catalog:
 
     def diode(self, name: str) -> Diode:
         """The diode of this name; InputError names the known ones and a likely one."""
-        return self._cased(_named(self.diodes, name, "diode"))
+        return self._cased(_named(self.diodes, name, "circuit.diode"))
 
     def reference(self, name: str) -> Reference:
         """The voltage reference of this name; InputError as for ``opamp``."""
-        return self._cased(_named(self.references, name, "reference"))
+        return self._cased(_named(self.references, name, "circuit.reference"))
 
     def trimmer(self, value: float) -> Trimmer:
         """The first trimmer of this value [Ω]; InputError names the values that there are."""

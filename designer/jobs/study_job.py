@@ -71,6 +71,8 @@ def run_into(
     if not todo:
         answer = run_json(folder.json(DESIGN), folder.json(TOLERANCE))
         return Outcome(answer, _satisfied(answer), out, True)
+    if "design" in todo:
+        design_files.check(modelfile, catalog)
     began = time.perf_counter()
     with _Help.of(options, progress) as help_:
         progress.stage("responses of the model, parts")
