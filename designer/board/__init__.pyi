@@ -2,6 +2,9 @@ from . import (
     board_notes as board_notes,
     schematic_drawing as schematic_drawing,
 )
+from .board_check import (
+    check_board as check_board,
+)
 from .board_parts import (
     board_circuit as board_circuit,
 )

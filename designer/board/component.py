@@ -11,7 +11,7 @@ from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
 from designer.catalog.catalog import Catalog
-from designer.catalog.entries import Kind, Rating, Use
+from designer.catalog.entries import Kind, OpAmp, Rating, Use
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.circuit.netlist import (
     Capacitor,
@@ -294,7 +294,7 @@ class _Lister:
             role="; ".join(dict.fromkeys(s.role for s in used)),
             stage=next(iter(stages), SUPPLY),
             views=View.EVERYWHERE,
-            description=f"op-amp, {opamp.sections} sections, {_spare(opamp.sections - len(used))}",
+            description=f"op-amp, {_sections(opamp)}, {_spare(opamp.sections - len(used))}",
             bought=Bought(
                 opamp.manufacturer,
                 opamp.part_number,
@@ -337,6 +337,10 @@ def _better(grade: float, asked: float) -> str:
     if math.isclose(grade, asked, rel_tol=1e-9):
         return ""
     return f"asked for at {100 * asked:g} %, at which nobody sells this value"
+
+
+def _sections(opamp: OpAmp) -> str:
+    return "1 section" if opamp.sections == 1 else f"{opamp.sections} sections"
 
 
 def _spare(count: int) -> str:

@@ -211,11 +211,11 @@ class Catalog:
 
     def diode(self, name: str) -> Diode:
         """The diode of this name; InputError as for ``opamp``."""
-        return self._cased(_named(self.diodes, name, "diode"), "diodes", self.diodes)
+        return self._cased(_named(self.diodes, name, "circuit.diode"), "diodes", self.diodes)
 
     def reference(self, name: str) -> Reference:
         """The voltage reference of this name; InputError as for ``opamp``."""
-        named = _named(self.references, name, "reference")
+        named = _named(self.references, name, "circuit.reference")
         same = [r for r in self.references if math.isclose(r.voltage, named.voltage, rel_tol=_SAME)]
         return self._cased(named, f"references of {format_quantity(named.voltage, 'V')}", same)
 

@@ -21,6 +21,7 @@ from scipy.stats import norm
 
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
+from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.centering.candidate import Candidate, Contribution, Listened, Searched, Step, better
 from designer.centering.distance import Stretched
@@ -91,16 +92,29 @@ def look(
     need_responses(modelfile)
     catalog = modelfile.choices(catalog)
     with naming(modelfile):
-        for choice in topologies(modelfile, catalog):
-            spec = choice.spec(modelfile.circuit)
-            parts_choice.check_choices(modelfile.model, spec, catalog)
-            zone = zone_of_spec(modelfile.model, spec, catalog)
-            if choice == Choice.of(modelfile.circuit):
-                check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone))
+        _check_topologies(modelfile, catalog.mounted(modelfile.board.mounting))
         step = progress.stage("windows of the responses on the model")
         return stretches(
             modelfile.model, modelfile.responses, modelfile.search, jobs=jobs, progress=step
         )
+
+
+def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
+    """Refuse what no board could be made of. One topology for which the catalogue has no value is
+    left to the search as long as there is another."""
+    short: list[Unreachable] = []
+    wanted = topologies(modelfile, catalog)
+    for choice in wanted:
+        spec = choice.spec(modelfile.circuit)
+        try:
+            check_board(modelfile, catalog, spec)
+        except Unreachable as error:
+            short.append(error)
+        if choice == Choice.of(modelfile.circuit):
+            zone = zone_of_spec(modelfile.model, spec, catalog)
+            check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone))
+    if len(short) == len(wanted):
+        raise short[0]
 
 
 class _Hunt:

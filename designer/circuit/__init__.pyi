@@ -72,6 +72,9 @@ from .nominal import (
     reached as reached,
     trace_of as trace_of,
 )
+from .packing import (
+    QUAD as QUAD,
+)
 from .paper_values import (
     MODEL as MODEL,
     Candidate as Candidate,

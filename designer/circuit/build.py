@@ -1,8 +1,8 @@
 """From terms and values to the circuit: integrators and inverters around the dead-zone stage.
 
 The nets of the paper's Fig. 4 and Fig. 5: v1 … v4 the states, v1n … v4n their inverses, s1 … s4
-the summing nodes, fv the nonlinear stage's output. Sections carry the paper's names for two
-masses; for more, packages are filled in order.
+the summing nodes, fv the nonlinear stage's output. Sections of quads carry the paper's names for
+two masses; for more, packages are filled in order. Other op-amps: ``circuit.packing``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from designer.catalog.entries import OpAmp
 from designer.circuit.dead_zone_kind import Zone
 from designer.circuit.dead_zone_parts import OUTPUT, dead_zone
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section, Stop
+from designer.circuit.packing import packed
 from designer.circuit.resistors import Composite, Resistors
 from designer.circuit.terms import Term, inverted_states
 
@@ -72,7 +73,7 @@ def build(
         parts += stage
         stops = (stop_,)
     resistors.done()
-    return Circuit(
+    circuit = Circuit(
         parts=tuple(parts),
         generator=GENERATOR,
         states=tuple(f"C{i + 1}" for i in range(2 * masses)),
@@ -85,6 +86,7 @@ def build(
         saturation=saturation,
         figures=opamp,
     )
+    return packed(circuit, opamp)
 
 
 def inverter_resistors(state: int) -> tuple[str, str]:

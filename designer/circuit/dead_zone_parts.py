@@ -183,7 +183,8 @@ def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tupl
         idle = _HALVES[-side]
         lift = 2.0 * references[idle.reference].volts * values[idle.lift] / values[idle.threshold]
         drop = next(d.model.drop for d in circuit.diodes if d.name == idle.series)
-        out[driving.section] = (idle.series, side * (lift + 2.0 * drop))
+        section = next(s.name for s in circuit.sections if s.inverting == driving.node)
+        out[section] = (idle.series, side * (lift + 2.0 * drop))
     return out
 
 

@@ -13,6 +13,7 @@ from designer.base.checks import cores
 from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.plain_json import dumps
+from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import Checked
 from designer.check.deck_notes import circuit_notes
@@ -35,6 +36,17 @@ from designer.spread.part_grades import better_grades
 from designer.synthesis.tie_break import SOLVER
 
 SETUP = "setup.csv"
+
+
+def check(modelfile: ModelFile, catalog: Catalog) -> None:
+    """Refuse what no design folder could be written for, before any part is chosen.
+
+    Raises
+    ------
+    InputError, Unreachable : see ``board_check.check_board``.
+    """
+    with naming(modelfile):
+        check_board(modelfile, catalog)
 
 
 def texts(made: Synthesis) -> dict[str, str]:

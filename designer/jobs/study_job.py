@@ -70,6 +70,8 @@ def run_into(
     if not todo:
         answer = PLACE.answer(folder)
         return Outcome(answer, satisfied(answer), out, True)
+    if "design" in todo:
+        design_files.check(modelfile, catalog)
     began = time.perf_counter()
     with Help.of(options, progress) as help_:
         progress.stage("responses of the model, parts")

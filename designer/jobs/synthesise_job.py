@@ -116,6 +116,7 @@ def synthesise_into(
         wanted["comparison"] = (wanted["design"][0], list(compare_files.NAMES))
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
     if "design" in todo:
+        design_files.check(modelfile, catalog)
         progress.stage("responses of the model, parts")
         made = synthesis_result.synthesise(modelfile, catalog)
         progress.stage("start recipes, files of the design")

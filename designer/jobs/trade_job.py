@@ -147,6 +147,8 @@ def answer(
         return folder.json(TRADE), True
     goes_on = "design" not in todo and folder.state("trade", inputs) == "unfinished"
     known = read_pieces(folder / PIECES) if goes_on and options.resume else {}
+    if "design" in todo:
+        design_files.check(modelfile, catalog)
     progress.stage("responses of the model, parts")
     if "design" in todo:
         made = synthesis_result.synthesise(modelfile, catalog)

@@ -5,6 +5,7 @@ from . import (
 )
 from .board_table import (
     BoardChoice as BoardChoice,
+    BoardSpec as BoardSpec,
     PartArray as PartArray,
 )
 from .circuit_table import (

@@ -8,12 +8,14 @@ from typing import Any
 
 from designer.base.plain_json import FORMAT, plain
 from designer.circuit import paper_values
+from designer.circuit.packing import QUAD
 from designer.report.comparison import Column
 
 
 def comparison_json(columns: Sequence[Column]) -> dict[str, Any]:
     """``columns`` in order, and the sources of the printed values where they are one of them."""
-    answer: dict[str, Any] = {"columns": [_column(c) for c in columns]}
+    known = {s.output: s.name for s in columns[0].candidate.circuit.sections} if columns else {}
+    answer: dict[str, Any] = {"columns": [_column(c) | _paper_names(c, known) for c in columns]}
     printed = [c for c in columns if c.candidate.name == paper_values.AS_PRINTED]
     if printed:
         names = printed[0].candidate.circuit.values
@@ -32,6 +34,18 @@ def file_json(
 def in_answer(file: Mapping[str, Any]) -> dict[str, Any]:
     """The key ``comparison`` of what ``synthesise`` prints, from the object of the file."""
     return {k: v for k, v in file.items() if k in ("columns", "printed_in")}
+
+
+def _paper_names(column: Column, known: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """``paper_names``: what the paper calls each section, where its op-amps are no quads.
+
+    known : names by the net of the output, of a circuit with the paper's op-amps.
+    """
+    circuit = column.candidate.circuit
+    if circuit.figures is None or circuit.figures.sections == len(QUAD):
+        return {}
+    names = {s.name: known.get(s.output, s.name) for s in circuit.sections}
+    return {"paper_names": names} if any(new != old for old, new in names.items()) else {}
 
 
 def _column(column: Column) -> dict[str, Any]:

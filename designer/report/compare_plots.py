@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from designer.base.figure_style import GRID, INK, new_figure, say, styled
-from designer.report.compare_table import EXACT
+from designer.report.compare_table import EXACT, peaks
 
 MARKS = (
     ("#d55e00", "s"),
@@ -33,7 +33,7 @@ def comparison(columns: Sequence[Mapping[str, Any]]) -> Figure:
     shift of the operating point by the op-amps' offsets over the clearance.
     """
     names = list(dict.fromkeys(n for c in columns for n in c["errors"] or ()))
-    sections = list(dict.fromkeys(n for c in columns for n in c["peaks"]))
+    sections = list(dict.fromkeys(n for c in columns for n in peaks(c)))
     rows = max(len(names), len(sections) + 5, 10)
     figure = new_figure(9.6, 0.27 * rows + 1.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(max(len(sections), 4), 3.2))
@@ -91,13 +91,13 @@ def _peaks(
     limits = sorted({float(c["saturation"]) for c in columns})
     for limit in limits:
         axes.axvline(limit, color=INK, lw=0.9, ls=(0, (4, 2)))
-    peaks: list[float] = []
+    shown: list[float] = []
     for i, (c, mark) in enumerate(zip(columns, marks, strict=True)):
-        values = [_peak(c["peaks"].get(n)) for n in names]
-        peaks += [v for v in values if v > 0.0]
+        values = [_peak(peaks(c).get(n)) for n in names]
+        shown += [v for v in values if v > 0.0]
         _dots(axes, values, i, len(columns), mark)
     axes.set_xscale("log")
-    axes.set_xlim(min([*peaks, 0.04]) / 2.0, 1.4 * limits[-1])
+    axes.set_xlim(min([*shown, 0.04]) / 2.0, 1.4 * limits[-1])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     words = " and ".join(f"{v:g} V" for v in limits)

@@ -34,8 +34,9 @@ def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]
     )
     yield "threshold", [_number(c["threshold"], " V") for c in columns]
     yield "op-amp, its limit", [f"{c['opamp']}, {c['saturation']:g} V" for c in columns]
-    for section in dict.fromkeys(name for c in columns for name in c["peaks"]):
-        yield f"  peak {section}", [_peak(c["peaks"].get(section)) for c in columns]
+    loads = [peaks(c) for c in columns]
+    for section in dict.fromkeys(name for held in loads for name in held):
+        yield f"  peak {section}", [_peak(held.get(section)) for held in loads]
     yield "largest current", [_current(c["largest_current"]) for c in columns]
     for kind in ("typical", "maximum"):
         yield (
@@ -57,6 +58,12 @@ def _rows(columns: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, list[str]
     yield "distinct values", [str(c["distinct_values"]) for c in columns]
     yield "parts not for sale", [str(len(c["unsold"])) for c in columns]
     yield "price of the rest, at most", [_number(c["price_at_most_eur"], " €") for c in columns]
+
+
+def peaks(column: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The loads of a column by the names that the paper's columns have for its amplifiers."""
+    names = column.get("paper_names", {})
+    return {names.get(section, section): load for section, load in column["peaks"].items()}
 
 
 def notes(answer: Mapping[str, Any]) -> list[str]:

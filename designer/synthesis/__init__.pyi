@@ -4,6 +4,7 @@ from . import (
     side_conditions as side_conditions,
 )
 from .attempt import (
+    to_choose_from as to_choose_from,
     zone_of_spec as zone_of_spec,
 )
 from .limits import (
@@ -18,6 +19,10 @@ from .output_loads import (
     Loads as Loads,
     Run as Run,
     Sampled as Sampled,
+)
+from .part_choice import (
+    diode_of as diode_of,
+    opamp_of as opamp_of,
 )
 from .part_names import (
     parts_of as parts_of,

@@ -13,7 +13,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
-from designer.catalog.entries import OpAmp
+from designer.catalog.entries import Kind, OpAmp
 from designer.circuit import build as topology, drive_resistors
 from designer.circuit.coefficients import CoefficientErrors, CutShort, coefficient_errors
 from designer.circuit.dead_zone_kind import Zone, zone_of
@@ -122,12 +122,8 @@ def order(
     """
     opamp = catalog.opamp(spec.opamp)
     zone = zone_of_spec(model, spec, catalog)
-    resistors = catalog.values(
-        "resistor", spec.resistors, *spec.resistor_range, spec.resistor_grade
-    )
-    capacitors = catalog.values(
-        "capacitor", spec.capacitors, *spec.capacitor_range, spec.capacitor_grade
-    )
+    resistors = to_choose_from("resistor", spec, catalog)
+    capacitors = to_choose_from("capacitor", spec, catalog)
     prices = [catalog.part("capacitor", v, spec.capacitor_grade).price for v in capacitors.tolist()]
     return Order(
         model=model,
@@ -147,6 +143,18 @@ def order(
         parts=parts_of(model, spec, catalog, zone),
         largest=largest,
     )
+
+
+def to_choose_from(kind: Kind, spec: CircuitSpec, catalog: Catalog) -> Array:
+    """Values of the circuit's resistors [ohm] or capacitors [F] that can be bought, ascending.
+
+    Raises
+    ------
+    Unreachable : there is none.
+    """
+    if kind == "resistor":
+        return catalog.values(kind, spec.resistors, *spec.resistor_range, spec.resistor_grade)
+    return catalog.values(kind, spec.capacitors, *spec.capacitor_range, spec.capacitor_grade)
 
 
 def zone_of_spec(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> Zone:

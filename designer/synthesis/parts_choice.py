@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
-import numpy as np
-
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import doing, part
 from designer.catalog.catalog import Catalog
@@ -27,10 +25,19 @@ from designer.model.find_responses import ModelResponse, Peaks
 from designer.model.model import Dimensionless
 from designer.synthesis import composites, output_loads, side_conditions
 from designer.synthesis.advice import FREES
-from designer.synthesis.attempt import Attempt, Order, attempt, linear_block, order, zone_of_spec
+from designer.synthesis.attempt import (
+    Attempt,
+    Order,
+    attempt,
+    linear_block,
+    order,
+    to_choose_from,
+    zone_of_spec,
+)
 from designer.synthesis.limits import NO_AIMS, Aims, Limits, limits
 from designer.synthesis.linear_alternatives import best_beside
 from designer.synthesis.linear_search import LinearBlock
+from designer.synthesis.part_choice import diode_of, opamp_of, reference_of
 from designer.synthesis.part_names import check_names, check_preferred, parts_of, wishes_of
 from designer.synthesis.tie_break import Shortfall
 
@@ -80,7 +87,6 @@ def synthesise(
     check_choices(model, spec, catalog)
     largest = max((model.b / r.b for r in found), default=1.0)
     wanted = replace(order(model, spec, catalog, peaks, max(largest, 1.0)), aims=aims)
-    check_preferred(spec, wanted.resistors, wanted.capacitors)
     reached = _reach(wanted, spec.kept, found)
     if isinstance(reached, Shortfall):
         _refuse(wanted, reached, found)
@@ -98,18 +104,17 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
 
     Raises
     ------
-    InputError : an unknown part of the catalogue or of the circuit, or a choice of the contract
-        that this version does not build.
+    InputError : a part of the catalogue that is not known or cannot be used, a part that the
+        circuit does not have, or a choice of the contract that this version does not build.
+    Unreachable : no value of the series can be bought in the range.
     """
-    opamp = catalog.opamp(spec.opamp, spec.supply)
-    low, high = opamp.supply.min or 0.0, opamp.supply.max or np.inf
-    if not opamp.takes(spec.supply):
-        raise InputError(
-            None, "circuit.supply", spec.supply, f"{low:g} to {high:g} V, the rails of {opamp.name}"
-        )
-    limit = spec.saturation or opamp.saturation_at(spec.supply)
-    if not 0.0 < limit <= spec.supply:
-        raise InputError(None, "circuit.saturation", limit, f"above 0 and up to {spec.supply:g} V")
+    opamp_of(spec, catalog)
+    if spec.saturation is not None and not 0.0 < spec.saturation <= spec.supply:
+        expected = f"above 0 and up to {spec.supply:g} V"
+        raise InputError(None, "circuit.saturation", spec.saturation, expected)
+    if spec.dead_zone == "rectifier" and model.k0 > 0.0:
+        diode_of(spec.diode, catalog)
+        reference_of(spec, catalog)
     if spec.objective != "match":
         raise InputError(
             None,
@@ -118,6 +123,8 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
             '"match": a design for the yield comes from search, run or synthesise with --out',
         )
     check_names(parts_of(model, spec, catalog, zone_of_spec(model, spec, catalog)), spec)
+    resistors = to_choose_from("resistor", spec, catalog)
+    check_preferred(spec, resistors, to_choose_from("capacitor", spec, catalog))
 
 
 def _reach(

@@ -30,6 +30,8 @@ def circuits() -> dict[str, Circuit]:
         "one-sided rectifier": stage("rectifier", "lower", bought(rectifier(5.0))),
         "f20": stage("saturation", "both", bought({**EXACT, "R12": 18e3}), f20=0.2),
         "composites": stage("saturation", "both", bought(composite), {"R50": "series"}),
+        "duals": stage("rectifier", "lower", bought(rectifier(5.0)), opamp="TL072C"),
+        "singles": stage("saturation", "both", bought(EXACT), opamp="TL071C"),
     }
 
 
@@ -89,7 +91,7 @@ def test_every_section_of_a_package_is_used_or_tied_off(circuit: Circuit) -> Non
     board = fitted(circuit, CHOICE, CATALOG)
     for component in components(board, CATALOG, CHOICE):
         if component.kind == "op-amp":
-            assert len(component.pins) == 14
+            assert len(component.pins) == {"TL071C": 5, "TL072C": 8, "TL074C": 14}[circuit.opamp]
             assert all(pin.net for pin in component.pins)
     for part in board.fittings:
         if isinstance(part, Section):

@@ -266,13 +266,26 @@ def figures(opamp: OpAmp) -> dict[str, Figure]:
     return {name: value for name, value in found.items() if isinstance(value, Figure)}
 
 
-def test_opamps_are_quads_with_the_usual_pins(catalog: Catalog) -> None:
-    assert {"TL074C", "TL074H", "OPA4192", "MCP6004"} <= {opamp.name for opamp in catalog.opamps}
+def test_opamps_have_the_usual_pins(catalog: Catalog) -> None:
+    """JEDEC's single, dual and quad, as the first page of each sheet draws them."""
+    usual = {
+        1: (("7", "4"), [("2", "3", "6")]),
+        2: (("8", "4"), [("2", "3", "1"), ("6", "5", "7")]),
+        4: (("4", "11"), [("2", "3", "1"), ("6", "5", "7"), ("9", "10", "8"), ("13", "12", "14")]),
+    }
+    by_count = {count: {o.name for o in catalog.opamps if o.sections == count} for count in usual}
+    assert by_count == {
+        1: {"TL071C"},
+        2: {"TL072C", "TL072H", "OPA2192"},
+        4: {"TL074C", "TL074H", "OPA4192", "MCP6004"},
+    }
     for opamp in catalog.opamps:
-        assert opamp.sections == 4
-        assert opamp.supply_pins == ("4", "11")
-        pins = [(p.inverting, p.noninverting, p.output) for p in opamp.pins]
-        assert pins == [("2", "3", "1"), ("6", "5", "7"), ("9", "10", "8"), ("13", "12", "14")]
+        supply, sections = usual[opamp.sections]
+        assert opamp.supply_pins == supply
+        assert [(p.inverting, p.noninverting, p.output) for p in opamp.pins] == sections
+        cases = [opamp.footprint, *(case.footprint for case in opamp.cases)]
+        leads = {"14"} if opamp.sections == 4 else {"8"}
+        assert {re.split(r"[-_]", case.split(":")[1])[1] for case in cases} == leads
 
 
 def test_opamp_figures_are_plausible_and_sourced(catalog: Catalog) -> None:
@@ -360,7 +373,7 @@ def test_a_part_that_is_not_sold(catalog: Catalog) -> None:
 
 def test_unknown_names_are_answered_with_the_known_ones(catalog: Catalog) -> None:
     with pytest.raises(
-        InputError, match=r'TL074C, TL074H, OPA4192, MCP6004; did you mean "OPA4192"\?'
+        InputError, match=r'TL074C, TL074H, OPA4192, MCP6004, .*; did you mean "OPA\d?192"\?'
     ):
         catalog.opamp("OPA192")
     with pytest.raises(InputError, match="1N4148"):

@@ -27,7 +27,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import find
 from designer.model.model_file import parse_model_file
 from designer.model.response_table import Response
-from designer.report import compare_plots, comparison
+from designer.report import compare_plots, compare_table, comparison
 from designer.report.compare_json import comparison_json
 from designer.report.comparison import OURS, Column
 
@@ -208,6 +208,27 @@ def test_what_cannot_be_computed_leaves_the_rest(monkeypatch: pytest.MonkeyPatch
     assert answer["peaks"]["U3C"]["high"] == pytest.approx(13.0)
     # Drawn all the same.
     assert "<svg" in figure_style.to_svg(compare_plots.comparison([answer]))
+
+
+def test_amplifiers_of_duals_stand_in_the_rows_of_the_papers() -> None:
+    """The corrected circuit from quads and from duals: equal peaks, each under the paper's name."""
+    quads = paper_values.candidates(PAPER, SPEC, CATALOG)[1]
+    values = quads.circuit.values
+    duals = paper_values.circuit(PAPER, values, CATALOG.opamp("TL072C"))
+    found = find(PAPER, [Response(0.85)])
+    got = [
+        comparison.column(replace(quads, circuit=circuit), PAPER, found, SPEC, CATALOG)
+        for circuit in (quads.circuit, duals)
+    ]
+    paper, other = comparison_json(got)["columns"]
+    assert "paper_names" not in paper
+    assert other["paper_names"]["U2A"] == "U2C", "the integrator of M1's velocity"
+    assert list(other["peaks"]) == [s.name for s in duals.sections]
+    assert compare_table.peaks(other) == paper["peaks"]
+    rows = {row[0]: row[1:] for row in compare_table.rows({"columns": [paper, other]})}
+    assert all(len(set(cells)) == 1 for name, cells in rows.items() if "peak" in name)
+    assert sum("peak" in name for name in rows) == 12
+    assert (paper["packages"], other["packages"]) == (3, 6)
 
 
 def test_the_picture_of_next_to_nothing() -> None:

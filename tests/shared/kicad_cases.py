@@ -26,6 +26,8 @@ CASES: dict[str, tuple[str, Mounting]] = {
     **{name: (name, "mixed") for name in CIRCUITS},
     "through-hole": ("rectifier", "tht"),
     "surface": ("rectifier", "smd"),
+    "duals on the surface": ("duals", "smd"),
+    "singles on the surface": ("singles", "smd"),
 }
 """Circuit and mounting."""
 

@@ -61,13 +61,14 @@ def stage(
     values: Mapping[str, float],
     composites: Mapping[str, Composite] | None = None,
     f20: float = 0.0,
+    opamp: str = "TL074C",
 ) -> Circuit:
     """The paper's circuit around one of the stages."""
     system = model(sides, f20).second_order()
     return build.build(
         terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
         values,
-        CATALOG.opamp("TL074C"),
+        CATALOG.opamp(opamp),
         supply=SUPPLY,
         saturation=SATURATION,
         clearance="A",

@@ -189,8 +189,8 @@ def test_unreachable_names_what_binds() -> None:
     ("changes", "field"),
     [
         ({"objective": "yield"}, "circuit.objective"),
-        ({"diode": "1N9999", "dead_zone": "rectifier"}, "diode"),
-        ({"reference": "LM9999", "dead_zone": "rectifier"}, "reference"),
+        ({"diode": "1N9999", "dead_zone": "rectifier"}, "circuit.diode"),
+        ({"reference": "LM9999", "dead_zone": "rectifier"}, "circuit.reference"),
         ({"composites": ("R211",)}, "circuit.composites"),
         ({"composites": ("R6",)}, "circuit.composites"),
         ({"composites": ("R100",)}, "circuit.composites"),
