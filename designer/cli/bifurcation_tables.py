@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ def show(answer: Mapping[str, Any], out: Path | None, reused: bool) -> None:
 
 
 def _sweep(answer: Mapping[str, Any]) -> None:
-    console, name = _console(), answer["parameter"]
+    console = _console()
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     wide = answer["windows"]
     widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
@@ -33,13 +33,19 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     if len(wide) > len(widest):
         _line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        table = _table("Bifurcation points", "kind", f"{name}{unit}", "track", "what changes")
-        for p in answer["points"][:LONGEST]:
-            branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
-            for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
-                first = ("", "") if k else (p["kind"], f"{p['value']:.9g}")
-                _row(table, *first, c["track"] or "-", c["text"])
-        console.print(table)
+        _line(console, "\nBifurcation points")
+        for text in _points(answer["points"][:LONGEST]):
+            _line(console, text)
+
+
+def _points(points: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """What happens at each point on its branch, and below it what the sweep's tracks show."""
+    for p in points:
+        # Folders of older versions have no caption.
+        yield p.get("caption", f"{p['kind']} at {p['value']:.9g}: {p['before']} → {p['after']}")
+        for c in p.get("changes", []):
+            if c["track"] is not None:
+                yield f"  {c['track']}: {c['text']}"
 
 
 def _map(answer: Mapping[str, Any]) -> None:

@@ -148,6 +148,12 @@ def simulate(
     rung: Annotated[
         RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
     ] = RungName.IDEAL,
+    starts: Annotated[
+        int,
+        typer.Option(
+            "--starts", metavar="N", help="Initial states that are drawn: the attractors' shares."
+        ),
+    ] = 200,
     seed: Seed = 1,
     plots: Annotated[
         Path | None,
@@ -168,7 +174,16 @@ def simulate(
 
         synthesise_job.Options(seed, jobs).check()
         answer, found = synthesise_job.simulate_answer(
-            model, tuple(omega or ()), engine.value, jobs, progress, plots, overwrite, rung.value
+            model,
+            tuple(omega or ()),
+            engine.value,
+            jobs,
+            progress,
+            plots,
+            overwrite,
+            rung.value,
+            starts,
+            seed,
         )
     if json:
         _print_json(answer)

@@ -111,6 +111,7 @@ def simulate_json(
                     {**orbit_json(o), "twin": _twin_json(s.twins[i] if s.twins else None)}
                     for i, o in enumerate(s.others, start=1)
                 ],
+                "starts": None if s.coexistence is None else s.coexistence.as_dict(),
                 "engine": s.settings,
                 "trust": s.trust.as_dict(),
                 "cost": {"periods": s.orbit.periods, "seconds": s.seconds},

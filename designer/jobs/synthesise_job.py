@@ -25,7 +25,7 @@ from designer.base.plain_json import plain
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
-from designer.check import simulation, synthesis_result
+from designer.check import coexistence, simulation, synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import board_files, compare_files, design_files, kicad_files
 from designer.jobs.design_files import load
@@ -148,6 +148,8 @@ def simulate_answer(
     plots: Path | None = None,
     overwrite: bool = False,
     rung: Rung = "ideal",
+    starts: int = coexistence.STARTS,
+    seed: int = coexistence.SEED,
 ) -> tuple[dict[str, Any], bool]:
     """The verb ``simulate``: its JSON object, and whether every wanted response was found
     and can be trusted.
@@ -176,8 +178,11 @@ def simulate_answer(
         progress=progress,
         traces=plots is not None,
         rung=rung,
+        starts=starts,
+        seed=seed,
     )
-    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine, rung))
+    settings = {**simulation.engine_settings(engine, rung), "drawn_starts": starts}
+    said = provenance(modelfile, catalog.hash, seed=seed, settings=settings)
     answer = simulate_json(simulated, engine, said, time.perf_counter() - began)
     if plots is not None:
         progress.stage("pictures")
