@@ -22,6 +22,7 @@ from .default_counts import (
     SAMPLES as SAMPLES,
     SEARCH_SAMPLES as SEARCH_SAMPLES,
     SEED as SEED,
+    STARTS as STARTS,
     TRADE_BOARDS as TRADE_BOARDS,
 )
 from .design_folder import (

@@ -71,6 +71,9 @@ _LONG = re.compile(r' (?:d|x|y)="[^"]*"')
 
 _DIGITS = re.compile(r"-?\d+\.\d{3,}")
 
+_HASHED = re.compile(r'((?: id="|href="#|url\(#)(?:p|m|h|image))([0-9a-f]{10})(?=["\)])')
+"""A name that Matplotlib made of a hash: of a clip, a marker, a hatch or an image."""
+
 P = ParamSpec("P")
 
 
@@ -92,13 +95,18 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 
 def to_svg(figure: Figure) -> str:
-    """The figure as an SVG document with text as paths: nothing is loaded, no date, no version."""
+    """The figure as an SVG document with text as paths: nothing is loaded, no date, no version.
+
+    Equal data give equal bytes. Matplotlib names clips and markers by a hash of every digit of
+    their place, and the layout's last digits differ from process to process: here they are
+    numbered.
+    """
     buffer = io.StringIO()
     nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
     with style():
         figure.savefig(buffer, format="svg", metadata=nothing)
     text = buffer.getvalue()
-    return _LONG.sub(_short, text[text.index("<svg") :])
+    return _numbered(_LONG.sub(_short, text[text.index("<svg") :]))
 
 
 def to_png(figure: Figure, path: Path | BinaryIO, dpi: float = 160.0) -> None:
@@ -110,6 +118,12 @@ def to_png(figure: Figure, path: Path | BinaryIO, dpi: float = 160.0) -> None:
 def _short(attribute: re.Match[str]) -> str:
     """Coordinates to a hundredth of a point: the file is a third smaller, the picture the same."""
     return _DIGITS.sub(lambda m: f"{float(m[0]):.2f}", attribute[0])
+
+
+def _numbered(document: str) -> str:
+    """The same document with hashed names replaced by numbers, in order of appearance."""
+    numbers: dict[str, int] = {}
+    return _HASHED.sub(lambda m: f"{m[1]}{numbers.setdefault(m[2], len(numbers) + 1)}", document)
 
 
 def new_figure(width: float, height: float) -> Figure:

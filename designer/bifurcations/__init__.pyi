@@ -2,7 +2,9 @@ from . import (
     basins as basins,
     captions as captions,
     parameter_map as parameter_map,
+    point_captions as point_captions,
     sweep as sweep,
+    titles as titles,
     window_ends as window_ends,
 )
 from .basins import (
@@ -29,6 +31,9 @@ from .parameter_map import (
     Cell as Cell,
     MapPlan as MapPlan,
     ParameterMap as ParameterMap,
+)
+from .point_captions import (
+    caption as caption,
 )
 from .points import (
     Bifurcation as Bifurcation,

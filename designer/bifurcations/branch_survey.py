@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.bifurcations.branch_switch import close, switch
+from designer.bifurcations.branch_switch import birth, close, switch
 from designer.bifurcations.continuation import Branch, End, start, trace
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.loop_check import images, place
@@ -61,7 +61,7 @@ def survey(
         number = len(branches)
         branches.append(branch)
         parents.append(parent)
-        points.extend(locate(branch, number))
+        points.extend(replace(p, born=birth(branch, p)) for p in locate(branch, number))
         progress()
         return number
 

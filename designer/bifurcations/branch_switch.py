@@ -10,7 +10,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.bifurcations.continuation import Branch, BranchPoint, End, apart, at, follow, linked
 from designer.bifurcations.orbit_curve import Curve, Solved
-from designer.bifurcations.points import Bifurcation, Kind
+from designer.bifurcations.points import Bifurcation, Birth, Kind
 from designer.dynamics.attractors import mirrored_strobes
 from designer.dynamics.orbit import MAX_PERIOD
 
@@ -24,6 +24,8 @@ FIRST = 0.1
 where it sets out, λ going by the square of the distance, cannot be read off the meeting point."""
 NEAR = 2.0
 """Of such an arclength: farther from the parent than this lies another branch's orbit."""
+CRITICAL = 1e-9
+"""Nearer to 1 than this the largest multiplier does not tell whether an orbit is stable."""
 
 
 def switch(
@@ -42,6 +44,36 @@ def switch(
     that it leaves, so it is the same wherever the parent was begun. None where none is found, or
     its period passes ``MAX_PERIOD``, or its first points are ``known``.
     """
+    out = _setting_out(parent, where)
+    if out is None:
+        return None
+    first, border = out
+    if known(first):
+        return None
+    origin = Branch(first.curve, first.points[-1:], first.ends)
+    grown = follow(origin, low, high, 1.0, border=border)
+    return Branch(first.curve, first.points[:-1] + grown.points, (End.JOINED, grown.ends[1]))
+
+
+def birth(parent: Branch, where: Bifurcation) -> Birth | None:
+    """The orbits that leave ``parent`` at a pitchfork or a period doubling, right beside it.
+
+    None at other points, and where none are found.
+    """
+    out = _setting_out(parent, where)
+    if out is None:
+        return None
+    first = out[0]
+    for p in first.points[1:]:
+        off = p.value - where.value
+        if abs(off) > where.error and abs(p.orbit.radius - 1.0) > CRITICAL:
+            return Birth(p.response, first.curve.symmetric, 1 if off > 0.0 else -1, p.stable)
+    return None
+
+
+def _setting_out(parent: Branch, where: Bifurcation) -> tuple[Branch, Array] | None:
+    """The first points of the branch that leaves ``parent`` at a point, from the point itself on,
+    and the direction they set out in; None where there are none."""
     curve = parent.curve
     x, value = where.point.solved.x, where.value
     doubled = where.kind is Kind.DOUBLING
@@ -62,15 +94,11 @@ def switch(
             continue
         if _parting(other, point) < 0.5 * reach:
             continue  # fell back onto the parent
-        origin = Branch(other, (point,), (End.JOINED, End.STOPPED))
         root = _meeting(other, where, point)
         points = None if root is None else _led(other, root, point)
         if points is None:
             continue  # no orbit of this branch, or one beyond more than can be told apart
-        if known(Branch(other, points, (End.JOINED, End.STOPPED))):
-            return None
-        grown = follow(origin, low, high, 1.0, border=border)
-        return Branch(other, points[:-1] + grown.points, (End.JOINED, grown.ends[1]))
+        return Branch(other, points, (End.JOINED, End.STOPPED)), border
     return None
 
 

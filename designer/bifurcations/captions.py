@@ -1,4 +1,8 @@
-"""What a sweep's tracks show on both sides of a bifurcation point, in the order they meet it."""
+"""What a sweep's tracks show on both sides of a bifurcation point, in the order they meet it.
+
+A track shows a point only where it is on the branch that the point lies on, or on what is born
+there: a track that changes beside it for another reason has nothing to do with it.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.bifurcations.points import Bifurcation, Kind
+from designer.bifurcations.point_captions import caption, doubled, label
+from designer.bifurcations.points import Bifurcation, Birth, Kind
 from designer.bifurcations.sweep import DOWN, Sweep
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
@@ -38,25 +43,19 @@ class Change:
 def changes(sweep: Sweep, point: Bifurcation) -> list[Change]:
     """One for each track that changes at the point; of fixed starts the first that does.
 
-    Where none does (the branch is another one, or unstable on both sides), one without a track,
-    that says what happens on the branch itself.
+    Where none does (it is not on this branch, or that is unstable on both sides), one without a
+    track, that says what happens on the branch itself.
     """
     out: list[Change] = []
     for track in sweep.plan.tracks:
-        found = _on(sweep, track, point)
-        if found is None:
+        shown = _on(sweep, track, point)
+        if shown is None:
             continue
         name = track if sweep.plan.followed else RISING
-        out.append(Change(name, *found, _text(point, *found)))
+        out.append(Change(name, *shown, _text(point, *shown)))
         if not sweep.plan.followed:
             break
     return out or [_of_branch(point)]
-
-
-def label(response: str, symmetric: bool | None) -> str:
-    """The response with its symmetry, where it has one."""
-    said = {True: " symmetric", False: " asymmetric", None: ""}
-    return response + said[symmetric if response.count("-") == 2 else None]
 
 
 def family(response: str) -> str:
@@ -66,7 +65,7 @@ def family(response: str) -> str:
 
 
 def _on(sweep: Sweep, track: str, point: Bifurcation) -> tuple[str, str] | None:
-    """What the track shows on its two sides, if that differs and the branch is one of them."""
+    """What the track shows on its two sides, if that differs by what happens at the point."""
     above = int(np.searchsorted(sweep.plan.values, point.value))
     steps, step = sweep.steps[track], 1
     first, then = above - 1, above
@@ -81,11 +80,58 @@ def _on(sweep: Sweep, track: str, point: Bifurcation) -> tuple[str, str] | None:
         after = steps[index]
         if after.status is OrbitStatus.NOT_SETTLED or _shown(after) == _shown(before):
             continue
-        near = {family(point.before), family(point.after)}
-        if family(before.response) not in near and family(after.response) not in near:
-            return None
-        return _shown(before), _shown(after)
+        caused = _leaves(point, before, after, step) or _arrives(point, before, after, step)
+        if not caused and not sweep.plan.followed:
+            caused = _begins(point, after, step)
+        return (_shown(before), _shown(after)) if caused else None
     return None
+
+
+def _leaves(point: Bifurcation, before: Steady, after: Steady, step: int) -> bool:
+    """Whether a track was on the branch, stable there, and loses it at the point.
+
+    step : 1 where the track rises through the parameter, -1 where it falls.
+    """
+    if point.kind is Kind.FOLD:
+        return point.side == -step and any(point.stable) and _is(before, point, point.response)
+    sides = point.stable_sides
+    assert sides is not None
+    responses = {point.direction: point.after, -point.direction: point.before}
+    if not sides[-step] or not _is(before, point, responses[-step]):
+        return False
+    return not sides[step] or _is(after, point, responses[step])
+
+
+def _arrives(point: Bifurcation, before: Steady, after: Steady, step: int) -> bool:
+    """Whether a track was on what is born at the point, and goes over to the branch there."""
+    born, sides = _born(point), point.stable_sides
+    if born is None or sides is None or not born.stable or born.side != -step:
+        return False
+    whence = family(before.response) == family(born.response)
+    return whence and sides[step] and _is(after, point, point.response)
+
+
+def _begins(point: Bifurcation, after: Steady, step: int) -> bool:
+    """Whether an orbit that a fixed start leads to is there only past this fold."""
+    fold = point.kind is Kind.FOLD and any(point.stable) and point.side == step
+    return fold and _is(after, point, point.response)
+
+
+def _born(point: Bifurcation) -> Birth | None:
+    """What is born, where that was not looked for: as where a stable orbit loses its stability."""
+    if point.born is not None or point.kind not in (Kind.DOUBLING, Kind.PITCHFORK):
+        return point.born
+    if point.stable[0] is point.stable[1]:
+        return None
+    unstable = -point.direction if point.stable[1] else point.direction
+    twice = point.kind is Kind.DOUBLING
+    response = doubled(point.response) if twice else point.response
+    return Birth(response, False, unstable, True)
+
+
+def _is(step: Steady, point: Bifurcation, response: str) -> bool:
+    """Whether a track shows this response, with the symmetry of the point's orbit."""
+    return family(step.response) == family(response) and step.symmetric is point.symmetric
 
 
 def _shown(step: Steady) -> str:
@@ -95,7 +141,7 @@ def _shown(step: Steady) -> str:
 def _text(point: Bifurcation, before: str, after: str) -> str:
     if point.kind is not Kind.FOLD:
         return f"{before} → {after}"
-    if family(before.split()[0]) in (family(point.before), family(point.after)):
+    if family(before.split()[0]) == family(point.response):
         return f"{before} ends (fold) → {after}"
     return f"{before} → {after}, which begins (fold)"
 
@@ -105,11 +151,4 @@ def _of_branch(point: Bifurcation) -> Change:
     before, after = point.before, point.after
     if point.stable[1] and not point.stable[0]:
         before, after = after, before
-    unstable = "" if point.stable[0] or point.stable[1] else "unstable "
-    if point.kind is Kind.GRAZING:
-        return Change(None, before, after, f"{unstable}{before} → {after}")
-    if point.kind is Kind.FOLD:
-        return Change(None, before, "", f"{unstable}{before} ends (fold)")
-    if unstable:
-        return Change(None, before, "", f"unstable {before}")
-    return Change(None, before, "", f"{before} loses its stability")
+    return Change(None, before, after if point.kind is Kind.GRAZING else "", caption(point))

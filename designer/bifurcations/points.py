@@ -17,14 +17,15 @@ it on a converged orbit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 from scipy.optimize import brentq
 
-from designer.bifurcations.continuation import Branch, BranchPoint, at, joined, parted
+from designer.bifurcations.continuation import Branch, BranchPoint, End, at, joined, parted
 from designer.bifurcations.orbit_curve import CONVERGED, Curve
+from designer.dynamics.orbit import SYMMETRY_TOLERANCE
 from designer.dynamics.turning_points import heights
 
 ROUNDING = 1e-11
@@ -45,15 +46,46 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
+class Birth:
+    """The orbits that leave a branch at a point: twins at a pitchfork, doubled at a doubling.
+
+    response, symmetric : of one of them. side : 1 where they lie above the point's value of the
+    parameter, -1 below. stable : whether they are stable there.
+    """
+
+    response: str
+    symmetric: bool
+    side: int
+    stable: bool
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain, for JSON."""
+        return {
+            "response": self.response,
+            "symmetric": self.symmetric,
+            "side": SIDES[self.side],
+            "stable": self.stable,
+        }
+
+
+SIDES = {1: "above", -1: "below"}
+"""Of a value of the parameter."""
+
+
+@dataclass(frozen=True)
 class Bifurcation:
     """A bifurcation point.
 
     parameter, value : its name and where. kind : see ``Kind``. error : half the width of an
     interval of the parameter that was seen to hold the point: the test function has different signs
     (for grazing: the counts of impacts differ) at its ends. point : the orbit there. before,
-    after : the branch's responses on either side, in its own order; stable : whether stable there.
-    position : where along the branch: whole part, the number of the point before it. branch :
-    number of the branch among those it was found with.
+    after : the branch's responses right beside it, in the branch's own order; stable : whether
+    stable there. direction : 1 where the parameter rises along the branch, -1 where it falls, 0 at
+    a fold. side : of a fold, 1 where its orbits lie above the value, -1 below; else 0. symmetric :
+    whether the orbit is (without an exact mirror: to ``orbit.SYMMETRY_TOLERANCE``). position :
+    where along the branch: whole part, the number of the point before it. branch : number of the
+    branch among those it was found with. born : what leaves the branch here, where that was looked
+    for (``branch_switch.birth``).
     """
 
     parameter: str
@@ -67,6 +99,22 @@ class Bifurcation:
     direction: int
     position: float
     branch: int = 0
+    side: int = 0
+    symmetric: bool = False
+    born: Birth | None = None
+
+    @property
+    def response(self) -> str:
+        """ "n-p-q" of the orbit at the point; of a grazing one, on the branch's first side."""
+        same = self.before == self.after or self.kind is Kind.GRAZING
+        return self.before if same else self.point.response
+
+    @property
+    def stable_sides(self) -> dict[int, bool] | None:
+        """Whether the branch is stable above (1) and below (-1); None at a fold, on one side."""
+        if not self.direction:
+            return None
+        return {self.direction: self.stable[1], -self.direction: self.stable[0]}
 
     def as_dict(self) -> dict[str, object]:
         """Plain, for JSON."""
@@ -81,6 +129,12 @@ class Bifurcation:
             "stable_after": self.stable[1],
             "direction": self.direction,
             "branch": self.branch,
+            "response": self.response,
+            "symmetric": self.symmetric,
+            "stable_above": None if self.stable_sides is None else self.stable_sides[1],
+            "stable_below": None if self.stable_sides is None else self.stable_sides[-1],
+            "side": SIDES.get(self.side),
+            "born": None if self.born is None else self.born.as_dict(),
         }
 
 
@@ -95,7 +149,35 @@ def locate(branch: Branch, number: int = 0) -> list[Bifurcation]:
             located = _locate(branch.curve, a, b, kind, test, index, number)
             if located is not None:
                 found.append(located)
-    return sorted(found, key=lambda p: p.position)
+    found.sort(key=lambda p: p.position)
+    return [_beside(branch, where, found) for where in found]
+
+
+def _beside(branch: Branch, where: Bifurcation, every: list[Bifurcation]) -> Bifurcation:
+    """A point with the branch's responses and stability right beside it.
+
+    Those are the neighbouring points' of the branch, unless something else happens before them, or
+    they are where the branch meets another and their multipliers tell nothing.
+    """
+    index = int(where.position)
+    ends = branch.points[index], branch.points[index + 1]
+    beside = []
+    for k, end in enumerate(ends):
+        others = [
+            p.position
+            for p in every
+            if int(p.position) == index and (p.position - where.position) * (k - 0.5) > 0.0
+        ]
+        meets = branch.ends[k] is End.JOINED and index + k == k * (len(branch.points) - 1)
+        found = None
+        if others or meets:
+            edge = min(others, key=lambda s: abs(s - where.position), default=float(index + k))
+            share = 0.5 * (edge + where.position) - index
+            solved = branch.curve.between(ends[0].solved, ends[1].solved, share)
+            found = None if solved is None else at(branch.curve, solved)
+        beside.append(end if found is None else found)
+    a, b = beside
+    return replace(where, before=a.response, after=b.response, stable=(a.stable, b.stable))
 
 
 Test = Callable[[BranchPoint], float]
@@ -196,7 +278,16 @@ def _locate(
         direction=0 if kind is Kind.FOLD else int(np.sign(b.value - a.value)),
         position=index + root,
         branch=number,
+        side=int(np.sign(a.value + b.value - 2.0 * middle.value)) if kind is Kind.FOLD else 0,
+        symmetric=_symmetric(curve, middle),
     )
+
+
+def _symmetric(curve: Curve, p: BranchPoint) -> bool:
+    """Whether an orbit is symmetric: by its branch, or by the tolerance without a mirror."""
+    if curve.family.flow(p.value).system.mirror is not None:
+        return curve.symmetric
+    return curve.n % 2 == 1 and p.orbit.asymmetry < SYMMETRY_TOLERANCE
 
 
 def _bisect(left: Callable[[float], bool]) -> float:

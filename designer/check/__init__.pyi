@@ -7,6 +7,9 @@ from .checked_design import (
     Checked as Checked,
     traces as traces,
 )
+from .coexistence import (
+    beside as beside,
+)
 from .deck_notes import (
     circuit_notes as circuit_notes,
     simulator_notes as simulator_notes,

@@ -14,20 +14,23 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.checks import cores
+from designer.base.default_counts import SEED, STARTS
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.check import trust
+from designer.check import coexistence, trust
 from designer.check.checked_design import Checked
+from designer.check.coexistence import Coexistence
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.check.trust import Trust
 from designer.circuit import nominal
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace, circuit_flow, trace_of
-from designer.dynamics import attractors
-from designer.dynamics.attractors import coexisting, settle, starts
+from designer.dynamics import attractors, step_budget
+from designer.dynamics.attractors import coexisting, settle, starts as sobol_starts
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
-from designer.dynamics.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
+from designer.dynamics.orbit import ANSWERS, MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.dynamics.step_budget import Budget
 from designer.model.find_responses import (
     STARTS,
     ModelResponse,
@@ -57,7 +60,9 @@ class Simulated:
     twins : mirror twin of the orbit and of each of ``others``; None where an orbit is its own
     twin, or there is no mirror, or the engine was not asked (ngspice). b : the clearance; sides :
     the stops there are. settings : of the engine for this response. traces : where asked, the
-    orbit and its twin over their periods, each from its start. trust : of the orbit.
+    orbit and its twin over their periods, each from its start. trust : of the orbit. coexistence :
+    what share of the starts in a box goes to the orbit, to each of ``others`` and to none; its
+    orbits are in the flow's own units. None where the engine was not asked (ngspice).
     """
 
     omega: float
@@ -72,6 +77,7 @@ class Simulated:
     settings: dict[str, Any] = field(default_factory=dict)
     traces: tuple[Trace, ...] = ()
     trust: Trust = field(default_factory=Trust)
+    coexistence: Coexistence | None = None
 
     @property
     def twin(self) -> Orbit | None:
@@ -89,18 +95,24 @@ def simulate(
     progress: Progress | None = None,
     traces: bool = False,
     rung: Rung = "ideal",
+    starts: int = STARTS,
+    seed: int = SEED,
 ) -> tuple[Simulated, ...]:
     """The responses of a model file, or what is reached from rest at ``omegas``.
 
     engine : "model" (exact flow), "circuit" (exact flow of the reduced circuit) or "ngspice".
     synthesis : of this model file; made where the engine needs one and None is given. traces :
     keep the orbits and their mirror twins as traces too. rung : the op-amps' model in ngspice.
+    starts, seed : of the initial states that are drawn to see which attractors coexist
+    (``check.coexistence``); ngspice has none.
 
     Raises
     ------
-    InputError : a rung for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, or
-        nothing to simulate.
+    InputError : a rung for another engine, a frequency outside ``SLOWEST`` to ``FASTEST``, a
+        number of starts that cannot be, or nothing to simulate.
     """
+    coexistence.check(starts)
+    drawn = (starts, seed)
     said = Progress() if progress is None else progress
     if rung != "ideal" and engine != "ngspice":
         raise InputError(
@@ -118,14 +130,14 @@ def simulate(
     if engine == "model":
         step = said.stage("responses of the model", len(specs))
         return tuple(
-            _timed(step, lambda s=s: _on_model(modelfile, s, traces))  # type: ignore[misc]
+            _timed(step, lambda s=s: _on_model(modelfile, s, traces, drawn))  # type: ignore[misc]
             for s in specs
         )
     if engine == "circuit":
         made = synthesis or synthesise(modelfile)
         step = said.stage("responses of the exact circuit", len(specs))
         return tuple(
-            _timed(step, lambda s=s: _on_circuit(made, s, bool(omegas), traces))  # type: ignore[misc]
+            _timed(step, lambda s=s: _on_circuit(made, s, bool(omegas), traces, drawn))  # type: ignore[misc]
             for s in specs
         )
     with SpicePool(cores() if jobs is None else jobs) as pool:
@@ -167,12 +179,17 @@ def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated
     return replace(result, seconds=time.perf_counter() - began)
 
 
-def _on_model(modelfile: ModelFile, spec: Response, traces: bool) -> Simulated:
+def _on_model(
+    modelfile: ModelFile, spec: Response, traces: bool, drawn: tuple[int, int]
+) -> Simulated:
     with naming(modelfile):
         (r,) = find(modelfile.model, [spec])
     model = replace(modelfile.model, b=r.b)
     flow = Flow(model.second_order().piecewise_linear(), Drive(r.omega))
-    orbits = [_measured(flow, o) for o in (r.orbit, *r.others)]
+    known = _attractors((r.orbit, *r.others))
+    met = coexistence.of_flow(flow, scale_of(model, r.omega), *drawn, known)
+    others = (*_attractors(r.others), *(b.orbit for b in met.basins[len(known) :]))
+    orbits = [_measured(flow, o) for o in (r.orbit, *others)]
     twins = [_twin(flow, o) for o in orbits]
     return Simulated(
         r.omega,
@@ -187,7 +204,13 @@ def _on_model(modelfile: ModelFile, spec: Response, traces: bool) -> Simulated:
         _exact_settings(flow, orbits[0], 1.0),
         _traces(flow, (orbits[0], twins[0]), np.ones(4), 1.0) if traces else (),
         trust.of_orbit(flow, orbits[0]),
+        met,
     )
+
+
+def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
+    """Those of them that are an answer."""
+    return [o for o in orbits if o.status in ANSWERS]
 
 
 def _sides(model: Dimensionless) -> tuple[int, ...]:
@@ -250,17 +273,26 @@ def _circuit_orbits(
     volts = made.design.volts(r.b)
     if scan:
         model = replace(made.modelfile.model, b=r.b)
-        return r, flow, coexisting(flow, starts(scale_of(model, r.omega) * volts, STARTS))
+        return r, flow, coexisting(flow, sobol_starts(scale_of(model, r.omega) * volts, STARTS))
     orbits = [settle(flow, o.start * volts) for o in (r.orbit, *r.others) if len(o.start)]
     return r, flow, orbits or [settle(flow, np.zeros(flow.system.size))]
 
 
-def _on_circuit(made: Synthesis, spec: Response, scan: bool, traces: bool) -> Simulated:
+def _on_circuit(
+    made: Synthesis, spec: Response, scan: bool, traces: bool, drawn: tuple[int, int]
+) -> Simulated:
     r, flow, orbits = _circuit_orbits(made, spec, scan)
     volts, seconds = made.design.volts(r.b), made.design.errors.scales.seconds
     measured = [_measured(flow, o) for o in orbits]
     shown = [dimensionless(o, volts, seconds) for o in measured]
-    kept = _distinct(shown)
+    kept = [i for i in _distinct(shown) if i == 0 or shown[i].status in ANSWERS]
+    known = _attractors([measured[i] for i in kept])
+    box = scale_of(replace(made.modelfile.model, b=r.b), r.omega)
+    met = coexistence.of_flow(flow, box, *drawn, known, volts)
+    more = [_measured(flow, b.orbit) for b in met.basins[len(known) :]]
+    kept += range(len(measured), len(measured) + len(more))
+    measured += more
+    shown += [dimensionless(o, volts, seconds) for o in more]
     twins = {i: _twin(flow, measured[i]) for i in kept}
     return Simulated(
         r.omega,
@@ -275,6 +307,7 @@ def _on_circuit(made: Synthesis, spec: Response, scan: bool, traces: bool) -> Si
         _exact_settings(flow, measured[0], float(volts[0])),
         _traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
         trust.of_orbit(flow, measured[0]),
+        met,
     )
 
 
@@ -374,7 +407,8 @@ def _measured(flow: Flow, orbit: Orbit) -> Orbit:
     """With the extremes over 200 periods where the orbit is not periodic and has none."""
     if len(orbit.extremes) or not len(orbit.start):
         return orbit
-    run_ = flow.run(orbit.start, 200, measure=True)
+    with flow.within(Budget(step_budget.SETTLING)):
+        run_ = flow.run(orbit.start, 200, measure=True)
     return orbit if run_.status is not FlowStatus.DONE else replace(orbit, extremes=run_.extremes)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ def show(answer: Mapping[str, Any], out: Path | None, reused: bool) -> None:
 
 
 def _sweep(answer: Mapping[str, Any]) -> None:
-    console, name = new_console(), answer["parameter"]
+    console = new_console()
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
     wide = answer["windows"]
     widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
@@ -39,16 +39,20 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     if len(wide) > len(widest):
         print_line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        heads = ["(SI)"] if si else []
-        table = new_table(
-            "Bifurcation points", "kind", f"{name}{unit}", *heads, "track", "what changes"
-        )
-        for p in answer["points"][:LONGEST]:
-            branch = {"track": None, "text": f"{p['before']} → {p['after']}"}
-            for k, c in enumerate(p.get("changes", [branch])):  # older folders have none
-                first = [p["kind"], f"{p['value']:.9g}", *([_si(p, "value", si)] if si else [])]
-                add_row(table, *([""] * len(first) if k else first), c["track"] or "-", c["text"])
-        console.print(table)
+        print_line(console, "\nBifurcation points")
+        for text in _points(answer["points"][:LONGEST], si):
+            print_line(console, text)
+
+
+def _points(points: Sequence[Mapping[str, Any]], si: str | None) -> Iterator[str]:
+    """What happens at each point on its branch, and below it what the sweep's tracks show."""
+    for p in points:
+        # Folders of older versions have no caption.
+        text = p.get("caption", f"{p['kind']} at {p['value']:.9g}: {p['before']} → {p['after']}")
+        yield f"{text} ({_si(p, 'value', si)})" if si else text
+        for c in p.get("changes", []):
+            if c["track"] is not None:
+                yield f"  {c['track']}: {c['text']}"
 
 
 def _si(row: Mapping[str, Any], key: str, unit: str) -> str:

@@ -236,6 +236,8 @@ def simulated(answer: Mapping[str, Any]) -> None:
     console = new_console()
     console.print(table)
     for r in answer["responses"]:
+        if r["starts"] is not None:
+            print_line(console, f"ω = {r['omega']:g}: {coexisting(r['starts'])}")
         if r["reason"]:
             print_line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
         for doubt in doubts({"this response": r.get("trust")}):
@@ -256,6 +258,27 @@ def _hertz(
 
 def _metres(value: float | None) -> str:
     return "-" if value is None else value_text(value, "m")
+
+
+def coexisting(starts: Mapping[str, Any]) -> str:
+    """Where the starts that were drawn from a box end, the largest share first."""
+    parts = []
+    for a in sorted(starts["attractors"], key=lambda a: -a["share"]):
+        name = a["response"] + (" (with its twin)" if a["on_twin"] is not None else "")
+        parts.append(f"{name} {_share(a)}")
+    if starts["not_settled"]["count"]:
+        parts.append(f"not settled {_share(starts['not_settled'])}")
+    box = ", ".join(f"{name} ± {half:.3g}" for name, half in starts["box"].items())
+    count = str(starts["count"])
+    if starts["count"] < starts["asked"]:
+        count += f" (of {starts['asked']}: the others would take too many steps)"
+    return f"of {count} starts at drive phase 0 in the box {box}: {'; '.join(parts)}"
+
+
+def _share(counted: Mapping[str, Any]) -> str:
+    """With its 95 % interval."""
+    low, high = 100 * counted["low"], 100 * counted["high"]
+    return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"
 
 
 def compared(answer: Mapping[str, Any]) -> None:

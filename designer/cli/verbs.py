@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from designer.base.default_counts import SEED
+from designer.base.default_counts import SEED, STARTS
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.version import __version__
@@ -182,6 +182,12 @@ def simulate(
     rung: Annotated[
         RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
     ] = RungName.IDEAL,
+    starts: Annotated[
+        int,
+        typer.Option(
+            "--starts", metavar="N", help="Initial states that are drawn: the attractors' shares."
+        ),
+    ] = STARTS,
     seed: Seed = SEED,
     plots: Annotated[
         Path | None,
@@ -212,6 +218,8 @@ def simulate(
             overwrite,
             rung.value,
             frequencies=tuple(frequency or ()),
+            starts=starts,
+            seed=seed,
         )
     if json:
         print_json(answer)

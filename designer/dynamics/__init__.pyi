@@ -4,6 +4,7 @@ from . import (
     kernel_four_state as kernel_four_state,
     kernel_modal as kernel_modal,
     modal_tables as modal_tables,
+    step_budget as step_budget,
     working_modes as working_modes,
 )
 from .attractors import (
@@ -12,6 +13,7 @@ from .attractors import (
     describe as describe,
     mirrored_strobes as mirrored_strobes,
     peaks_near as peaks_near,
+    same as same,
     settle as settle,
     starts as starts,
     twin as twin,
@@ -64,6 +66,9 @@ from .steady_state import (
     Course as Course,
     Setting as Setting,
     Steady as Steady,
+)
+from .step_budget import (
+    Budget as Budget,
 )
 from .turning_points import (
     heights as heights,

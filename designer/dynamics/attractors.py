@@ -17,9 +17,11 @@ from scipy.stats import qmc
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.dynamics import step_budget
 from designer.dynamics.flow import Flow, FlowResult, FlowStatus
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
+from designer.dynamics.step_budget import Budget
 
 STAGES = (20, 20, 100, 660, 3200)
 STROBE_TOLERANCE = 1e-8
@@ -36,22 +38,32 @@ CHAOS = 0.02
 """Growth of a tangent vector per drive period that is taken for chaos after 800 periods."""
 
 
-def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
+def settle(
+    flow: Flow, x: Array, mode: ModeKey | None = None, budget: Budget | None = None
+) -> Orbit:
     """The attractor reached from state x (n,) at drive phase 0.
+
+    budget : steps that it may take, ``step_budget.SETTLING`` by default; with none left its status
+    is not settled, and the reason says after how many drive periods.
 
     Returns an orbit of any status; it never raises for lack of an answer.
     """
+    with flow.within(Budget(step_budget.SETTLING) if budget is None else budget) as given:
+        return _settle(flow, x, mode, given)
+
+
+def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit:
     spent = 0
     for stage, periods in enumerate(STAGES):
         run = flow.run(x, periods, mode=mode)
         spent += len(run.strobes) - 1
         if run.status is not FlowStatus.DONE:
-            status = (
-                OrbitStatus.DIVERGED
-                if run.status is FlowStatus.DIVERGED
-                else OrbitStatus.NOT_SETTLED
-            )
-            return Orbit(status, reason=str(run.status), periods=spent)
+            diverged = run.status is FlowStatus.DIVERGED
+            status = OrbitStatus.DIVERGED if diverged else OrbitStatus.NOT_SETTLED
+            reason = str(run.status)
+            if run.status is FlowStatus.TOO_LONG:
+                reason = _too_long(flow, spent, budget)
+            return Orbit(status, reason=reason, periods=spent)
         x, mode = run.strobes[-1], run.mode
         found, cost = _polish(flow, run)
         spent += cost
@@ -72,6 +84,15 @@ def settle(flow: Flow, x: Array, mode: ModeKey | None = None) -> Orbit:
         reason=f"no period up to {MAX_PERIOD} and no chaos after {spent} drive periods: "
         "quasi-periodic, of a longer period, or very slow",
         periods=spent,
+    )
+
+
+def _too_long(flow: Flow, spent: int, budget: Budget) -> str:
+    """Why settling was cut short."""
+    return (
+        f"no period was found in {spent} drive periods; more are not run, since they took "
+        f"{budget.spent:.2g} steps: the fastest motion of the model is "
+        f"{flow.steps_a_period:.2g} steps to a drive period, or its contacts are that fast"
     )
 
 
@@ -157,6 +178,8 @@ def describe(
     want a single lap: what rounding leaves grows by their multipliers.
     """
     run = flow.run(x, laps * n, mode=mode, measure=True)
+    if run.status is not FlowStatus.DONE:
+        return Orbit(OrbitStatus.NOT_SETTLED, reason=f"while classifying period {n}: {run.status}")
     j = flow.system.displacement[0] if flow.system.displacement else 0
     peak = np.abs(run.extremes).max(axis=1)
     drift = np.abs(run.strobes - np.tile(run.strobes[:n], (laps + 1, 1))[: laps * n + 1])
@@ -196,10 +219,12 @@ def describe(
 
 
 def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> float:
-    """max over t of |x(t + nT/2) + x(t)| relative to each state's peak; nan for even n."""
-    if n % 2 == 0:
+    """max over t of |x(t + nT/2) + x(t)| relative to each state's peak; nan for even n, and where
+    the flow does not come to an end."""
+    run = flow.run(x, n, points=points) if n % 2 else None
+    if run is None or run.status is not FlowStatus.DONE:
         return float("nan")
-    trace = flow.run(x, n, points=points).strobes[:-1]
+    trace = run.strobes[:-1]
     half = n * points // 2
     return float((np.abs(np.roll(trace, -half, axis=0) + trace).max(axis=0) / peak).max())
 
@@ -236,11 +261,17 @@ def starts(scale: Array, count: int, seed: int = 0) -> Array:
 def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
     """The different attractors that these starts lead to, in order of discovery.
 
-    Mirror twins count as one; aperiodic ones are not told apart.
+    Starts that are left when ``step_budget.STARTS`` steps are spent are not run. Mirror twins
+    count as one; aperiodic ones are not told apart.
     """
     found: list[Orbit] = []
+    left = float(step_budget.STARTS)
     for x in states:
-        orbit = settle(flow, np.asarray(x, dtype=float))
+        if left <= 0.0:
+            break
+        budget = Budget(min(step_budget.SETTLING, left))
+        orbit = settle(flow, np.asarray(x, dtype=float), budget=budget)
+        left -= budget.spent
         if not any(same(flow, orbit, other) for other in found):
             found.append(orbit)
     return found
@@ -289,7 +320,10 @@ def _polish(flow: Flow, run: FlowResult) -> tuple[Orbit | None, int]:
         if found is None:
             continue
         x, monodromy = found
-        laps = flow.run(x, n).strobes
+        once = flow.run(x, n)
+        if once.status is not FlowStatus.DONE:
+            continue
+        laps = once.strobes
         least = next(
             d
             for d in range(1, n + 1)

@@ -9,10 +9,14 @@ a circuit that keeps to its working modes takes that of ``dynamics.kernel_four_s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from designer.base.arrays import Array
@@ -26,6 +30,7 @@ from designer.dynamics import (
     working_modes,
 )
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.step_budget import Budget
 
 STEP = 0.5
 """‖A h‖ of one step, after balancing."""
@@ -35,6 +40,10 @@ MAX_EVENTS = 10_000
 
 CHUNK = 500
 """Periods between two looks at ``interrupt``: some 10 to 100 ms of compiled work."""
+SLICE = 5_000_000
+"""Steps between two looks at it, where a period has many: half a second."""
+FAST_STEP, FAST_PERIOD, FAST_IMPACT = 0.15, 10.0, 10.0
+"""What a step, a period and an impact of the fast paths cost, in steps of the general kernel."""
 
 
 class FlowStatus(StrEnum):
@@ -43,6 +52,7 @@ class FlowStatus(StrEnum):
     DONE = "done"
     CHATTER = "too many events"
     DIVERGED = "diverged"
+    TOO_LONG = "too many steps"
 
 
 @dataclass(frozen=True)
@@ -96,6 +106,24 @@ class Flow:
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
+        self._budget: Budget | None = None
+
+    @contextmanager
+    def within(self, budget: Budget) -> Iterator[Budget]:
+        """What is run inside takes its steps from this budget (and none from one outside it); with
+        nothing left a run ends with the status TOO_LONG."""
+        outer, self._budget = self._budget, budget
+        try:
+            yield budget
+        finally:
+            self._budget = outer
+
+    @cached_property
+    def steps_a_period(self) -> float:
+        """Steps that the general kernel takes for one drive period in the mode of rest; more where
+        a contact is stiffer."""
+        A = self.system.mode(self.system.start).A
+        return self.drive.period / _step_length(A, self.drive.omega)
 
     @property
     def kernel(self) -> str:
@@ -144,7 +172,7 @@ class Flow:
             if found is not None:
                 return found
         z = np.concatenate([x, [0.0, 1.0, 1.0]])
-        clock = np.zeros(2)
+        clock, budget = np.zeros(3), self._budget or Budget()
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
         phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
         phases = 2.0 * np.pi * np.arange(points) / points
@@ -168,6 +196,7 @@ class Flow:
         code = kernel.DONE
         while cursor[0] < stretches:
             heed()
+            given = clock[2] = max(min(float(SLICE), budget.left), 0.0)
             code = kernel.advance(
                 self._tables,
                 z,
@@ -182,8 +211,11 @@ class Flow:
                 measure,
                 log,
             )
+            budget.take(given - float(clock[2]))
             if code == kernel.UNKNOWN_MODE:
                 self._link(int(cursor[1]), int(cursor[3]))
+            elif code == kernel.PAUSED and budget.left > 0.0:
+                continue
             elif code != kernel.DONE:
                 break
         if measure and clock[1] > capacity:  # more impacts than room: again, with room for all
@@ -231,9 +263,13 @@ class Flow:
         strobes[0] = x
         counts = np.zeros((periods, 2), dtype=np.int64)
         done, code = 0, kernel_modal.DONE
+        chunk, budget = self._chunk(), self._budget or Budget()
         while done < periods and code == kernel_modal.DONE:
             heed()
-            last = min(done + CHUNK, periods)
+            if budget.left <= 0.0:
+                code = kernel.PAUSED
+                break
+            last = min(done + chunk, periods)
             code = kernel_modal.advance(
                 tables,
                 strobes[done].copy(),
@@ -244,6 +280,7 @@ class Flow:
                 strobes[done : last + 1],
                 counts[done:last],
             )
+            self._charge(budget, counts[done : done + int(cursor[1])])
             done += int(cursor[1])
         nothing = np.zeros(0)
         return FlowResult(
@@ -284,9 +321,14 @@ class Flow:
         trail = working_modes.trail(capacity)
         anchor = working_modes.anchors(points)
         drive = np.array([self.drive.omega, self.drive.period, max_events])
-        done, code, chunk = 0, kernel_four_state.DONE, stretches if measure else CHUNK * points
+        done, code = 0, kernel_four_state.DONE
+        chunk = stretches if measure else self._chunk() * points
+        budget = self._budget or Budget()
         while done < stretches and code == kernel_four_state.DONE:
             heed()
+            if budget.left <= 0.0:
+                code = kernel.PAUSED
+                break
             last = min(done + chunk, stretches)
             code = kernel_four_state.advance(
                 tables.data,
@@ -302,6 +344,7 @@ class Flow:
             )
             if code == kernel_four_state.LEFT:
                 return None
+            self._charge(budget, counts[done : done + int(cursor[1])], points)
             done += int(cursor[1])
         met = int(trail.met[0])
         if met > capacity and measure:  # more impacts than room: again, with room for all
@@ -323,6 +366,16 @@ class Flow:
             tangencies=int(trail.graze[2]) if measure else 0,
             clipped_time=0.0,
         )
+
+    def _chunk(self) -> int:
+        """Periods of a fast path between two looks at ``interrupt`` and the budget."""
+        periods = SLICE / (FAST_PERIOD + FAST_STEP * self.steps_a_period)
+        return max(1, min(CHUNK, int(periods)))
+
+    def _charge(self, budget: Budget, counts: NDArray[np.int64], points: int = 1) -> None:
+        """Take from the budget what a fast path ran; counts : (stretches, 2) impacts."""
+        a_period = FAST_PERIOD + FAST_STEP * self.steps_a_period
+        budget.take(len(counts) / points * a_period + FAST_IMPACT * float(counts.sum()))
 
     def _number(self, key: ModeKey) -> int:
         """Index of the mode in the tables, which are filled on its first use."""
@@ -368,6 +421,7 @@ _STATUS = {
     kernel.DONE: FlowStatus.DONE,
     kernel.TOO_MANY_EVENTS: FlowStatus.CHATTER,
     kernel.DIVERGED: FlowStatus.DIVERGED,
+    kernel.PAUSED: FlowStatus.TOO_LONG,
 }
 
 

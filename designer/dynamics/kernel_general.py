@@ -28,8 +28,10 @@ Int = NDArray[np.int64]
 
 ORDER = 18
 """Taylor order: 0.5**19/19! is 1.6e-23."""
-DONE, UNKNOWN_MODE, TOO_MANY_EVENTS, DIVERGED = 0, 1, 2, 3
+DONE, UNKNOWN_MODE, TOO_MANY_EVENTS, DIVERGED, PAUSED = 0, 1, 2, 3, 4
 """Return codes of ``advance``."""
+CHANGE, TANGENT = 20.0, 4.0
+"""What a change of mode, and a step that carries tangent vectors, cost, in plain steps."""
 FINEST = 1e-10
 TANGENCY = 1e-13
 """Of a guard's unit: below it a value is not told from zero."""
@@ -293,8 +295,8 @@ def advance(
 ) -> int:
     """Carry z to strobe number ``until`` of ``log``; resumable.
 
-    z : (N,) augmented state, overwritten. clock : (2,) time in the stretch, impacts met (logged
-    as far as the log reaches).
+    z : (N,) augmented state, overwritten. clock : (3,) time in the stretch, impacts met (logged
+    as far as the log reaches), steps that are left: with none left it returns PAUSED.
     cursor : (4,) stretch index, mode index, events in this stretch and, on UNKNOWN_MODE, the guard
     whose target is missing. anchor : (stretches a period, 2) the drive's exact sine and cosine at
     the start of each stretch, so that its phase does not drift. phi : (n, k) tangent vectors,
@@ -306,6 +308,9 @@ def advance(
     work = np.empty((n, n))
     c = np.empty(tables.guard.shape[2])
     while cursor[0] < until:
+        if clock[2] <= 0.0:
+            return PAUSED
+        clock[2] -= 1.0 if phi.shape[0] == 0 else TANGENT
         mode = cursor[1]
         h = tables.step[mode]
         left = stretch - clock[0]
@@ -381,6 +386,7 @@ def advance(
                         log.at[k, i] = z[i]
             cursor[1] = other
             cursor[2] += 1
+            clock[2] -= CHANGE
             if cursor[2] > max_events:
                 return TOO_MANY_EVENTS
             continue

@@ -17,7 +17,15 @@ from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.si_unit import Unit
 from designer.base.version import __version__
-from designer.bifurcations import basins, captions, parameter_map, sweep, window_ends
+from designer.bifurcations import (
+    basins,
+    captions,
+    parameter_map,
+    point_captions,
+    sweep,
+    titles,
+    window_ends,
+)
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.store import GridStore, SweepStore, work_hash
 from designer.bifurcations.subject import Subject
@@ -141,9 +149,11 @@ def _make(
             count = len(window_ends.windows(made))
             step = progress.stage("bifurcation points", count)
             points = window_ends.locate(made, jobs, step)
+        unit = plan.subject.units.get(plan.parameter, "")
+        symbol = titles.NAMES.get(plan.parameter, plan.parameter)
         body = {
             "parameter": plan.parameter,
-            "unit": plan.subject.units.get(plan.parameter, ""),
+            "unit": unit,
             **({} if si is None else {"si_unit": si.name}),
             "tracks": list(plan.tracks),
             "steps": len(plan.values),
@@ -151,6 +161,7 @@ def _make(
             "points": [
                 {
                     **_with_si(p.as_dict(), si),
+                    "caption": point_captions.caption(p, symbol, unit),
                     "changes": [c.as_dict() for c in captions.changes(made, p)],
                 }
                 for p in points

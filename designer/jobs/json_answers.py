@@ -137,6 +137,7 @@ def simulate_json(
                     }
                     for i, o in enumerate(s.others, start=1)
                 ],
+                "starts": None if s.coexistence is None else s.coexistence.as_dict(),
                 "engine": s.settings,
                 "trust": s.trust.as_dict(),
                 "cost": {"periods": s.orbit.periods, "seconds": s.seconds},

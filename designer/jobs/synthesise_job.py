@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from designer.base.default_counts import SEED, STARTS
 from designer.base.design_folder import (
     COMPARISON,
     DESIGN,
@@ -162,6 +163,8 @@ def simulate_answer(
     overwrite: bool = False,
     rung: Rung = "ideal",
     frequencies: tuple[str, ...] = (),
+    starts: int = STARTS,
+    seed: int = SEED,
 ) -> tuple[dict[str, Any], bool]:
     """The verb ``simulate``: its JSON object, and whether every wanted response was found
     and can be trusted.
@@ -195,8 +198,11 @@ def simulate_answer(
         progress=progress,
         traces=plots is not None,
         rung=rung,
+        starts=starts,
+        seed=seed,
     )
-    said = provenance(modelfile, catalog.hash, settings=simulation.engine_settings(engine, rung))
+    settings = {**simulation.engine_settings(engine, rung), "drawn_starts": starts}
+    said = provenance(modelfile, catalog.hash, seed=seed, settings=settings)
     seconds = time.perf_counter() - began
     answer = simulate_json(simulated, engine, said, seconds, modelfile.mechanical)
     if plots is not None:

@@ -18,16 +18,26 @@ from designer.model.mechanics import Clearance, SecondOrderSystem
 
 Sides = Literal["both", "upper", "lower"]
 
+TRIED = {
+    "m": (1e-9, 1.0 - 1e-9),
+    "k": (1e-9, 1.0 - 1e-9),
+    "c": (0.0, 1.0 - 1e-9),
+    "zeta": (0.0, 1e6),
+}
+"""Closed intervals beyond which a parameter is refused, though it is a number in its domain: the
+slowest and the fastest motion are then so far apart that the linear algebra, or a single drive
+period, comes to no end (docs/stability.md)."""
+
 
 @dataclass(frozen=True)
 class Dimensionless:
     """Dimensionless parameters, Eq. (3).
 
-    m, k in (0, 1); k0, c in [0, 1); zeta > 0; f20 in [0, 1]; b > 0.
+    m, k in (0, 1); k0, c in [0, 1); zeta > 0; f20 in [0, 1]; b > 0; and within ``TRIED``.
 
     Raises
     ------
-    InputError : a parameter lies outside its domain.
+    InputError : a parameter lies outside its domain, or outside what was tried of it.
     """
 
     m: float
@@ -57,6 +67,16 @@ class Dimensionless:
         for name, (fine, expected) in domains.items():
             if not fine:
                 raise InputError(None, f"model.{name}", getattr(self, name), expected)
+        for name, (low, high) in TRIED.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise InputError(
+                    None,
+                    f"model.{name}",
+                    value,
+                    f"a number from {low:g} to {_close(high)}: beyond it one drive period has more "
+                    "steps than can be run, or the equations are singular to rounding",
+                )
 
     @property
     def mu(self) -> float:
@@ -76,6 +96,11 @@ class Dimensionless:
             force=np.array([1.0 - self.f20, self.f20]),
             clearances=clearances,
         )
+
+
+def _close(value: float) -> str:
+    """A number near 1 with its distance from it."""
+    return f"1 - {1.0 - value:.0e}" if 0.99 < value < 1.0 else f"{value:g}"
 
 
 @dataclass(frozen=True)

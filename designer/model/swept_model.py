@@ -18,7 +18,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Setting
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.model import TRIED, Dimensionless, Mechanical
 from designer.model.si_units import units_of
 from designer.model.swept_tables import ModalBatch
 
@@ -123,10 +123,10 @@ DOMAINS = {
     "omega": (SLOWEST, FASTEST),
     "b": (SMALLEST, GREATEST),
     "k0": (0.0, BELOW_ONE),
-    "zeta": (SMALLEST, GREATEST),
-    "m": (SMALLEST, BELOW_ONE),
-    "k": (SMALLEST, BELOW_ONE),
-    "c": (0.0, BELOW_ONE),
+    "zeta": (SMALLEST, TRIED["zeta"][1]),
+    "m": TRIED["m"],
+    "k": TRIED["k"],
+    "c": TRIED["c"],
     "f20": (0.0, 1.0),
 }
 """Closed intervals in which a model's parameter can be followed (``model.Dimensionless``)."""

@@ -27,6 +27,7 @@ from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.continuation import End
 from designer.bifurcations.doubling_cascade import Cascade
+from designer.bifurcations.point_captions import caption
 from designer.bifurcations.store import write_sweep
 from designer.bifurcations.windows import NOT_LOCATED, BranchWindow, all_windows, outside
 from designer.catalog.catalog import load_catalog
@@ -267,7 +268,7 @@ def _plain(dynamics: Dynamics, extent: Extent, said: Mapping[str, Any]) -> dict[
         "from": extent.low,
         "to": extent.high,
         "windows": [w.as_dict() for w in dynamics.windows],
-        "points": [p.as_dict() for p in dynamics.found.points],
+        "points": [{**p.as_dict(), "caption": caption(p, "ω")} for p in dynamics.found.points],
         "cascades": {str(p): c.as_dict() for p, c in dynamics.cascades.items()},
         "coexisting": {f"{w:g}": list(names) for w, names in dynamics.shared.items()},
         "from_rest": {f"{w:g}": orbit.response for w, orbit in dynamics.chatter},

@@ -7,11 +7,13 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from designer.base.default_counts import STARTS
 from designer.base.design_folder import TOLERANCE
 from designer.check.checked_design import Checked
+from designer.check.coexistence import beside
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.report import words
@@ -65,12 +67,21 @@ def response_table(data: ReportData) -> Table:
                 "not asked" if c.ngspice is None else c.ngspice.response,
                 "yes" if c.agrees else "no",
                 words.yes(c.model.orbit.symmetric),
-                ", ".join(o.response for o in c.model.others) or "none met",
+                _coexisting(data, c),
             )
             for c in data.checked
         ),
         (0, *_mechanism_columns(data)),
     )  # fmt: skip
+
+
+def _coexisting(data: ReportData, checked: Checked) -> str:
+    """The other attractors of the model with their shares of the starts."""
+    model = replace(data.modelfile.model, b=checked.model.b)
+    others = [
+        f"{b.orbit.response} ({100 * b.count / STARTS:.3g} %)" for b in beside(model, checked.model)
+    ]
+    return f"{', '.join(others) or 'none'}, of {STARTS} starts"
 
 
 def settings_table(data: ReportData) -> Table:

@@ -1,3 +1,6 @@
+from . import (
+    random_streams as random_streams,
+)
 from .board_quantities import (
     Quantity as Quantity,
     between as between,

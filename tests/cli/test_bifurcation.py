@@ -217,6 +217,8 @@ def test_goes_on_after_a_kill(model: Path, tmp_path: Path, tracks: list[str]) ->
     assert {**one, "cost": 0} == {**other, "cost": 0}
     for path in sorted((whole / "sweep.parquet").iterdir()):
         assert (out / "sweep.parquet" / path.name).read_bytes() == path.read_bytes()
+    for picture in ("sweep.svg", "sweep.png"):
+        assert (out / picture).read_bytes() == (whole / picture).read_bytes()
 
 
 def _finished(*words: str | Path) -> tuple[int, str]:

@@ -15,7 +15,7 @@ from designer.catalog.entries import Case, mounting_of
 from designer.centering import design_search
 from designer.check import synthesis_result
 from designer.cli import entry
-from designer.jobs import search_job, study_job
+from designer.jobs import search_job, study_stage
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.synthesis import parts_choice
 from designer.synthesis.parts_choice import check_choices
@@ -170,7 +170,7 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for module, name in (
         (synthesis_result, "synthesise"), (design_search, "stretches"), (parts_choice, "_reach"),
-        (study_job.Help, "of"), (search_job, "SpicePool"),
+        (study_stage.Help, "of"), (search_job, "SpicePool"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, fail)
 

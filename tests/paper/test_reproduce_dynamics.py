@@ -253,7 +253,11 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(bifurcation_plots, "diagram", titled)
     found = reproduce(out, extent=few)
     data = json.loads((out / "dynamics.json").read_text(encoding="utf-8"))
+    captions = [p.pop("caption") for p in data["points"]]
     assert data["points"] == [p.as_dict() for p in found.found.points]
+    assert all(
+        f" at ω = {p['value']:.9g}: " in c for p, c in zip(data["points"], captions, strict=True)
+    )
     assert len(data["windows"]) == len(found.windows)
     assert data["provenance"]["versions"]["numpy"] == np.__version__
     said = data["provenance"]

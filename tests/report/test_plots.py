@@ -114,6 +114,26 @@ def test_no_text_is_cut_off_or_covered(name: str) -> None:
     assert overlapping(figure) == []
 
 
+@pytest.mark.parametrize("name", sorted(_figures()))
+def test_the_last_digits_of_the_layout_do_not_show(name: str) -> None:
+    """The layout's solver goes through its variables by address: two processes differ by that."""
+    documents = []
+    for shift in (0.0, 1e-13):
+        figure = _figures()[name]()
+        figure_style.to_svg(figure)  # lays it out
+        figure.set_layout_engine("none")
+        for axes in figure.axes:
+            box = axes.get_position()
+            axes.set_position((box.x0 + shift, box.y0 + shift, box.width - shift, box.height))
+        documents.append(figure_style.to_svg(figure))
+    assert documents[0] == documents[1]
+    root = ElementTree.fromstring(documents[0])
+    names = [e.attrib["id"] for e in root.iter() if "id" in e.attrib]
+    assert len(names) == len(set(names))
+    meant = set(re.findall(r'(?:href="#|url\(#)([^")]+)', documents[0]))
+    assert meant <= set(names)
+
+
 def test_no_state_is_left_behind_and_none_is_taken_over() -> None:
     draw = _figures()["portrait"]
     plain = figure_style.to_svg(draw())

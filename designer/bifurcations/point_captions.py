@@ -1,0 +1,84 @@
+"""What happens at a bifurcation point, in words: on which orbit, stable where, and what is born.
+
+By the continued branch alone: the orbit at the point, its multipliers right beside it, and the
+first orbits of what leaves it. What a sweep shows there is another matter (``point_changes``).
+"""
+
+from __future__ import annotations
+
+from designer.bifurcations.points import SIDES, Bifurcation, Kind
+
+NAMES = {
+    Kind.PITCHFORK: "pitchfork",
+    Kind.DOUBLING: "period doubling",
+    Kind.FOLD: "fold",
+    Kind.GRAZING: "grazing",
+    Kind.TORUS: "torus bifurcation",
+}
+"""Of the kinds, in a sentence."""
+
+
+def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
+    """Such as "period doubling of 1-2-2 asymmetric at ω = 0.718977872: stable above, unstable
+    below; 2-4-4 is born below, stable".
+
+    parameter : how it is written; "" leaves out where the point lies. unit : of it.
+    """
+    place = f" at {parameter} = {point.value:.9g}{' ' + unit if unit else ''}" if parameter else ""
+    whose = "" if point.kind is Kind.GRAZING else f" of {label(point.response, point.symmetric)}"
+    return f"{NAMES[point.kind]}{whose}{place}: {_what(point)}"
+
+
+def label(response: str, symmetric: bool | None) -> str:
+    """The response with its symmetry, where it has one."""
+    words = {True: " symmetric", False: " asymmetric", None: ""}
+    return response + words[symmetric if response.count("-") == 2 else None]
+
+
+def doubled(response: str) -> str:
+    """The counts over twice the period: "1-2-2" becomes "2-4-4"."""
+    return "-".join(str(2 * int(k)) for k in response.split("-"))
+
+
+def _what(point: Bifurcation) -> str:
+    if point.kind is Kind.FOLD:
+        return _fold(point)
+    if point.kind is Kind.GRAZING:
+        above, below = point.after, point.before
+        if point.direction < 0:
+            above, below = below, above
+        counts = (
+            f"{label(below, point.symmetric)} below, {label(above, point.symmetric)} above; "
+            "the counts of impacts change"
+        )
+        return f"{counts}; {_stability(point)}"
+    return f"{_stability(point)}; {_born(point)}"
+
+
+def _stability(point: Bifurcation) -> str:
+    """Of the branch on both sides."""
+    sides = point.stable_sides
+    assert sides is not None
+    if sides[1] is sides[-1]:
+        return "stable on both sides" if sides[1] else "unstable on both sides"
+    return "stable above, unstable below" if sides[1] else "stable below, unstable above"
+
+
+def _fold(point: Bifurcation) -> str:
+    which = "a stable and an unstable orbit" if any(point.stable) else "two unstable orbits"
+    return f"{which} meet, both {SIDES[point.side]}; {SIDES[-point.side]} there is neither"
+
+
+def _born(point: Bifurcation) -> str:
+    if point.kind is Kind.TORUS:
+        return "quasi-periodic motion is born"
+    born = point.born
+    response = point.response if born is None else born.response
+    if point.kind is Kind.DOUBLING and born is None:
+        response = doubled(point.response)
+    where = ""
+    if born is not None:
+        where = f" {SIDES[born.side]}, {'stable' if born.stable else 'unstable'}"
+    if point.kind is Kind.PITCHFORK:
+        return f"its two asymmetric twins {response} are born{where}"
+    return f"{response} is born{where}"

@@ -1,0 +1,228 @@
+"""Which attractors coexist, and what share of the starts in a box of initial states each takes.
+
+The states are drawn evenly from the box ± a few static deflections (``find_responses.scale_of``),
+all at drive phase 0. That is the box whose planes ``basins`` shows. Start number i of a seed is the
+same whatever number of starts is asked for (``samples``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.checks import at_least
+from designer.base.default_counts import SEED, STARTS
+from designer.base.errors import InputError
+from designer.base.proportion import wilson
+from designer.dynamics import step_budget
+from designer.dynamics.attractors import mirrored_strobes, same, settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.dynamics.step_budget import Budget
+from designer.model.find_responses import ModelResponse, scale_of
+from designer.model.model import Dimensionless
+from designer.spread import random_streams
+
+MOST_STARTS = 100_000
+STATES = ("x1", "x1'", "x2", "x2'")
+NEAR = 1e-6
+"""Of the peak: strobes of one orbit, from different starts, lie nearer than this."""
+ALIKE = 1e-3
+"""Of the peak: extremes of two orbits without an exact mirror that are alike or mirror images."""
+
+
+@dataclass(frozen=True)
+class Basin:
+    """An attractor, and how many starts end on it.
+
+    orbit : the one of two mirror twins that was met first. count : starts that end on it or on
+    its twin. twins : those of them that end on the twin; None where it is its own or none is told
+    apart (aperiodic motions are all one).
+    """
+
+    orbit: Orbit
+    count: int
+    twins: int | None
+
+
+@dataclass(frozen=True)
+class Coexistence:
+    """Where the starts in a box end.
+
+    starts : how many were run; asked : how many were asked for: more where all starts together
+    would have taken more than ``step_budget.STARTS`` steps. seed : that they were drawn with.
+    box : (states,) half-widths, of every state at drive phase 0, in model units. basins : the
+    known attractors first, then those met, in order. not_settled : starts for which no attractor
+    was seen.
+    """
+
+    starts: int
+    asked: int
+    seed: int
+    box: Array
+    basins: tuple[Basin, ...]
+    not_settled: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """By the keys of the contract."""
+        return {
+            "count": self.starts,
+            "asked": self.asked,
+            "seed": self.seed,
+            "phase": 0.0,
+            "box": dict(zip(STATES, self.box.tolist(), strict=True)),
+            "attractors": [
+                {
+                    "response": b.orbit.response,
+                    "symmetric": b.orbit.symmetric,
+                    "count": b.count,
+                    "on_twin": b.twins,
+                    **self._share(b.count),
+                }
+                for b in self.basins
+            ],
+            "not_settled": {"count": self.not_settled, **self._share(self.not_settled)},
+        }
+
+    def _share(self, count: int) -> dict[str, float]:
+        low, high = wilson(count, self.starts)
+        return {"share": count / self.starts, "low": low, "high": high}
+
+
+def check(starts: int) -> None:
+    """Raises InputError for a number of starts that cannot be."""
+    at_least("--starts", starts, 1)
+    if starts > MOST_STARTS:
+        raise InputError(None, "--starts", starts, f"at most {MOST_STARTS}")
+
+
+def drawn(box: Array, count: int, seed: int) -> Array:
+    """(count, states) initial states, even in the box ± ``box`` (states,)."""
+    names = [f"start {name}" for name in STATES]
+    return np.asarray(box * (2.0 * random_streams.cube(seed, names, range(count)) - 1.0))
+
+
+@lru_cache(maxsize=64)
+def of_model(
+    model: Dimensionless, omega: float, starts: int = STARTS, seed: int = SEED
+) -> Coexistence:
+    """Of the model under a drive of frequency ``omega``, by the exact flow; largest share first."""
+    flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
+    met = of_flow(flow, scale_of(model, omega), starts, seed)
+    return replace(met, basins=tuple(sorted(met.basins, key=lambda b: -b.count)))
+
+
+def beside(model: Dimensionless, response: ModelResponse) -> tuple[Basin, ...]:
+    """What coexists with a response of the model, by ``STARTS`` starts: the largest share first,
+    then what was met on the way to it alone.
+
+    model : with the clearance of the response.
+    """
+    flow = Flow(model.second_order().piecewise_linear(), Drive(response.omega))
+    met = of_model(model, response.omega).basins
+    rest = [
+        Basin(o, 0, None)
+        for o in response.others
+        if o.status in ANSWERS and not any(same(flow, o, b.orbit) for b in met)
+    ]
+    return (*(b for b in met if not same(flow, b.orbit, response.orbit)), *rest)
+
+
+def of_flow(
+    flow: Flow,
+    box: Array,
+    starts: int,
+    seed: int,
+    known: Sequence[Orbit] = (),
+    unit: Array | None = None,
+) -> Coexistence:
+    """Where the starts end under a flow.
+
+    box : (states,) half-widths in model units. known : attractors that are listed first, in this
+    order. unit : (states,) size of a model unit in the flow's states; ones by default.
+    """
+    states = drawn(box, starts, seed) * (1.0 if unit is None else unit)
+    tally = _Tally(flow, known)
+    run, unsettled = tally.take(states)
+    return Coexistence(run, starts, seed, box, tally.basins(), unsettled)
+
+
+# ---------------------------------------------------------------------------------------------
+
+
+class _Tally:
+    """Counts starts by the attractor that they end on."""
+
+    def __init__(self, flow: Flow, known: Sequence[Orbit]) -> None:
+        self._flow = flow
+        self._orbits: list[Orbit] = []
+        self._images: list[tuple[Array, Array]] = []
+        self._counts: list[list[int]] = []
+        for orbit in known:
+            self._add(orbit)
+
+    def take(self, states: Array) -> tuple[int, int]:
+        """Settle these starts while there are steps left; returns how many were run, and how many
+        of them lead to no attractor."""
+        left, run, unsettled = float(step_budget.STARTS), 0, 0
+        for x in states:
+            if left <= 0.0:
+                break
+            budget = Budget(min(step_budget.SETTLING, left))
+            orbit = settle(self._flow, x, budget=budget)
+            left -= budget.spent
+            run += 1
+            if orbit.status not in ANSWERS:
+                unsettled += 1
+                continue
+            place = self._place(orbit) or (self._add(orbit), 0)
+            self._counts[place[0]][place[1]] += 1
+        return run, unsettled
+
+    def basins(self) -> tuple[Basin, ...]:
+        """In the order in which they were met."""
+        rows = zip(self._orbits, self._counts, strict=True)
+        return tuple(
+            Basin(orbit, sum(counts), counts[1] if orbit.symmetric is False else None)
+            for orbit, counts in rows
+        )
+
+    def _add(self, orbit: Orbit) -> int:
+        laps = mirrored = np.zeros((0, self._flow.system.size))
+        if orbit.n and len(orbit.start):
+            mode = orbit.mode or None
+            laps = self._flow.run(orbit.start, orbit.n, mode=mode).strobes[:-1]
+            if self._flow.system.mirror is not None:
+                mirrored = mirrored_strobes(self._flow, orbit)
+        self._orbits.append(orbit)
+        self._images.append((laps, mirrored))
+        self._counts.append([0, 0])
+        return len(self._orbits) - 1
+
+    def _place(self, orbit: Orbit) -> tuple[int, int] | None:
+        """Number of the attractor that this is, and whether it is the twin (1) or itself (0)."""
+        for number, other in enumerate(self._orbits):
+            counts = {(other.n, other.p, other.q), (other.n, other.q, other.p)}
+            if orbit.status is not other.status or (orbit.n, orbit.p, orbit.q) not in counts:
+                continue
+            if orbit.status is not OrbitStatus.PERIODIC:
+                return number, 0
+            peak = np.abs(other.extremes).max(axis=1)
+            for twin, images in enumerate(self._images[number]):
+                if (np.abs(images - orbit.start) < NEAR * peak).all(axis=1).any():
+                    return number, twin
+            if self._flow.system.mirror is None and _mirrored(orbit, other, peak):
+                return number, 1
+        return None
+
+
+def _mirrored(a: Orbit, b: Orbit, peak: Array) -> bool:
+    """Whether two orbits without an exact mirror between them look like twins."""
+    image = -b.extremes[:, ::-1]
+    return bool((np.abs(a.extremes - image).max(axis=1) < ALIKE * peak).all())
