@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from designer.base.errors import InputError, Unreachable
 from designer.base.eseries import SERIES, series_values
+from designer.base.reading import read_bytes, reading
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
 from designer.catalog.entries import (
@@ -341,7 +342,8 @@ def load_catalog(extra: Path | None = None) -> Catalog:
 def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry], str], Entry]:
     """The entries of a folder, files in the order of their names; other files are left alone."""
     found: dict[tuple[type[Entry], str], Entry] = {}
-    files = (path for path in folder.iterdir() if path.suffix in (".toml", ".csv"))
+    with reading(folder, "a folder of catalogue files", "the folder"):
+        files = [path for path in folder.iterdir() if path.suffix in (".toml", ".csv")]
     for path in sorted(files, key=lambda each: each.name):
         content, entries = read_catalog_file(path)
         digest.update(f"{path.name} {len(content)}\n".encode())
@@ -352,7 +354,7 @@ def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry],
                 raise InputError(path, "name", entry.name, "names that this folder uses once")
             found[key] = entry
     for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
-        content = path.read_bytes()
+        content = read_bytes(path, "a layout that can be read")
         digest.update(f"{LAYOUTS}/{path.name} {len(content)}\n".encode())
         digest.update(content)
     return found

@@ -6,13 +6,12 @@ gives with it, when the file is read.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable
 from pathlib import Path
 
 from designer.base.errors import InputError
 from designer.base.eseries import series_values
+from designer.base.reading import csv_rows, decode, read_bytes
 from designer.base.schema import checked, one_of, parse_toml
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.entries import (
@@ -44,20 +43,8 @@ def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
     ------
     InputError : the file cannot be read, or anything in it is wrong.
     """
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(_MAX_BYTES + 1)
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise InputError(path, "the file", reason, "a catalogue file that can be read") from None
-    if len(content) > _MAX_BYTES:
-        raise InputError(path, "the file", f"more than {_MAX_BYTES} bytes", "a catalogue file")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        row = content[: error.start].count(b"\n") + 1
-        found = f"byte 0x{content[error.start]:02x}"
-        raise InputError(path, f"line {row}", found, "text in UTF-8") from None
+    content = read_bytes(path, "a catalogue file that can be read", most=_MAX_BYTES)
+    text = decode(content, path)
     if path.suffix == ".csv":
         return content, tuple(_from_csv(text, str(path)))
     entries = tuple(_from_toml(text, str(path)))
@@ -87,26 +74,23 @@ def _from_toml(text: str, file: str) -> Iterable[Entry]:
 
 def _from_csv(text: str, file: str) -> Iterable[Entry]:
     """Part families, one a row; the columns are the keys of a TOML table, and ``format``."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    rows = csv_rows(text, file)
     known = ["format", *sorted(FamilyTable.model_fields)]
-    try:
-        header = next(reader, [])
-        for name in header:
-            if name not in known:
-                raise InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
-        for row in reader:
-            place = f"line {reader.line_num}"
-            if not row:
-                continue
-            if len(row) != len(header):
-                raise InputError(file, place, f"{len(row)} cells", f"{len(header)}, as the header")
-            cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
-            if cells.pop("format", "") != "1":
-                raise InputError(file, f"{place}.format", "no 1", "1 in a column format")
-            table = {key: _cell(key, cell) for key, cell in cells.items() if cell}
-            yield _family(checked(FamilyTable, table, file, within=place), file, place)
-    except csv.Error as error:
-        raise InputError(file, f"line {reader.line_num}", str(error), "a CSV file") from None
+    _, header = next(rows, (1, []))
+    for name in header:
+        if name not in known:
+            raise InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
+    for number, row in rows:
+        place = f"line {number}"
+        if not row:
+            continue
+        if len(row) != len(header):
+            raise InputError(file, place, f"{len(row)} cells", f"{len(header)}, as the header")
+        cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
+        if cells.pop("format", "") != "1":
+            raise InputError(file, f"{place}.format", "no 1", "1 in a column format")
+        table = {key: _cell(key, cell) for key, cell in cells.items() if cell}
+        yield _family(checked(FamilyTable, table, file, within=place), file, place)
 
 
 def _cell(key: str, cell: str) -> object:

@@ -9,7 +9,6 @@ is reported, KiCad has dropped the rules, and nothing it says of them counts.
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -20,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from designer.base.errors import InputError
+from designer.base.reading import parse_json
 from designer.base.sexpr import Expression, read, write
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_reader import BoardFile
@@ -130,7 +131,7 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
             timeout=PATIENCE,
             check=False,
         )
-        found = json.loads(out.read_text(encoding="utf-8"))
+        found = parse_json(out.read_bytes(), out)
     except subprocess.TimeoutExpired:
         raise CheckFailed(f"kicad-cli gave no answer within {PATIENCE:g} s") from None
     except OSError:
@@ -138,7 +139,7 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
         raise CheckFailed(
             f"kicad-cli wrote no report: {said[-1] if said else 'no reason'}"
         ) from None
-    except ValueError:
+    except InputError:
         raise CheckFailed("kicad-cli wrote a report that is no JSON") from None
     if not isinstance(found, dict) or not isinstance(found.get("violations"), list):
         raise CheckFailed("kicad-cli wrote a report of another kind")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
+from designer.base.keyed_store import Vouch, nobody
 from designer.model.tuning_bands import Bands
 from designer.yields.blame_analysis import Blame
 from designer.yields.layers import CHUNK, SEARCH
@@ -75,7 +76,8 @@ def study_files(options: Options, responses: int) -> list[str]:
 
 class FolderStores(Stores):
     """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
-    is told of blocks that are of another study. kept : where the blame is."""
+    is told of blocks that are damaged or of another study. kept : where the blame is. vouch : asked
+    about blocks of earlier versions (``Folder.vouches``)."""
 
     def __init__(
         self,
@@ -83,7 +85,9 @@ class FolderStores(Stores):
         guard: Callable[[], None],
         note: Callable[[str], None] = lambda _: None,
         kept: Kept | None = None,
+        vouch: Vouch = nobody,
     ) -> None:
+        self._vouch = vouch
         self._root, self._guard, self._note, self._kept = root, guard, note, kept
         self._stores: dict[str, BlockStore[Any]] = {}
 
@@ -136,6 +140,7 @@ class FolderStores(Stores):
                 size=size,
                 guard=self._guard,
                 note=self._note,
+                vouch=self._vouch,
             )
         return self._stores[folder]
 

@@ -146,14 +146,14 @@ def _studied(
 ) -> tuple[RunResult, Iterable[str]]:
     """Checks and study of a design in its folder, and the files of the study's blocks."""
     ready = time.perf_counter()
-    kept = Kept(folder / KEPT, lambda content: folder.write(KEPT, content))
+    kept = Kept(folder / KEPT, folder.write, progress.note, folder.vouches)
     equations, checked = _checks(folder, made, help_.pool, kept, progress)
     if checked[0].gate is not None and checked[0].gate.passed:
         folder.rewrite("circuit.cir", design_files.circuit_deck(made, checked[0]))
         kicad_files.settle(folder, made, checked[0])
     gated = time.perf_counter()
     guard = folder.watch()
-    stores = FolderStores(folder.path, guard, progress.note, kept)
+    stores = FolderStores(folder.path, guard, progress.note, kept, folder.vouches)
     study = tolerance(
         made,
         samples=options.samples,
