@@ -37,7 +37,8 @@ Row = Mapping[str, Any]
 
 def measure(folder: Path) -> dict[str, list[dict[str, Any]]]:
     """All pieces; those that are in the folder already are taken as they are."""
-    store = CaseStore(folder, FILES, resume=(folder / "cases").is_dir(), place="the folder")
+    begun = (folder / "cases").is_dir()
+    store = CaseStore(folder, FILES, resume=begun, place="the folder", note=print)
     store.expect(KEY)
     flow = [
         store.piece(s.name, lambda s=s: plain(stability_flow.measure(s)))  # type: ignore[misc]

@@ -19,10 +19,10 @@ from .csv_tables import (
     csv_text as csv_text,
 )
 from .default_counts import (
+    DRAWN_STARTS as DRAWN_STARTS,
     SAMPLES as SAMPLES,
     SEARCH_SAMPLES as SEARCH_SAMPLES,
     SEED as SEED,
-    STARTS as STARTS,
     TRADE_BOARDS as TRADE_BOARDS,
 )
 from .design_folder import (
@@ -93,7 +93,21 @@ from .jit import (
 from .jit_notice import (
     announced as announced,
 )
+from .keyed_store import (
+    DAMAGED as DAMAGED,
+    UNSEALED as UNSEALED,
+    KeyedStore as KeyedStore,
+    Lines as Lines,
+    Note as Note,
+    Vouch as Vouch,
+    nobody as nobody,
+    quiet as quiet,
+    read_line as read_line,
+    sealed_line as sealed_line,
+)
 from .manifest import (
+    MANIFEST as MANIFEST,
+    Stage as Stage,
     StageName as StageName,
     file_hash as file_hash,
     read_json as read_json,
@@ -103,6 +117,10 @@ from .natural_sort import (
 )
 from .netlist_guard import (
     check_netlist as check_netlist,
+)
+from .parquet_entry import (
+    ParquetForm as ParquetForm,
+    Rows as Rows,
 )
 from .plain_json import (
     FORMAT as FORMAT,
@@ -117,6 +135,15 @@ from .progress import (
 )
 from .proportion import (
     wilson as wilson,
+)
+from .reading import (
+    UNREADABLE as UNREADABLE,
+    csv_rows as csv_rows,
+    decode as decode,
+    parse_json as parse_json,
+    read_bytes as read_bytes,
+    read_text as read_text,
+    reading as reading,
 )
 from .report_guard import (
     check_ours as check_ours,
@@ -144,6 +171,9 @@ from .schema import (
     shown as shown,
     span as span,
     validated as validated,
+)
+from .seal import (
+    BLANK as BLANK,
 )
 from .sexpr import (
     Atom as Atom,

@@ -10,5 +10,5 @@ SEARCH_SAMPLES = 4000
 """Fresh boards of the study at the end of a search."""
 TRADE_BOARDS = 400
 """Boards of each response in a trade: with fewer no yield can be shown to within 1 %."""
-STARTS = 200
+DRAWN_STARTS = 200
 """Initial states that ``simulate`` draws, for the shares of the attractors."""

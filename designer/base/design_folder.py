@@ -28,6 +28,7 @@ from designer.base.manifest import (
     State,
     file_hash as file_hash,
     grown,
+    object_hash,
     read_json as read_json,
     read_manifest,
 )
@@ -57,6 +58,8 @@ class Folder:
         self.manifest = read_manifest(path)
         if self.manifest is None:
             _check_free(path)
+        listed = {} if self.manifest is None else self.manifest.files
+        self._digests = {name: digest for name, (_, digest) in listed.items() if digest}
 
     def __truediv__(self, name: str) -> Path:
         return self.path / name
@@ -135,6 +138,11 @@ class Folder:
             if digest != file_hash(name, content):
                 return name
         return None
+
+    def vouches(self, name: str, content: bytes) -> bool:
+        """Whether the manifest, as it was when the folder was opened, knows a file of this name
+        with this content."""
+        return name in self._digests and self._digests[name] == file_hash(name, content)
 
     def begin(
         self,
@@ -288,8 +296,23 @@ class Folder:
             yield name
 
     def json(self, name: str) -> dict[str, Any]:
-        """The object in one of the folder's JSON files."""
-        return read_json(self / name)
+        """The object in one of the folder's JSON files.
+
+        Raises
+        ------
+        InputError : it is none, or another than the manifest says.
+        """
+        value = read_json(self / name)
+        listed = {} if self.manifest is None else self.manifest.files
+        _, digest = listed.get(name, ("", None))
+        if digest is not None and digest != object_hash(value):
+            raise InputError(
+                self / name,
+                "its sha256",
+                "another than in manifest.json",
+                "the file as it was written, or --overwrite to make it again",
+            )
+        return value
 
     def _save(self) -> None:
         assert self.manifest is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ from typing import Any, Literal, get_args
 
 from designer.base.errors import MISSING, InputError
 from designer.base.hashing import sha256
+from designer.base.reading import UNREADABLE, parse_json, read_bytes
 
 FORMAT = 1
 MANIFEST = "manifest.json"
@@ -112,37 +114,36 @@ def grown(known: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
         return False
     return all(
         mine == theirs
-        or (isinstance(mine, list) and isinstance(theirs, list) and _lasting(mine) <= set(theirs))
+        or (
+            isinstance(mine, list)
+            and isinstance(theirs, list)
+            and all(each in theirs for each in _lasting(mine))
+        )
         for mine, theirs in ((known[key], wanted[key]) for key in known)
     )
 
 
-def _lasting(items: list[Any]) -> set[Any]:
-    return {i for i in items if not (isinstance(i, str) and i.startswith(REPLACED))}
+def _lasting(items: list[Any]) -> list[Any]:
+    return [i for i in items if not (isinstance(i, str) and i.startswith(REPLACED))]
 
 
 def file_hash(name: str, content: bytes) -> str:
     """Hash of a file as the manifest states it: a JSON file's without its object ``cost``."""
     if name.endswith(".json"):
-        try:
-            value = json.loads(content)
-            value.pop("cost", None)
-            content = json.dumps(value, sort_keys=True).encode("ascii")
-        except (ValueError, AttributeError):
-            pass
+        with contextlib.suppress(*UNREADABLE):  # damaged: its bytes then
+            return object_hash(json.loads(content))
     return sha256(content)
+
+
+def object_hash(value: Mapping[str, Any]) -> str:
+    """Hash of the object of a JSON file as the manifest states it."""
+    rest = {key: part for key, part in value.items() if key != "cost"}
+    return sha256(json.dumps(rest, sort_keys=True).encode("ascii"))
 
 
 def read_json(path: Path) -> dict[str, Any]:
     """The object in a JSON file of a folder; InputError where there is none."""
-    try:
-        value = json.loads(path.read_bytes())
-    except OSError as error:
-        gone = isinstance(error, FileNotFoundError)
-        reason = MISSING if gone else error.strerror or str(error)
-        raise InputError(path, "the file", reason, "JSON") from None
-    except ValueError as error:
-        raise InputError(path, "the file", str(error), "JSON") from None
+    value = parse_json(read_bytes(path, "JSON"), path)
     if not isinstance(value, dict):
         raise InputError(path, "the file", type(value).__name__, "a JSON object")
     if value.get("format") != FORMAT:
@@ -157,23 +158,40 @@ def read_manifest(path: Path) -> Manifest | None:
     if file.stat().st_size > _MAX_MANIFEST:
         raise InputError(file, "the file", "too large a file", "a manifest")
     value = read_json(file)
-    try:
-        if value["tool"] != "designer":
-            raise ValueError
-        stages: dict[str, Stage] = {
-            name: _stage(value["stages"][name]) for name in STAGES if name in value["stages"]
-        }
-        files = {
-            _inside(path, name): (str(said["stage"]), said["sha256"])
-            for name, said in value["files"].items()
-        }
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise InputError(file, "the file", "something else", "a manifest of this tool") from None
-    return Manifest(stages, files, value.get("provenance", {}))
+    if value.get("tool") != "designer":
+        raise InputError(file, "tool", value.get("tool"), '"designer": a manifest of this tool')
+    known, listed = (_object(value.get(field), file, field) for field in ("stages", "files"))
+    stages: dict[str, Stage] = {
+        name: _stage(known[name], file, f"stages.{name}") for name in STAGES if name in known
+    }
+    files = {}
+    for name, said in listed.items():
+        field = f"files.{name}"
+        said = _object(said, file, field)
+        stage, digest = said.get("stage"), said.get("sha256")
+        if not (isinstance(stage, str) and (digest is None or isinstance(digest, str))):
+            raise InputError(file, field, said, "a stage and a sha256")
+        files[_inside(path, name)] = (stage, digest)
+    return Manifest(stages, files, _object(value.get("provenance", {}), file, "provenance"))
 
 
-def _stage(said: Mapping[str, Any]) -> Stage:
-    return Stage(dict(said["inputs"]), said["complete"], dict(said.get("kept", {})))
+def _stage(value: object, file: Path, field: str) -> Stage:
+    said = _object(value, file, field)
+    inputs = _object(said.get("inputs"), file, f"{field}.inputs")
+    kept = _object(said.get("kept", {}), file, f"{field}.kept")
+    complete = said.get("complete")
+    if not isinstance(complete, bool):
+        raise InputError(file, f"{field}.complete", complete, "true or false")
+    layers = inputs.get("layers", [])
+    if not (isinstance(layers, list) and all(isinstance(each, str) for each in layers)):
+        raise InputError(file, f"{field}.inputs.layers", layers, "a list of names")
+    return Stage(inputs, complete, kept)
+
+
+def _object(value: object, file: Path, field: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(file, field, value, "an object")
+    return value
 
 
 def _inside(root: Path, name: str) -> str:

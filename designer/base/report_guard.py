@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection
 from pathlib import Path
 
 from designer.base.atomic_write import PART
 from designer.base.errors import InputError
+from designer.base.reading import parse_json, read_bytes
 
 
 def check_ours(out: Path, names: Collection[str], data: str, command: str) -> None:
@@ -38,7 +38,7 @@ def check_ours(out: Path, names: Collection[str], data: str, command: str) -> No
 
 def _says(path: Path, command: str) -> bool:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = parse_json(read_bytes(path, "JSON"), path)
+    except InputError:
         return False
     return isinstance(data, dict) and data.get("command") == command

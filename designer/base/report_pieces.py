@@ -1,7 +1,8 @@
 """The pieces of a long report, each on disk as soon as it is done.
 
 A piece is a JSON file in the folder ``cases`` of the report, with a key that says what it was made
-of. The report's own files are made of the pieces; a file of somebody else's is not written over.
+of, and a seal (``base.keyed_store``): one that was damaged since is made again. The report's
+own files are made of the pieces; a file of somebody else's is not written over.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from designer.base.atomic_write import write
 from designer.base.errors import InputError
+from designer.base.keyed_store import SEAL, KeyedStore, Note, quiet
+from designer.base.reading import parse_json, read_bytes
+from designer.base.seal import BLANK, intact
 
 FOLDER = "cases"
 
@@ -24,7 +27,7 @@ class CaseStore:
     ----------
     out : the report's folder, which is made. files : names of the report's own files. resume : go
     on with the pieces that are there. place : what messages call ``out``, where the command has no
-    ``--out`` and no ``--resume``, since it always goes on.
+    ``--out`` and no ``--resume``, since it always goes on. note : told of damaged pieces.
 
     Raises
     ------
@@ -33,11 +36,18 @@ class CaseStore:
     """
 
     def __init__(
-        self, out: Path, files: Iterable[str], *, resume: bool, place: str | None = None
+        self,
+        out: Path,
+        files: Iterable[str],
+        *,
+        resume: bool,
+        place: str | None = None,
+        note: Note = quiet,
     ) -> None:
         self._out, self._folder, self._files = out, out / FOLDER, tuple(files)
         self._place, self._option = place or "--out", place or "--resume"
         self._keys: str | Mapping[str, str] = {}
+        self._store: KeyedStore[dict[str, Any]] = KeyedStore(self._folder, _Json(), note)
         begun = self._folder.is_dir() and any(self._folder.iterdir())
         if begun and not resume:
             raise InputError(self._folder, self._place, "results", "an empty folder, or --resume")
@@ -76,10 +86,9 @@ class CaseStore:
         path = self._folder / f"{name}.json"
         known = self._read(path)
         if known is None:
-            known = {"key": self._key(name), **make()}
-            text = json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False)
-            write(path, text + "\n")
-        return {k: v for k, v in known.items() if k != "key"}
+            known = dict(make())
+            self._store.write(path.name, {"key": self._key(name)}, known)
+        return known
 
     def _key(self, name: str) -> str:
         return self._keys if isinstance(self._keys, str) else self._keys[name]
@@ -91,8 +100,8 @@ class CaseStore:
                 raise InputError(self._out / name, self._place, found, "a folder without it")
 
     def _read(self, path: Path) -> dict[str, Any] | None:
-        known = read_piece(path, self._option)
-        if known is not None and known.get("key") != self._key(path.stem):
+        key = self._key(path.stem)
+        if read_key(path, self._option) not in (None, key):
             found = "a piece of other settings"
             raise InputError(
                 path,
@@ -101,24 +110,47 @@ class CaseStore:
                 "the same settings, or another folder; to make the report anew in this one, "
                 f"delete {self._folder} and what was made beside it",
             )
-        return known
+        return self._store.read(path.name, {"key": key})
 
 
-def read_piece(
-    path: Path, option: str, what: str = "a piece of this report"
-) -> dict[str, Any] | None:
-    """A piece as it stands on the disk; None where there is none.
+class _Json:
+    """A JSON object with its key first and its seal last (``keyed_store.Form``)."""
+
+    def encode(self, head: Mapping[str, Any], value: Mapping[str, Any]) -> bytes:
+        known = {**head, **value, SEAL: BLANK}
+        text = json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False)
+        return f"{text}\n".encode()
+
+    def decode(self, content: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
+        known = parse_json(content, None)
+        head = {"key": known.pop("key")}
+        known.pop(SEAL, None)
+        return head, known
+
+
+_BEGINS = b'{\n "key": '
+"""How a piece begins; cut off or not."""
+
+
+def read_key(path: Path, option: str, what: str = "a piece of this report") -> str | None:
+    """The key of a piece; None where there is no file, or one that was damaged or cut off.
 
     Raises
     ------
     InputError : it cannot be read, or is no piece; in the name of ``option``.
     """
-    try:
-        known = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         return None
-    except (OSError, ValueError) as error:
-        raise InputError(path, option, str(error), what) from None
-    if not isinstance(known, dict):
-        raise InputError(path, option, type(known).__name__, what)
-    return known
+    content = read_bytes(path, what, option)
+    if intact(content) is False:
+        return None
+    try:
+        known = parse_json(content, path, what, option)
+    except InputError as error:
+        if content.startswith(_BEGINS) or _BEGINS.startswith(content):
+            return None
+        raise InputError(path, option, error.found, what) from None
+    if not isinstance(known, dict) or not isinstance(known.get("key"), str):
+        found = "no key" if isinstance(known, dict) else type(known).__name__
+        raise InputError(path, option, found, what)
+    return str(known["key"])

@@ -15,7 +15,10 @@ from designer.base.errors import InputError
 
 DEEPEST = 100
 """Levels of nesting that a file may have; KiCad's own have about a dozen."""
+LARGEST = 1e9
+"""Size of a number: KiCad's own lengths are below 2147 mm. Squares and products stay finite."""
 
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _TOKEN = re.compile(
     r'(?P<space>\s+)|(?P<open>\()|(?P<close>\))|"(?P<quoted>(?:[^"\\]|\\.)*)"'
     r'|(?P<bare>[^\s()"]+)',
@@ -87,12 +90,11 @@ class Expression:
     def number(self, index: int = 0) -> float:
         """The number at this place after the name; InputError where there is none."""
         text = self.text(index)
-        try:
-            value = float(text)
-        except ValueError:
-            raise self.error(text, "a number") from None
-        if value != value or abs(value) == float("inf"):
-            raise self.error(text, "a finite number")
+        if not _NUMBER.fullmatch(text):
+            raise self.error(text, "a number")
+        value = float(text)
+        if abs(value) > LARGEST:
+            raise self.error(text, f"a number of a size up to {LARGEST:g}")
         return value
 
     def walk(self) -> Iterator[Expression]:

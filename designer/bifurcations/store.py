@@ -1,7 +1,7 @@
 """Finished blocks of a sweep, a map or a basin on disk, as Parquet.
 
 Every file says which work it belongs to and carries the provenance; it appears whole or not at
-all.
+all, and one that was damaged since is not taken (``base.keyed_store``).
 """
 
 from __future__ import annotations
@@ -10,15 +10,16 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from designer.base.arrays import Array
-from designer.base.atomic_write import appearing
+from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
+from designer.base.parquet_entry import ParquetForm, Rows
 from designer.bifurcations.parameter_map import Cell
 from designer.bifurcations.sweep import Sweep
 from designer.dynamics.orbit import OrbitStatus
@@ -27,7 +28,6 @@ from designer.dynamics.steady_state import Steady
 FORMAT = 1
 RULES = 2
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
-_KEY = b"designer"
 _COLUMNS = [
     ("status", pa.string()),
     ("n", pa.int64()),
@@ -64,8 +64,9 @@ def write_sweep(path: Path, made: Sweep, provenance: Mapping[str, Any]) -> None:
         for track, steps in made.steps.items()
         for row in _rows(parameter, track, [float(v) for v in made.plan.values], steps)
     ]
-    said = {"format": FORMAT, "work": work_hash(made.plan.as_dict())}
-    write_rows(path, rows, _sweep_schema(parameter), said, provenance)
+    key = {"format": FORMAT, "work": work_hash(made.plan.as_dict())}
+    store: KeyedStore[Rows] = KeyedStore(path.parent, ParquetForm(_sweep_schema(parameter)))
+    store.write(path.name, key, rows, {"provenance": provenance})
 
 
 def _sweep_schema(parameter: str) -> pa.Schema:
@@ -86,13 +87,15 @@ class SweepStore:
     """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``.
 
     parameter : name of the swept parameter's column. work : hash of the plan. provenance : goes
-    into every file.
+    into every file. note, vouch : as of ``KeyedStore``.
     """
 
     root: Path
     parameter: str
     work: str
     provenance: Mapping[str, Any]
+    note: Note = quiet
+    vouch: Vouch = nobody
 
     @staticmethod
     def name(track: str, block: int) -> str:
@@ -101,12 +104,11 @@ class SweepStore:
 
     def read(self, track: str, block: int) -> list[Steady] | None:
         """The steps of a finished block of this very work, or None."""
-        schema = _sweep_schema(self.parameter)
-        rows = read_rows(self.root / self.name(track, block), schema, self._said(track, block))
+        rows = self._store.read(self.name(track, block), self._key(track, block))
         if rows is None:
             return None
         out = []
-        for row in rows:
+        for row in map(dict, rows):
             del row["track"], row[self.parameter]
             row["status"] = OrbitStatus(row["status"])
             for key in ("start", "end", "minima", "velocities"):
@@ -116,12 +118,16 @@ class SweepStore:
 
     def write(self, track: str, block: int, values: Sequence[float], steps: list[Steady]) -> None:
         """Keep a finished block; rows in the order in which the steps were made."""
-        schema = _sweep_schema(self.parameter)
         rows = _rows(self.parameter, track, values, steps)
-        said = self._said(track, block)
-        write_rows(self.root / self.name(track, block), rows, schema, said, self.provenance)
+        more = {"provenance": self.provenance}
+        self._store.write(self.name(track, block), self._key(track, block), rows, more)
 
-    def _said(self, track: str, block: int) -> dict[str, Any]:
+    @cached_property
+    def _store(self) -> KeyedStore[Rows]:
+        form = ParquetForm(_sweep_schema(self.parameter))
+        return KeyedStore(self.root, form, self.note, self.vouch)
+
+    def _key(self, track: str, block: int) -> dict[str, Any]:
         return {"format": FORMAT, "work": self.work, "track": track, "block": block}
 
 
@@ -129,7 +135,8 @@ class SweepStore:
 class GridStore:
     """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in ``root``.
 
-    kind : "map" or "basins". x, y : names of the axes' columns; xs, ys : their values.
+    kind : "map" or "basins". x, y : names of the axes' columns; xs, ys : their values. note,
+    vouch : as of ``KeyedStore``.
     """
 
     root: Path
@@ -140,6 +147,8 @@ class GridStore:
     ys: Array
     work: str
     provenance: Mapping[str, Any]
+    note: Note = quiet
+    vouch: Vouch = nobody
 
     @staticmethod
     def name(kind: str, row: int) -> str:
@@ -148,11 +157,11 @@ class GridStore:
 
     def read(self, row: int) -> list[Cell] | None:
         """The cells of a finished row of this very work, or None."""
-        rows = read_rows(self.root / self.name(self.kind, row), self._schema, self._said(row))
+        rows = self._store.read(self.name(self.kind, row), self._key(row))
         if rows is None or len(rows) != len(self.xs):
             return None
         out = []
-        for each in rows:
+        for each in map(dict, rows):
             del each[self.x], each[self.y]
             each["status"] = OrbitStatus(each["status"])
             each["strobe"] = tuple(each["strobe"])
@@ -165,8 +174,12 @@ class GridStore:
         for cell in cells:
             said = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
             rows.append({**said, **cell.__dict__, "status": str(cell.status)})
-        path = self.root / self.name(self.kind, row)
-        write_rows(path, rows, self._schema, self._said(row), self.provenance)
+        name = self.name(self.kind, row)
+        self._store.write(name, self._key(row), rows, {"provenance": self.provenance})
+
+    @cached_property
+    def _store(self) -> KeyedStore[Rows]:
+        return KeyedStore(self.root, ParquetForm(self._schema), self.note, self.vouch)
 
     @property
     def _schema(self) -> pa.Schema:
@@ -181,42 +194,5 @@ class GridStore:
             ]
         )
 
-    def _said(self, row: int) -> dict[str, Any]:
+    def _key(self, row: int) -> dict[str, Any]:
         return {"format": FORMAT, "work": self.work, "row": row}
-
-
-def read_rows(
-    path: Path, schema: pa.Schema, said: Mapping[str, Any]
-) -> list[dict[str, Any]] | None:
-    """Rows of a file that says ``said`` of itself; None where there is none such."""
-    if not path.is_file():
-        return None
-    try:
-        table = pq.read_table(path, schema=schema, partitioning=None)
-        found = json.loads((pq.read_schema(path).metadata or {}).get(_KEY, b"{}"))
-    except (OSError, ValueError, pa.ArrowException):
-        return None
-    if {k: found.get(k) for k in said} != dict(said):
-        return None
-    rows: list[dict[str, Any]] = table.to_pylist()
-    return rows
-
-
-def write_rows(
-    path: Path,
-    rows: Sequence[Mapping[str, Any]],
-    schema: pa.Schema,
-    said: Mapping[str, Any],
-    provenance: Mapping[str, Any],
-) -> None:
-    """Write a Parquet file all at once.
-
-    Raises
-    ------
-    InputError : it cannot be written.
-    """
-    known = json.dumps({**said, "provenance": provenance}, sort_keys=True)
-    with appearing(path) as partial:
-        path.parent.mkdir(exist_ok=True)
-        table = pa.Table.from_pylist([dict(r) for r in rows], schema=schema)
-        pq.write_table(table.replace_schema_metadata({_KEY: known}), partial)

@@ -15,6 +15,7 @@ from pydantic import BaseModel, Field
 
 from designer.base.csv_tables import csv_text
 from designer.base.errors import MISSING, InputError
+from designer.base.reading import read_text
 from designer.base.schema import (
     STRICT,
     Accepts,
@@ -102,17 +103,7 @@ def _layout(name: str, folders: Sequence[Path]) -> Layout:
 
 
 def _read(name: str, path: Path) -> Layout:
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(_MAX_BYTES + 1)
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise InputError(path, "the file", reason, "a layout that can be read") from None
-    except UnicodeDecodeError:
-        raise InputError(path, "the file", "other bytes", "text in UTF-8") from None
-    if len(content) > _MAX_BYTES:
-        raise InputError(path, "the file", f"more than {_MAX_BYTES} bytes", "a layout")
+    text = read_text(path, "a layout that can be read", most=_MAX_BYTES)
     table = checked(_LayoutTable, parse_toml(text, str(path)), str(path))
     for number, column in enumerate(table.columns, start=1):
         if (column.field is None) == (column.text is None):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from designer.base.errors import InputError
 from designer.base.natural_sort import natural
+from designer.base.reading import read_bytes, reading
 from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
@@ -121,16 +122,14 @@ def read_board(path: Path) -> BoardFile:
     ------
     InputError : it cannot be read, is cut off, is no board, or is newer than KiCad 9.
     """
-    try:
-        size = path.stat().st_size
-        if size > LARGEST:
-            raise InputError(path, "--board", f"{size} bytes", f"{EXPECTED}, up to {LARGEST}")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(path, "--board", error.strerror or str(error), EXPECTED) from None
-    except ValueError:
-        raise InputError(path, "--board", "bytes that are no text in UTF-8", EXPECTED) from None
-    board = read(text, path)
+    content = read_bytes(path, f"{EXPECTED}, up to {LARGEST} bytes", "--board", LARGEST)
+    with reading(path, EXPECTED, "--board"):
+        text = content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    with reading(path, EXPECTED):
+        return _board(read(text, path), text, path)
+
+
+def _board(board: Expression, text: str, path: Path) -> BoardFile:
     if board.name != "kicad_pcb":
         raise InputError(path, "--board", f"({board.name[:40]} …)", EXPECTED)
     _check_version(board)
@@ -193,7 +192,7 @@ def _few(words: Sequence[str], between: str = ", ") -> str:
 
 def _check_version(board: Expression) -> None:
     found = board.get("version").text()
-    if not found.isdigit():
+    if not (found.isascii() and found.isdecimal() and len(found) <= 8):  # a date, YYYYMMDD
         raise board.get("version").error(found, "the number of a file version")
     version = int(found)
     if version > NEWEST:

@@ -16,6 +16,7 @@ from pathlib import Path
 import platformdirs
 
 from designer.base.errors import MISSING, InputError, InputErrors
+from designer.base.reading import read_bytes, reading
 from designer.catalog.read import Entry, read_catalog_file
 
 ENVIRONMENT = "DESIGNER_CATALOGS"
@@ -56,7 +57,8 @@ def read_folders(extra: Path | None = None) -> Contents:
 def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry], str], Entry]:
     """The entries of a folder, files in the order of their names; other files are left alone."""
     found: dict[tuple[type[Entry], str], Entry] = {}
-    files = (path for path in folder.iterdir() if path.suffix in (".toml", ".csv"))
+    with reading(folder, "a folder of catalogue files", "the folder"):
+        files = [path for path in folder.iterdir() if path.suffix in (".toml", ".csv")]
     for path in sorted(files, key=lambda each: each.name):
         content, entries = read_catalog_file(path)
         digest.update(f"{path.name} {len(content)}\n".encode())
@@ -71,7 +73,7 @@ def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry],
         if twice:
             raise twice[0] if len(twice) == 1 else InputErrors(twice)
     for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
-        content = path.read_bytes()
+        content = read_bytes(path, "a layout that can be read")
         digest.update(f"{LAYOUTS}/{path.name} {len(content)}\n".encode())
         digest.update(content)
     return found

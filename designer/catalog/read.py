@@ -6,8 +6,6 @@ gives with it, when the file is read.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -17,6 +15,7 @@ from pydantic import BaseModel
 
 from designer.base.errors import MISSING, InputError, InputErrors, problems_in
 from designer.base.eseries import series_values
+from designer.base.reading import csv_rows, decode, read_bytes
 from designer.base.schema import one_of, parse_toml, validated
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.entries import (
@@ -59,20 +58,8 @@ def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
     InputError : the file cannot be read.
     InputErrors : more than one thing in it is wrong; names each.
     """
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(_MAX_BYTES + 1)
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise InputError(path, "the file", reason, "a catalogue file that can be read") from None
-    if len(content) > _MAX_BYTES:
-        raise InputError(path, "the file", f"more than {_MAX_BYTES} bytes", "a catalogue file")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        row = content[: error.start].count(b"\n") + 1
-        found = f"byte 0x{content[error.start]:02x}"
-        raise InputError(path, f"line {row}", found, "text in UTF-8") from None
+    content = read_bytes(path, "a catalogue file that can be read", most=_MAX_BYTES)
+    text = decode(content, path)
     if path.suffix == ".csv":
         return content, _from_csv(text, str(path))
     entries = _from_toml(text, str(path))
@@ -122,35 +109,32 @@ def _all_right(entries: Sequence[Entry], problems: Sequence[InputError]) -> tupl
 
 def _from_csv(text: str, file: str) -> tuple[Entry, ...]:
     """Part families, one a row; the columns are the keys of a TOML table, and ``format``."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    rows = csv_rows(text, file)
     known = ["format", *sorted(FamilyTable.model_fields)]
     entries: list[Entry] = []
-    try:
-        header = next(reader, [])
-        problems = [
-            InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
-            for name in header
-            if name not in known
-        ]
-        for row in reader if not problems else ():
-            place = f"line {reader.line_num}"
-            if not row:
-                continue
-            if len(row) != len(header):
-                expected = f"{len(header)}, as the header"
-                problems.append(InputError(file, place, f"{len(row)} cells", expected))
-                continue
-            cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
-            if cells.pop("format", "") != "1":
-                expected = "1 in a column format"
-                problems.append(InputError(file, f"{place}.format", "no 1", expected))
-            cut = {key: _cell(key, cell) for key, cell in cells.items() if cell}
-            table, wrong = validated(FamilyTable, cut, file, within=place)
-            problems += wrong
-            if table is not None:
-                _collect(partial(_family, table, file, place), entries, problems)
-    except csv.Error as error:
-        raise InputError(file, f"line {reader.line_num}", str(error), "a CSV file") from None
+    _, header = next(rows, (1, []))
+    problems = [
+        InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
+        for name in header
+        if name not in known
+    ]
+    for number, row in rows if not problems else ():
+        place = f"line {number}"
+        if not row:
+            continue
+        if len(row) != len(header):
+            expected = f"{len(header)}, as the header"
+            problems.append(InputError(file, place, f"{len(row)} cells", expected))
+            continue
+        cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
+        if cells.pop("format", "") != "1":
+            expected = "1 in a column format"
+            problems.append(InputError(file, f"{place}.format", "no 1", expected))
+        cut = {key: _cell(key, cell) for key, cell in cells.items() if cell}
+        table, wrong = validated(FamilyTable, cut, file, within=place)
+        problems += wrong
+        if table is not None:
+            _collect(partial(_family, table, file, place), entries, problems)
     return _all_right(entries, problems)
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from designer.base.errors import InputError
 from designer.base.inside_folder import inside
 from designer.base.netlist_guard import check_netlist
+from designer.base.reading import read_bytes
 
 PINS = ("inp", "inn", "out", "vcc", "vee")
 ELEMENTS = "BCDEFGHIJKLMQRSVWX"
@@ -78,14 +79,7 @@ def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path)
         what was said.
     """
     path = inside(folder, name, "spice.file")
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(MOST_BYTES + 1)
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise InputError(path, "the file", reason, "a SPICE model that can be read") from None
-    if len(content) > MOST_BYTES:
-        raise InputError(path, "the file", f"more than {MOST_BYTES} bytes", "an op-amp's model")
+    content = read_bytes(path, "an op-amp's SPICE model that can be read", most=MOST_BYTES)
     if sorted(pins) != sorted(PINS):
         raise InputError(path, "pins", ", ".join(pins), "each once: " + ", ".join(PINS))
     # Bytes outside ASCII are common in comments, and refused elsewhere.

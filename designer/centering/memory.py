@@ -1,33 +1,37 @@
 """What a search has asked boards already, kept in a file so that an interrupted one goes on.
 
-Lines of JSON: the first says which search, every further one a key and the boards that showed the
-response, by stretch. A last line that was cut short is left out.
+Lines of JSON, each with its seal (``base.keyed_store``): the first says which search, every
+further one a key and the boards that showed the response, by stretch. A last line that was cut
+short is left out, and so is a line that was damaged, which is said.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from designer.base.atomic_write import write
 from designer.base.errors import InputError
+from designer.base.keyed_store import DAMAGED, UNSEALED, Note, quiet, read_line, sealed_line
+from designer.base.reading import UNREADABLE, read_bytes
 
-FORMAT = 1
+FORMAT = 2
 
 
 class Memory:
     """Answers by key. path : where they are kept; in memory alone if None. whose : names the
-    search; what another one left is not read.
+    search; what another one left is not read. note : told of damaged lines.
 
     Raises
     ------
     InputError : the file cannot be read or written.
     """
 
-    def __init__(self, path: Path | None = None, whose: str = "") -> None:
-        self._path, self._whose = path, whose
+    def __init__(self, path: Path | None = None, whose: str = "", note: Note = quiet) -> None:
+        self._path, self._whose, self._note = path, whose, note
         self._known: dict[str, tuple[int, ...]] = {}
         self.asked = 0
         """How many answers were wanted, known or not."""
@@ -38,7 +42,7 @@ class Memory:
         self, said: list[Any], make: Callable[[list[int]], list[tuple[int, ...]]]
     ) -> list[tuple[int, ...]]:
         """The answers to many. make : those of the questions with these numbers."""
-        keys = [_key(one) for one in said]
+        keys = [_key(self._whose, one) for one in said]
         new = [k for k, key in enumerate(keys) if key not in self._known]
         self.asked += len(keys)
         if new:
@@ -48,44 +52,63 @@ class Memory:
         return [self._known[key] for key in keys]
 
     def _read(self, path: Path) -> None:
-        try:
-            lines = path.read_text(encoding="ascii").splitlines() if path.exists() else []
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(path, "the file", str(error), "candidates of a search") from None
-        head = self._head()
-        if not lines or lines[0] != head:
-            self._put(f"{head}\n", new=True)
+        expected = "candidates of a search"
+        content = read_bytes(path, expected) if path.exists() else b""
+        first, *rest = content.split(b"\n")
+        head = _values(first)
+        before = first.startswith(b'{"format": 1, ')
+        if before:
+            self._note(f"{path}: {UNSEALED}")
+        if before or not rest or (head is not None and head != self._head()):
+            write(path, self._text([]))
             return
-        whole = []
-        for line in lines[1:]:
-            try:
-                key, ok = json.loads(line)
-                self._known[str(key)] = tuple(int(v) for v in ok)
-            except (ValueError, TypeError):
-                break
-            whole.append(line)
-        if len(whole) < len(lines) - 1:
-            self._put("\n".join([head, *whole]) + "\n", new=True)
+        unfinished = rest.pop()  # empty where the last line ends as it ought to
+        answers = [_answer(line) for line in rest]
+        self._known |= dict(filter(None, answers))
+        damaged = sum(each is None for each in (head, *answers))
+        if damaged:
+            count = "1 line is" if damaged == 1 else f"{damaged} lines are"
+            self._note(f"{path}: {count} {DAMAGED}")
+        if damaged or unfinished:
+            write(path, self._text(list(self._known.items())))
 
-    def _head(self) -> str:
-        return json.dumps({"format": FORMAT, "search": self._whose})
+    def _head(self) -> list[Any]:
+        return [{"format": FORMAT, "search": self._whose}]
+
+    def _text(self, known: Iterable[tuple[str, tuple[int, ...]]]) -> str:
+        lines = [self._head(), *([key, list(ok)] for key, ok in known)]
+        return "".join(f"{sealed_line(line)}\n" for line in lines)
 
     def _write(self, made: dict[str, tuple[int, ...]]) -> None:
-        if self._path is not None:
-            lines = [json.dumps([key, list(ok)]) for key, ok in made.items()]
-            self._put("\n".join(lines) + "\n", new=False)
-
-    def _put(self, text: str, *, new: bool) -> None:
-        assert self._path is not None
+        if self._path is None:
+            return
+        lines = [sealed_line([key, list(ok)]) for key, ok in made.items()]
         try:
-            with self._path.open("w" if new else "a", encoding="ascii") as stream:
-                stream.write(text)
+            with self._path.open("a", encoding="ascii") as stream:
+                stream.write("\n".join(lines) + "\n")
         except OSError as error:
             raise InputError(
                 self._path, "the file", error.strerror or str(error), "a file that can be written"
             ) from None
 
 
-def _key(said: Any) -> str:
-    text = json.dumps(said, sort_keys=True)
+def _values(line: bytes) -> list[Any] | None:
+    """The values of a line; None where it is damaged."""
+    try:
+        return read_line(line)
+    except (*UNREADABLE, InputError):
+        return None
+
+
+def _answer(line: bytes) -> tuple[str, tuple[int, ...]] | None:
+    """Key and answer of a line; None where it is damaged."""
+    try:
+        key, ok = read_line(line)
+        return str(key), tuple(int(v) for v in ok)
+    except (*UNREADABLE, InputError):
+        return None
+
+
+def _key(whose: str, said: Any) -> str:
+    text = json.dumps([whose, said], sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()[:24]

@@ -16,7 +16,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.checks import at_least
-from designer.base.default_counts import SEED, STARTS
+from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.errors import InputError
 from designer.base.proportion import wilson
 from designer.dynamics import step_budget
@@ -110,7 +110,7 @@ def drawn(box: Array, count: int, seed: int) -> Array:
 
 @lru_cache(maxsize=64)
 def of_model(
-    model: Dimensionless, omega: float, starts: int = STARTS, seed: int = SEED
+    model: Dimensionless, omega: float, starts: int = DRAWN_STARTS, seed: int = SEED
 ) -> Coexistence:
     """Of the model under a drive of frequency ``omega``, by the exact flow; largest share first."""
     flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
@@ -119,8 +119,8 @@ def of_model(
 
 
 def beside(model: Dimensionless, response: ModelResponse) -> tuple[Basin, ...]:
-    """What coexists with a response of the model, by ``STARTS`` starts: the largest share first,
-    then what was met on the way to it alone.
+    """What coexists with a response of the model, by ``DRAWN_STARTS`` starts: the largest share
+    first, then what was met on the way to it alone.
 
     model : with the clearance of the response.
     """

@@ -14,7 +14,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.checks import cores
-from designer.base.default_counts import SEED, STARTS
+from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
@@ -95,7 +95,7 @@ def simulate(
     progress: Progress | None = None,
     traces: bool = False,
     rung: Rung = "ideal",
-    starts: int = STARTS,
+    starts: int = DRAWN_STARTS,
     seed: int = SEED,
 ) -> tuple[Simulated, ...]:
     """The responses of a model file, or what is reached from rest at ``omegas``.

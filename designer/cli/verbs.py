@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from designer.base.default_counts import SEED, STARTS
+from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.version import __version__
@@ -187,7 +187,7 @@ def simulate(
         typer.Option(
             "--starts", metavar="N", help="Initial states that are drawn: the attractors' shares."
         ),
-    ] = STARTS,
+    ] = DRAWN_STARTS,
     seed: Seed = SEED,
     plots: Annotated[
         Path | None,

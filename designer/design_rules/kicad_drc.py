@@ -10,7 +10,6 @@ says of them counts.
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -22,6 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from designer.base.errors import InputError
+from designer.base.reading import parse_json
 from designer.base.sexpr import Expression, expression_text, read
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_reader import BoardFile
@@ -144,7 +145,7 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
             timeout=PATIENCE,
             check=False,
         )
-        found = json.loads(out.read_text(encoding="utf-8"))
+        found = parse_json(out.read_bytes(), out)
     except subprocess.TimeoutExpired:
         raise CheckFailed(f"kicad-cli gave no answer within {PATIENCE:g} s") from None
     except OSError:
@@ -152,7 +153,7 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
         raise CheckFailed(
             f"kicad-cli wrote no report: {said[-1] if said else 'no reason'}"
         ) from None
-    except ValueError:
+    except InputError:
         raise CheckFailed("kicad-cli wrote a report that is no JSON") from None
     lists = ("violations", "unconnected_items")
     if not isinstance(found, dict) or not all(isinstance(found.get(n), list) for n in lists):

@@ -1,7 +1,8 @@
 """The pieces of a trade, each kept as soon as it is done: interrupted work goes on from them.
 
 Of each response one piece with every rung, and one for every ``CHUNK`` boards. They stand in one
-file of the design folder, which goes when the trade is finished.
+file of the design folder, a line each with its own seal (``base.keyed_store``), which goes when
+the trade is finished.
 """
 
 from __future__ import annotations
@@ -13,9 +14,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from designer.base.errors import InputError
-from designer.base.manifest import read_json
-from designer.base.plain_json import FORMAT, dumps, plain
+from designer.base.keyed_store import Lines, Note, quiet
+from designer.base.plain_json import plain
 from designer.fidelity.label import Label
 from designer.fidelity.rung_errors import Compared, Truth
 from designer.fidelity.yields import Tally
@@ -29,15 +29,18 @@ CHUNK = 100
 class Pieces:
     """Pieces by name, as they were found in ``known`` or are made now.
 
-    save : puts the text of the file where it belongs; by default nowhere.
+    key : of all that decides a piece. save : puts the text of the file where it belongs; by default
+    nowhere.
     """
 
     def __init__(
         self,
         known: Mapping[str, Any] | None = None,
         save: Callable[[str], None] = lambda _: None,
+        key: str = "",
     ) -> None:
         self._pieces, self._save = dict(known or {}), save
+        self._lines = _lines(key)
 
     def __contains__(self, name: str) -> bool:
         return name in self._pieces
@@ -48,7 +51,7 @@ class Pieces:
             began = time.perf_counter()
             made = plain(make())
             self._pieces[name] = {**made, "elapsed": time.perf_counter() - began}
-            self._save(dumps({"format": FORMAT, "pieces": self._pieces}, indent=None))
+            self._save(self._lines.text(self._pieces))
         return dict(self._pieces[name])
 
     @property
@@ -57,22 +60,16 @@ class Pieces:
         return math.fsum(piece["elapsed"] for piece in self._pieces.values())
 
 
-def read_pieces(path: Path) -> dict[str, Any]:
-    """The pieces in a file; none where there is no file.
+def read_pieces(path: Path, key: str, note: Note = quiet) -> dict[str, dict[str, Any]]:
+    """The pieces of this key in a file that are as they were written; none where there is no file.
 
-    Raises
-    ------
-    InputError : it holds something else.
+    note : told of the others, which are made again.
     """
-    if not path.exists():
-        return {}
-    found = read_json(path).get("pieces")
-    if not (
-        isinstance(found, dict)
-        and all(isinstance(p, dict) and isinstance(p.get("elapsed"), float) for p in found.values())
-    ):
-        raise InputError(path, "pieces", "something else", "the pieces of a trade, or no file")
-    return found
+    return _lines(key).load(path, note)
+
+
+def _lines(key: str) -> Lines:
+    return Lines("pieces", key)
 
 
 def rungs_json(

@@ -72,7 +72,7 @@ def answer(
     if todo:
         kept = None if folder.manifest is None else folder.manifest.provenance
         folder.begin(wanted, kept or said)
-        made, figure = _make(plan, request, modelfile.title, folder.path, said, progress)
+        made, figure = _make(plan, request, modelfile.title, folder, said, progress)
         progress.stage("pictures")
         for name, content in _drawn(request.kind, figure()).items():
             folder.write(name, content)
@@ -128,7 +128,7 @@ def _make(
     plan: Plan,
     request: Request,
     name: str,
-    root: Path | None,
+    folder: Folder | None,
     said: Mapping[str, Any],
     progress: Progress,
 ) -> tuple[dict[str, Any], Callable[[], Any]]:
@@ -140,7 +140,10 @@ def _make(
     head = {"format": FORMAT, "kind": request.kind}
     tail = {"provenance": said}
     if isinstance(plan, SweepPlan):
-        store = None if root is None else SweepStore(root, plan.parameter, work, said)
+        store = None
+        if folder is not None:
+            vouch = folder.vouches
+            store = SweepStore(folder.path, plan.parameter, work, said, progress.note, vouch)
         blocks = sum(len(plan.blocks(t)) for t in plan.tracks)
         made = sweep.run(plan, jobs, store, progress.stage(f"sweep over {plan.parameter}", blocks))
         si = plan.subject.si.get(plan.parameter)
@@ -173,8 +176,9 @@ def _make(
             made, marks, name
         )
     grid = None
-    if root is not None:
-        grid = GridStore(root, request.kind, plan.x, plan.xs, plan.y, plan.ys, work, said)
+    if folder is not None:
+        axes = (request.kind, plan.x, plan.xs, plan.y, plan.ys)
+        grid = GridStore(folder.path, *axes, work, said, progress.note, folder.vouches)
     step = progress.stage(f"{request.kind} over {plan.x} and {plan.y}", len(plan.ys))
     body = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),

@@ -9,7 +9,6 @@ folder of its own.
 from __future__ import annotations
 
 import io
-import json
 import time
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import Any
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.keyed_store import Lines
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
@@ -36,6 +36,8 @@ from designer.model.model_file import naming, need_responses
 from designer.synthesis.tie_break import SOLVER
 
 CURE, STUDIES = "cure.json", "cure-studies.json"
+_LINES = Lines("studies", "verdicts")
+"""How the studies are written: each by its hash, which says all that decides it."""
 FRONT = ("cure-front.csv", "cure-front.png", "cure-front.svg")
 RULES = 5
 """Raised whenever the same inputs are to give another answer."""
@@ -113,7 +115,9 @@ def cure(
             "about the cured design (tolerance --rung ngspice)"
         )
     began = time.perf_counter()
-    known = _studies(place) if place.manifest and STUDIES in place.manifest.files else {}
+    known = {}
+    if place.manifest and STUDIES in place.manifest.files:
+        known = _LINES.load(place / STUDIES, said.note, place.vouches)
     provenance_ = provenance(
         base.modelfile, base.catalog.hash, seed=options.seed, settings={"highs": SOLVER}
     )
@@ -122,7 +126,7 @@ def cure(
 
     def save(studies: dict[str, Any]) -> None:
         guard()
-        place.write(STUDIES, dumps(studies, indent=None))
+        place.write(STUDIES, _LINES.text(studies["studies"]))
 
     with naming(base.modelfile):
         found = find_cure(
@@ -205,12 +209,3 @@ def _checked(target: float, budget: float | None, without: Collection[str]) -> f
             raise InputError(None, "--without", name, one_of(name, names))
         kinds.add(kind)
     return frozenset(kinds)
-
-
-def _studies(place: Folder) -> dict[str, dict[str, str]]:
-    """Verdicts that earlier work left; a damaged file is no reason to stop."""
-    try:
-        studies = json.loads((place / STUDIES).read_bytes())["studies"]
-        return {str(k): {str(b): str(v) for b, v in row.items()} for k, row in studies.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return {}

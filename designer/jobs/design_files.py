@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from designer.base.checks import cores
 from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.plain_json import dumps
+from designer.base.reading import csv_rows, read_text, reading
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import Checked
@@ -107,8 +108,8 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     with naming(modelfile):
         opamp = catalog.opamp(spec.opamp, spec.supply)
     system = model.second_order()
-    try:
-        values = {str(name): float(value) for name, value in said["parts"].items()}
+    with reading(file, "the design of this folder's model", "parts"):
+        values = {name: _size(value, file, name) for name, value in said["parts"].items()}
         circuit = build.build(
             terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
             values,
@@ -140,17 +141,25 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             checks=tuple(Check(**check) for check in told["checked"]),
             binding=dict(told["binding"]),
         )
-    except (KeyError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
-        raise InputError(
-            file, "parts", f"{type(error).__name__}: {error}", "the design of this folder's model"
-        ) from None
     return Synthesis(modelfile, catalog, found, design)
+
+
+def _size(value: object, file: Path, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0.0:
+        raise InputError(file, f"parts.{name}", value, "a number > 0, in ohm or farad")
+    return float(value)
 
 
 def starts(folder: Folder) -> tuple[str, ...]:
     """How to start each response, by the folder's ``setup.csv``."""
-    with (folder / SETUP).open(encoding="utf-8", newline="") as stream:
-        return tuple(row.get("start") or "" for row in csv.DictReader(stream))
+    path = folder / SETUP
+    rows = csv_rows(read_text(path, "the setup table of this design (CSV)"), path)
+    _, header = next(rows, (1, []))
+    if "start" not in header:
+        found = ", ".join(header) or "nothing"
+        raise InputError(path, "line 1", found, "a header with a column start")
+    at = header.index("start")
+    return tuple(row[at] if len(row) > at else "" for _, row in rows if row)
 
 
 def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:

@@ -85,7 +85,7 @@ def measured_into(
         provenance = {} if folder.manifest is None else folder.manifest.provenance
         folder.begin(stage, provenance)
         folder.write(PLACE.prefix + MEASURED, boards.content)
-        kept = PLACE.kept(folder)
+        kept = PLACE.kept(folder, progress.note)
         checked = checks(folder, made, help_.pool, kept, progress)
         work = Stage(folder, PLACE, made, options, command(options), progress, shown, 0.0)
         result = work.done(checked, kept, help_, time.perf_counter() - began)

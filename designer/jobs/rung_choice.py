@@ -16,8 +16,8 @@ from functools import partial
 from typing import Any
 
 from designer.base.design_folder import Folder
-from designer.base.errors import InputError
 from designer.base.progress import Progress
+from designer.base.reading import reading
 from designer.fidelity.rung_errors import BOARD
 from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
@@ -99,12 +99,8 @@ def _read(
     folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], Choice]
 ) -> Choice:
     said = folder.json(name)
-    try:
+    with reading(folder / name, f"what {name.removesuffix('.json')} wrote", key):
         return choice(said)
-    except (KeyError, TypeError, ValueError) as error:
-        found = f"{type(error).__name__}: {error}"
-        wrote = f"what {name.removesuffix('.json')} wrote"
-        raise InputError(folder / name, key, found, wrote) from None
 
 
 def _kept(model: object, said: Mapping[str, Any]) -> Choice:

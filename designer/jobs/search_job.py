@@ -16,7 +16,7 @@ from typing import Any
 from designer.base.checks import cores
 from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder
 from designer.base.errors import InputError
-from designer.base.manifest import StageName
+from designer.base.manifest import MANIFEST, StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.version import __version__
@@ -110,7 +110,7 @@ def searched_into(
     # trade.json goes with its design, and so before this is done.
     folder.begin({"search": (inputs, FILES)}, source, {"trade": trade} if trade else None)
     folder.write(ASKED, modelfile.text)
-    memory = Memory(folder / CANDIDATES, inputs["model"])
+    memory = Memory(folder / CANDIDATES, inputs["model"], progress.note)
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
         found = search(
             modelfile,
@@ -212,7 +212,7 @@ def _confirm(
     made: Synthesis, folder: Folder, options: Options, jobs: int, progress: Progress
 ) -> dict[str, Any]:
     checked = check(made, None, progress)
-    stores = FolderStores(folder.path, folder.watch())
+    stores = FolderStores(folder.path, folder.watch(), progress.note, vouch=folder.vouches)
     study = tolerance(
         made,
         samples=options.samples,
@@ -272,7 +272,10 @@ def _word(folder: Folder, modelfile: ModelFile, *, goes_on: bool) -> dict[str, A
     """What a trade says that stood here when the search began, as ``rung_choice.Choice``."""
     if goes_on:
         assert folder.manifest is not None
-        found: dict[str, Any] | None = folder.manifest.stages["search"].kept.get("trade")
+        found: object = folder.manifest.stages["search"].kept.get("trade")
+        if not (found is None or isinstance(found, dict)):
+            place = "stages.search.kept.trade"
+            raise InputError(folder / MANIFEST, place, found, "the word of a trade")
         return found
     word = rung_choice.before_search(folder, modelfile.sha256)
     return None if word is None else asdict(word)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
+from designer.base.keyed_store import Vouch, nobody
 from designer.base.manifest import StageName
 from designer.model.tuning_bands import Bands
 from designer.yields.blame_analysis import Blame
@@ -113,8 +114,9 @@ def study_files(options: Options, responses: int, census: bool = False) -> list[
 
 class FolderStores(Stores):
     """The layers of one study in a design folder; ``guard`` is asked before each write, ``note``
-    is told of blocks that are of another study. kept : where the blame is; pieces : where what is
-    known of one that is not whole. prefix : of the names in the folder, "" or ending in "/"."""
+    is told of blocks that are damaged or of another study. kept : where the blame is; pieces :
+    where what is known of one that is not whole. prefix : of the names in the folder, "" or ending
+    in "/". vouch : asked about blocks of earlier versions (``Folder.vouches``)."""
 
     def __init__(
         self,
@@ -124,7 +126,9 @@ class FolderStores(Stores):
         kept: Kept | None = None,
         pieces: Kept | None = None,
         prefix: str = "",
+        vouch: Vouch = nobody,
     ) -> None:
+        self._vouch = vouch
         self._root, self._guard, self._note, self._kept = root, guard, note, kept
         self._pieces, self._prefix = pieces, prefix
         self._stores: dict[str, BlockStore[Any]] = {}
@@ -195,6 +199,7 @@ class FolderStores(Stores):
                 size=size,
                 guard=self._guard,
                 note=self._note,
+                vouch=self._vouch,
             )
         return self._stores[folder]
 

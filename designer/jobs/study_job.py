@@ -95,7 +95,7 @@ def run_into(
                 design_files.renew_bills(folder, made)
         design_seconds = time.perf_counter() - began
         ready = time.perf_counter()
-        kept = PLACE.kept(folder)
+        kept = PLACE.kept(folder, progress.note)
         checked = checks(folder, made, help_.pool, kept, progress)
         first = checked[1][0]
         if first.gate is not None and first.gate.passed:

@@ -14,6 +14,7 @@ from typing import Any
 
 from designer.base.checks import cores
 from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
+from designer.base.keyed_store import Note
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
@@ -62,10 +63,16 @@ class Place:
         """The answer that stands there."""
         return run_json(folder.json(DESIGN), folder.json(self.prefix + TOLERANCE))
 
-    def kept(self, folder: Folder, name: str = KEPT) -> Kept:
-        """What is stored there under a name."""
-        path = self.prefix + name
-        return Kept(folder / path, lambda content: folder.write(path, content))
+    def kept(self, folder: Folder, note: Note, name: str = KEPT) -> Kept:
+        """What is stored there under a name. note : is told of a damaged file."""
+
+        def write(name: str, content: bytes) -> None:
+            folder.write(self.prefix + name, content)
+
+        def vouch(name: str, content: bytes) -> bool:
+            return folder.vouches(self.prefix + name, content)
+
+        return Kept(folder / (self.prefix + name), write, note, vouch)
 
 
 @dataclass
@@ -95,8 +102,16 @@ class Stage:
         folder, place = self.folder, self.place
         began, guard = time.perf_counter(), folder.watch()
         equations, responses = checked
-        pieces = place.kept(folder, PIECES)
-        stores = FolderStores(folder.path, guard, self.progress.note, kept, pieces, place.prefix)
+        pieces = place.kept(folder, self.progress.note, PIECES)
+        stores = FolderStores(
+            folder.path,
+            guard,
+            self.progress.note,
+            kept,
+            pieces,
+            place.prefix,
+            folder.vouches,
+        )
 
         def result_of(study: Study) -> RunResult:
             cost = {

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.default_counts import SEED, STARTS
+from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.design_folder import (
     COMPARISON,
     DESIGN,
@@ -163,7 +163,7 @@ def simulate_answer(
     overwrite: bool = False,
     rung: Rung = "ideal",
     frequencies: tuple[str, ...] = (),
-    starts: int = STARTS,
+    starts: int = DRAWN_STARTS,
     seed: int = SEED,
 ) -> tuple[dict[str, Any], bool]:
     """The verb ``simulate``: its JSON object, and whether every wanted response was found

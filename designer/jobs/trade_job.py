@@ -13,6 +13,7 @@ from typing import Any
 from designer.base.checks import cores
 from designer.base.default_counts import TRADE_BOARDS
 from designer.base.design_folder import Folder
+from designer.base.manifest import Stage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
@@ -146,7 +147,9 @@ def answer(
     if not todo:
         return folder.json(TRADE), True
     goes_on = "design" not in todo and folder.state("trade", inputs) == "unfinished"
-    known = read_pieces(folder / PIECES) if goes_on and options.resume else {}
+    key = Stage(inputs).hash
+    goes_on = goes_on and options.resume
+    known = read_pieces(folder / PIECES, key, progress.note) if goes_on else {}
     if "design" in todo:
         design_files.check(modelfile, catalog)
     progress.stage("responses of the model, parts")
@@ -166,7 +169,7 @@ def answer(
         guard()
         folder.write(PIECES, text)
 
-    document = _document(made, extent, Pieces(known, save), options, progress)
+    document = _document(made, extent, Pieces(known, save, key), options, progress)
     guard()
     _write(folder, document)
     (folder / PIECES).unlink(missing_ok=True)

@@ -10,9 +10,7 @@ Whatever is wrong with the file ends in an ``InputError`` that names its line.
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -21,6 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from designer.base.errors import InputError
+from designer.base.reading import csv_rows, decode, read_bytes
 from designer.base.schema import one_of
 from designer.base.units import parse_quantity
 
@@ -77,21 +76,8 @@ def read_measured(path: Path) -> Measured:
     ------
     InputError : the file cannot be read, or anything in it is wrong.
     """
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(_MOST_BYTES + 1)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(path, "the file", reason, "a list of measured values (CSV)") from None
-    if len(content) > _MOST_BYTES:
-        raise InputError(path, "the file", f"more than {_MOST_BYTES} bytes", "a list of parts")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        row = content[: error.start].count(b"\n") + 1
-        found = f"byte 0x{content[error.start]:02x}"
-        raise InputError(path, f"line {row}", found, "text in UTF-8") from None
-    return _Reader(path, content).read(text)
+    content = read_bytes(path, "a list of measured values (CSV)", most=_MOST_BYTES)
+    return _Reader(path, content).read(decode(content, path))
 
 
 class _Reader:
@@ -129,24 +115,19 @@ class _Reader:
 
     def rows(self, text: str) -> Iterator[dict[str, str]]:
         """Cells by column; ``row`` is the line of each while it is looked at."""
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-        try:
-            header = [cell.strip() for cell in next(reader, [])]
-            for name in header:
-                if name not in _COLUMNS:
-                    self.refuse(f"column {name!r}", one_of(name, _COLUMNS))
-            if len(set(header)) < len(header) or not {"part", "value"} <= set(header):
-                self.refuse(",".join(header), "columns part, value, and tolerance, board at will")
-            for row in reader:
-                self.row = reader.line_num
-                if not any(cell.strip() for cell in row):
-                    continue
-                if len(row) != len(header):
-                    self.refuse(f"{len(row)} cells", f"{len(header)}, as the header")
-                yield dict(zip(header, (cell.strip() for cell in row), strict=True))
-        except csv.Error as error:
-            self.row = reader.line_num
-            self.refuse(str(error), "a CSV file")
+        rows = csv_rows(text, self.path)
+        header = [cell.strip() for cell in next(rows, (1, []))[1]]
+        for name in header:
+            if name not in _COLUMNS:
+                self.refuse(f"column {name!r}", one_of(name, _COLUMNS))
+        if len(set(header)) < len(header) or not {"part", "value"} <= set(header):
+            self.refuse(",".join(header), "columns part, value, and tolerance, board at will")
+        for self.row, row in rows:
+            if not any(cell.strip() for cell in row):
+                continue
+            if len(row) != len(header):
+                self.refuse(f"{len(row)} cells", f"{len(header)}, as the header")
+            yield dict(zip(header, (cell.strip() for cell in row), strict=True))
 
     def number(self, text: str, unit: str) -> float:
         try:

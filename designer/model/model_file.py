@@ -17,7 +17,6 @@ found and what was expected; nothing is read by half.
 from __future__ import annotations
 
 import hashlib
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -27,6 +26,7 @@ from pydantic import BaseModel, Field
 
 from designer.base.errors import MISSING, InputError
 from designer.base.inside_folder import inside
+from designer.base.reading import read_text
 from designer.base.schema import (
     STRICT,
     Accepts,
@@ -115,31 +115,7 @@ def read_model_file(path: Path, *, measured: Path | None = None) -> ModelFile:
     InputError : the file cannot be read, or anything in it is wrong.
     """
     path = Path(path)
-    try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError(path, "the file", "a folder", "a model file (TOML)")
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(path, "the file", "no regular file", "a model file (TOML)")
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise InputError(path, "the file", MISSING, "a model file (TOML)") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(path, "the file", reason, "a model file that can be read") from None
-    if len(content) > MAX_BYTES:
-        raise InputError(
-            path, "the file", f"more than {MAX_BYTES} bytes", "a model file: a page of TOML"
-        )
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        row = content[: error.start].count(b"\n") + 1
-        raise InputError(
-            path, f"line {row}", f"byte 0x{content[error.start]:02x}", "text in UTF-8"
-        ) from None
-    modelfile = parse_model_file(text, path)
+    modelfile = parse_model_file(read_text(path, "a model file (TOML)", most=MAX_BYTES), path)
     named = modelfile.spread.measured
     if named is None:
         return modelfile

@@ -68,7 +68,7 @@ def reproduce(
     key = hashlib.sha256(
         json.dumps([FORMAT, __version__, asdict(extent), catalog.hash]).encode("ascii")
     ).hexdigest()
-    store = CaseStore(out, names(extent), resume=resume)
+    store = CaseStore(out, names(extent), resume=resume, note=said.note)
     store.expect(key)
     said.stage("responses of the model")
     bench = Bench.of(catalog, extent, jobs, said)

@@ -71,7 +71,7 @@ def reproduce(
     jobs = cores() if jobs is None else jobs
     for name, value, least in (("--samples", samples, 1), ("--seed", seed, 0), ("--jobs", jobs, 1)):
         at_least(name, value, least)
-    store = CaseStore(out, FILES, resume=resume)
+    store = CaseStore(out, FILES, resume=resume, note=said.note)
     catalog = load_catalog()
     said.stage("nominal circuits")
     asked = {

@@ -25,6 +25,7 @@ from designer.base.atomic_write import write
 from designer.base.checks import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import DesignerError
+from designer.base.manifest import read_json
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress, progress_for
 from designer.base.report_pieces import CaseStore
@@ -86,7 +87,7 @@ def report(
     options = Options(seed, jobs, samples, resume=True)
     rules = [__version__, search_job.RULES, study_identity.RULES]
     settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
-    store = CaseStore(out, FILES, resume=True, place="out")
+    store = CaseStore(out, FILES, resume=True, place="out", note=said.note)
     store.expect(dumps(settings, indent=None))
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -159,7 +160,7 @@ def _searched(
             seed=options.seed,
             jobs=jobs,
             checked=checked,
-            stores=FolderStores(powered, lambda: None),
+            stores=FolderStores(powered, lambda: None, said.note),
             progress=said,
         )
         if _decided(study, len(checked), tuned=tuned):
@@ -172,7 +173,7 @@ def _searched(
         name: None if one is None else _counted(one)
         for name, one in (("tuned", study.all_tuned), ("reached", study.all_reached))
     }
-    search = json.loads((place / "search.json").read_text(encoding="utf-8"))
+    search = read_json(place / "search.json")
     kept = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
     return {**row, "search": {key: search[key] for key in kept}}
 

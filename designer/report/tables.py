@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from designer.base.default_counts import STARTS
+from designer.base.default_counts import DRAWN_STARTS
 from designer.base.design_folder import TOLERANCE
 from designer.check.checked_design import Checked
 from designer.check.coexistence import beside
@@ -79,9 +79,10 @@ def _coexisting(data: ReportData, checked: Checked) -> str:
     """The other attractors of the model with their shares of the starts."""
     model = replace(data.modelfile.model, b=checked.model.b)
     others = [
-        f"{b.orbit.response} ({100 * b.count / STARTS:.3g} %)" for b in beside(model, checked.model)
+        f"{b.orbit.response} ({100 * b.count / DRAWN_STARTS:.3g} %)"
+        for b in beside(model, checked.model)
     ]
-    return f"{', '.join(others) or 'none'}, of {STARTS} starts"
+    return f"{', '.join(others) or 'none'}, of {DRAWN_STARTS} starts"
 
 
 def settings_table(data: ReportData) -> Table:

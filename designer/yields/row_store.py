@@ -2,22 +2,23 @@
 
 A row is a flat frozen dataclass with a field ``sample``. Block edges follow from the sample index
 alone, and every file says which study it belongs to, so that an interrupted study goes on where
-it stopped and a longer one takes over what is there. A file appears whole or not at all.
+it stopped and a longer one takes over what is there. A file appears whole or not at all, and one
+that was damaged since is not taken (``base.keyed_store``).
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, get_type_hints
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from designer.base.atomic_write import appearing
+from designer.base.keyed_store import KeyedStore, Vouch, nobody, quiet
+from designer.base.parquet_entry import ParquetForm, Rows
 from designer.yields.verdict import BLOCK
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ else:
     Row = TypeVar("Row")
 
 FORMAT = 2
-_KEY = b"designer"
 _TYPES: dict[type, pa.DataType] = {
     bool: pa.bool_(),
     int: pa.int64(),
@@ -55,7 +55,8 @@ class BlockStore(Generic[Row]):
     labels : names of measured boards; where there are any, readers get a column ``board``, which
     has the name of each sample's, in turn.
     size : samples of a block.
-    note : told how many blocks of another study were met.
+    note : told which blocks are damaged, and how many of another study were met.
+    vouch : asked about blocks of earlier versions, which have no checksum.
     guard : called before each write; raises where the folder is no longer the study's.
     """
 
@@ -70,7 +71,8 @@ class BlockStore(Generic[Row]):
         labels: Sequence[str] = (),
         size: int = BLOCK,
         guard: Callable[[], None] = lambda: None,
-        note: Callable[[str], None] = lambda _: None,
+        note: Callable[[str], None] = quiet,
+        vouch: Vouch = nobody,
     ) -> None:
         self.names: set[str] = set()
         """Files of this study that were read or written, relative to the design folder."""
@@ -78,10 +80,10 @@ class BlockStore(Generic[Row]):
         self._root, self._folder, self._row, self._study = root, folder, row, study
         self._omegas, self._guard, self._note = omegas, guard, note
         self._labels = labels
-        self._foreign: set[str] = set()
         self._noted = 0
         self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
-        self._schema = self._schema_of()
+        form = ParquetForm(self._schema_of())
+        self._store: KeyedStore[Rows] = KeyedStore(root, form, note, vouch, self._write)
         self._found: dict[str, list[Row]] = {}
 
     def name(self, block: range) -> str:
@@ -92,19 +94,15 @@ class BlockStore(Generic[Row]):
         """What is known of the block's samples in this very study; nothing where a file is of
         another study, damaged or not there."""
         name = self.name(block)
+        found = self._store.read(name, self._key(block))
+        if found is None:
+            return []
         try:
-            held = pq.read_schema(self._root / name).metadata or {}
-            said = json.loads(held.get(_KEY, b"{}"))
-            if {k: said.get(k) for k in ("format", "study")} != self._said():
-                self._foreign.add(name)
-                return []
-            table = pq.read_table(self._root / name, schema=self._schema, partitioning=None)
-            rows = [self._row_of(found) for found in table.to_pylist()]
-        except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
+            rows = [self._row_of(values) for values in found]
+        except (KeyError, ValueError):  # a word that is none of an enumeration's
             return []
-        if len(rows) != said.get("rows"):
-            return []
-        self._found[name] = rows
+        if name not in self._store.unsealed:
+            self._found[name] = rows
         return [row for row in rows if row.sample in block]
 
     def put(self, block: range, rows: Sequence[Row]) -> None:
@@ -119,19 +117,13 @@ class BlockStore(Generic[Row]):
         if self._found.get(name) == list(rows):
             return
         self._guard()
-        said = {**self._said(), "first": block.start, "rows": len(rows)}
-        schema = self._schema.with_metadata({_KEY: json.dumps(said, sort_keys=True)})
-        table = pa.Table.from_pylist([self._columns(row) for row in rows], schema=schema)
-        path = self._root / name
-        kept = "a place that can be written; finished blocks are kept: --resume goes on"
-        with appearing(path, "the block of samples", kept) as partial:
-            path.parent.mkdir(exist_ok=True)
-            pq.write_table(table, partial)
+        columns = [self._columns(row) for row in rows]
+        self._store.write(name, self._key(block), columns, {"rows": len(rows)})
         self._found[name] = list(rows)
 
     def say_ignored(self) -> None:
         """Tell once how many blocks of another study or of other rules were left aside."""
-        count = len(self._foreign)
+        count = len(self._store.foreign)
         if count > self._noted:
             blocks = "1 block" if count == 1 else f"{count} blocks"
             self._note(f"{self._folder}: {blocks} of another study ignored, computed again")
@@ -141,8 +133,16 @@ class BlockStore(Generic[Row]):
         """Let go of the rows that are kept for comparison: memory stays flat."""
         self._found.clear()
 
-    def _said(self) -> dict[str, Any]:
-        return {"format": FORMAT, "study": self._study}
+    def _key(self, block: range) -> dict[str, Any]:
+        first = block.start // self.size * self.size
+        return {"format": FORMAT, "study": self._study, "first": first}
+
+    def _write(self, name: str, content: bytes) -> None:
+        kept = "a place that can be written; finished blocks are kept: --resume goes on"
+        path = self._root / name
+        with appearing(path, "the block of samples", kept) as partial:
+            path.parent.mkdir(exist_ok=True)
+            partial.write_bytes(content)
 
     def _schema_of(self) -> pa.Schema:
         columns = []
@@ -166,7 +166,7 @@ class BlockStore(Generic[Row]):
             values["board"] = self._labels[row.sample % len(self._labels)]
         return values
 
-    def _row_of(self, values: dict[str, Any]) -> Row:
+    def _row_of(self, values: Mapping[str, Any]) -> Row:
         known = {name: values[name] for name in self._hints}
         for name, kind in self._hints.items():
             if issubclass(kind, StrEnum):

@@ -3,24 +3,26 @@
 One file in the design folder, beside the rows, and another with the parts of a blame and of maps
 that are not whole yet: each item under a name with a hash of all that
 decides it, and it counts for that hash alone. Numbers are kept to the last bit, so that a study
-made in two goes is the one made at once. A file that cannot be read holds nothing.
+made in two goes is the one made at once. A file that cannot be read, or was damaged, holds nothing
+(``base.keyed_store``).
 """
 
 from __future__ import annotations
 
 import io
 import json
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import ZipFile
 
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
+from designer.base.seal import BLANK
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, Finding
@@ -37,7 +39,9 @@ from designer.yields.yield_maps import Axis, YieldMap
 
 KEPT = "kept.npz"
 FORMAT = 1
+_KEY = {"format": FORMAT}
 _SAID = "items"
+_Items = Mapping[str, tuple[str, Any]]
 _RECORDS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
@@ -49,11 +53,21 @@ _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, V
 
 
 class Kept:
-    """The items in the file at ``path``, and a way to keep more. write : puts the file there."""
+    """The items in the file at ``path``, and a way to keep more.
 
-    def __init__(self, path: Path, write: Callable[[bytes], None]) -> None:
-        self._items = _read(path)
-        self._write = write
+    write : puts the file of this name there. note, vouch : as of ``KeyedStore``.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        write: Callable[[str, bytes], None],
+        note: Note = quiet,
+        vouch: Vouch = nobody,
+    ) -> None:
+        self._store: KeyedStore[_Items] = KeyedStore(path.parent, _Npz(), note, vouch, write)
+        self._name = path.name
+        self._items = dict(self._store.read(self._name, _KEY) or {})
         self._used: set[str] = set()
 
     def get(self, name: str, key: str) -> Any | None:
@@ -72,47 +86,34 @@ class Kept:
         """Keep several that one key decides."""
         self._items |= {name: (key, value) for name, value in values.items()}
         self._used.update(values)
-        self._write(_bytes(self._items))
+        self._store.write(self._name, _KEY, self._items)
 
     def forget_unused(self) -> None:
         """Drop what nobody has got or put since: it is of another design or study."""
         if not self._used.issuperset(self._items):
             self._items = {name: self._items[name] for name in self._used}
-            self._write(_bytes(self._items))
+            self._store.write(self._name, _KEY, self._items)
 
 
-def _bytes(items: Mapping[str, tuple[str, Any]]) -> bytes:
-    arrays: list[Array] = []
-    said = {name: [key, _plain(value, arrays)] for name, (key, value) in sorted(items.items())}
-    text = json.dumps({"format": FORMAT, _SAID: said}, sort_keys=True)
-    stream = io.BytesIO()
-    named = {f"array{k}": array for k, array in enumerate(arrays)}
-    np.savez_compressed(stream, **{_SAID: np.array(text)}, **named)  # type: ignore[arg-type]
-    return stream.getvalue()
+class _Npz:
+    """An archive of arrays, its seal in the archive's comment (``keyed_store.Form``)."""
 
+    def encode(self, head: Mapping[str, Any], value: _Items) -> bytes:
+        arrays: list[Array] = []
+        said = {name: [key, _plain(item, arrays)] for name, (key, item) in sorted(value.items())}
+        text = json.dumps({**head, _SAID: said}, sort_keys=True)
+        stream = io.BytesIO()
+        named = {f"array{k}": array for k, array in enumerate(arrays)}
+        np.savez_compressed(stream, **{_SAID: np.array(text)}, **named)  # type: ignore[arg-type]
+        with ZipFile(stream, "a") as archive:
+            archive.comment = BLANK.encode("ascii")
+        return stream.getvalue()
 
-_UNREADABLE = (
-    OSError,
-    BadZipFile,
-    zlib.error,
-    NotImplementedError,  # a method of compression that there is not
-    ValueError,
-    KeyError,
-    TypeError,
-    AttributeError,
-    EOFError,
-)
-
-
-def _read(path: Path) -> dict[str, tuple[str, Any]]:
-    try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as held:
-            said = json.loads(str(held[_SAID]))
-            if said["format"] != FORMAT:
-                return {}
-            return {name: (key, _made(value, held)) for name, (key, value) in said[_SAID].items()}
-    except _UNREADABLE:
-        return {}
+    def decode(self, content: bytes) -> tuple[Mapping[str, Any], _Items]:
+        with np.load(io.BytesIO(content), allow_pickle=False) as held:
+            said = json.loads(str(held[_SAID]))  # nan is a number here
+            items = {name: (key, _made(value, held)) for name, (key, value) in said[_SAID].items()}
+            return said, items
 
 
 def _plain(value: Any, arrays: list[Array]) -> Any:

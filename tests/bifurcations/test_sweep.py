@@ -202,6 +202,42 @@ def test_goes_on_from_any_finished_block(tmp_path: Path, tracks: tuple[str, ...]
     assert work_hash(plan.as_dict()) != work_hash(_plan(0.9, 1.1, 151, *tracks).as_dict())
 
 
+def _flipped(path: Path) -> bytes:
+    """Flip one bit in the middle of a file; what it was before."""
+    whole = path.read_bytes()
+    place = len(whole) // 2
+    path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    return whole
+
+
+def test_damaged_blocks_are_computed_again(tmp_path: Path) -> None:
+    """Of a sweep and of a map; the other blocks are taken, and the files are again as they were."""
+    notes: list[str] = []
+    plan = _plan(1.0, 0.9, 100, "down", course=QUICK)
+    steps = SweepStore(tmp_path, "omega", "w", {}, notes.append)
+    whole = sweep.run(plan, store=steps)
+    assert len(plan.blocks("down")) > 1
+    path = tmp_path / SweepStore.name("down", 0)
+    before, last = _flipped(path), tmp_path / SweepStore.name("down", 1)
+    written = last.stat().st_mtime_ns
+    assert steps.read("down", 0) is None
+    again = SweepStore(tmp_path, "omega", "w", {}, notes.append)
+    assert _text(sweep.run(plan, store=again)) == _text(whole)
+    assert notes == [f"{path}: damaged, computed again"] * 2  # by each of the stores
+    assert path.read_bytes() == before
+    assert last.stat().st_mtime_ns == written
+    axes = ("omega", np.linspace(0.8, 1.6, 3), "b", np.linspace(0.2, 0.3, 2))
+    grid = GridStore(tmp_path, "map", *axes, "w", {}, notes.append)
+    mapped = MapPlan(ModelSubject(PAPER), *axes)
+    made = parameter_map.run(mapped, store=grid)
+    path = tmp_path / GridStore.name("map", 1)
+    before = _flipped(path)
+    assert grid.read(1) is None
+    assert parameter_map.run(mapped, store=grid) == made
+    assert notes[2:] == [f"{path}: damaged, computed again"]
+    assert path.read_bytes() == before
+
+
 def test_map_by_settling(tmp_path: Path) -> None:
     plan = MapPlan(
         ModelSubject(PAPER), "omega", np.linspace(0.8, 1.6, 12), "b", np.linspace(0.15, 0.4, 6)

@@ -46,3 +46,30 @@ def test_a_file_that_was_cut_short_ends_as_the_whole_one(tmp_path: Path, kept: f
 def test_another_search_s_answers_are_not_taken(tmp_path: Path) -> None:
     fill(Memory(tmp_path / "file", "a"), [1])
     assert fill(Memory(tmp_path / "file", "b"), [1]) == [1]
+
+
+def test_a_damaged_line_is_asked_again_and_no_other(tmp_path: Path) -> None:
+    """Any bit of the file; a line break joins two lines."""
+    path = tmp_path / "file"
+    fill(Memory(path, "a"), [1, 2, 3])
+    whole = path.read_bytes()
+    breaks = [place for place, byte in enumerate(whole) if byte == ord("\n")]
+    for place in range(len(whole)):
+        path.write_bytes(
+            whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :]
+        )
+        notes: list[str] = []
+        made = fill(Memory(path, "a", notes.append), [1, 2, 3])
+        first = place <= breaks[0]
+        assert len(made) <= (2 if place in breaks else 0 if first else 1)
+        assert [str(path) in note for note in notes] == [True] or place == len(whole) - 1
+        assert fill(Memory(path, "a"), [1, 2, 3]) == []
+
+
+def test_a_file_without_seals_is_not_believed(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_text('{"format": 1, "search": "a"}\n["0123", [7]]\n')
+    notes: list[str] = []
+    assert fill(Memory(path, "a", notes.append), [1]) == [1]
+    assert len(notes) == 1
+    assert fill(Memory(path, "a"), [1]) == []

@@ -174,3 +174,33 @@ def test_help_says_the_kinds(capsys: pytest.CaptureFixture[str]) -> None:
     plain = re.sub(r"[\s│]+", " ", capsys.readouterr().out).replace("- ", "-")
     for name in search.KINDS:
         assert name in plain
+
+
+def test_a_damaged_study_is_made_again_and_no_other(
+    another: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """A letter of ``cure-studies.json`` that says ok where it said lost, after Ctrl-C."""
+    out = shutil.copytree(another, tmp_path / "out")
+    studies, seen = {"a" * 64: {"0": "olg", "250": "o"}, "b" * 64: {"0": "ll"}}, []
+
+    def interrupted(*_: Any, book: Any, **__: Any) -> None:
+        known, save = book
+        seen.append(known)
+        save({"format": 1, "studies": studies})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("designer.jobs.cure_job.Book", lambda known, save: (known, save))
+    monkeypatch.setattr("designer.jobs.cure_job.find_cure", interrupted)
+    words = ["search", str(out), "--yield", "0.9"]
+    assert [entry.status(words), entry.status([*words, "--resume"])] == [130, 130]
+    assert seen == [{}, studies]
+    path = out / "cure-studies.json"
+    assert json.loads(path.read_text())["studies"]["a" * 64]["0"] == "olg"
+    path.write_text(path.read_text().replace("olg", "oog"))
+    capfd.readouterr()
+    assert entry.status([*words, "--resume"]) == 130
+    assert seen[2] == {"b" * 64: {"0": "ll"}}
+    assert "cure-studies.json: 1 entry is damaged, computed again" in capfd.readouterr().err

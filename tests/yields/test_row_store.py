@@ -212,11 +212,13 @@ def test_a_full_disk_is_said_and_loses_nothing(
     store = _store(tmp_path, plan)
     store.put(first, _answers(first))
 
-    def full(table: object, path: Path) -> None:
-        path.write_bytes(b"PAR1")
+    write = Path.write_bytes
+
+    def full(path: Path, content: bytes) -> None:
+        write(path, content[:4])
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(pq, "write_table", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match=r"No space left on device.*--resume") as raised:
         store.put(second, _answers(second))
     assert raised.value.exit_status == 2

@@ -1,0 +1,57 @@
+"""Entries of a keyed store as Parquet files: rows of a schema, with a head and a seal.
+
+Head and seal stand in the file's key-value metadata, so that any reader of Parquet reads the rows.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from designer.base.seal import BLANK
+
+HEAD, SEAL = b"designer", b"designer-seal"
+"""Keys of the file's metadata."""
+Rows = Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class ParquetForm:
+    """Rows as mappings from column names to values (``keyed_store.Form``)."""
+
+    schema: pa.Schema
+    """Columns and their types."""
+
+    def encode(self, head: Mapping[str, Any], value: Rows) -> bytes:
+        """The file; equal heads and rows give equal bytes."""
+        known = {HEAD: json.dumps(head, sort_keys=True), SEAL: BLANK}
+        table = pa.Table.from_pylist([dict(row) for row in value], schema=self.schema)
+        out = pa.BufferOutputStream()
+        pq.write_table(table.replace_schema_metadata(known), out)
+        content: bytes = out.getvalue().to_pybytes()
+        return content
+
+    def decode(self, content: bytes) -> tuple[Mapping[str, Any], Rows]:
+        """Head and rows.
+
+        Raises
+        ------
+        ValueError, TypeError, OSError : other bytes, other columns, or no head.
+        """
+        try:
+            file = pq.ParquetFile(pa.BufferReader(content))
+            head = json.loads((file.schema_arrow.metadata or {}).get(HEAD, b"{}"))
+            table = file.read()
+        except pa.ArrowException as error:
+            raise ValueError(str(error)) from None
+        if not isinstance(head, dict):
+            raise TypeError("a head that is no object")
+        if not table.schema.remove_metadata().equals(self.schema.remove_metadata()):
+            raise ValueError("other columns")
+        rows: Rows = table.to_pylist()
+        return head, rows

@@ -1,0 +1,35 @@
+"""Seals: bytes that carry their own SHA-256, so that damage shows without any other file.
+
+Whoever writes puts ``BLANK`` into the content, anywhere that its format allows and after all other
+text. ``sealed`` puts the digest of everything, with the blank still in it, in its place.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+MARK = "designer-sha256:"
+DIGITS = 64
+BLANK = MARK + "0" * DIGITS
+
+
+def sealed(content: bytes) -> bytes:
+    """The content with its last blank filled in.
+
+    Raises
+    ------
+    ValueError : there is no blank.
+    """
+    at = content.rindex(BLANK.encode("ascii")) + len(MARK)
+    digest = hashlib.sha256(content).hexdigest().encode("ascii")
+    return content[:at] + digest + content[at + DIGITS :]
+
+
+def intact(content: bytes) -> bool | None:
+    """Whether the content is as it was sealed, to the last bit; None where it has no seal."""
+    at = content.rfind(MARK.encode("ascii"))
+    if at < 0:
+        return None
+    at += len(MARK)
+    blank = content[:at] + b"0" * DIGITS + content[at + DIGITS :]
+    return content[at : at + DIGITS] == hashlib.sha256(blank).hexdigest().encode("ascii")
