@@ -28,7 +28,7 @@ from designer.spice import convergence_aids, numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
 from designer.yields import exact_rung as exact
-from designer.yields.ngspice_sampling import SLOW, Hearing, Kind
+from designer.yields.ngspice_sampling import SLOW, Hearing, StartKind
 from designer.yields.study import Study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.two_engine_yield import Explanation, differences
@@ -104,11 +104,11 @@ def _row(study: Study, index: int, found: Sequence[Difference]) -> Row:
     answers = {a.sample: a for a in study.answers_to(index)}
     heard = study.heard_of(index)
 
-    def said(kind: Kind) -> list[bool | None]:
+    def said(kind: StartKind) -> list[bool | None]:
         return [h.agrees(answers[h.sample]) for h in heard if h.kind is kind]
 
-    nominal, own = said(Kind.NOMINAL), said(Kind.OWN)
-    words = [h.response for h in heard if h.kind is Kind.NOMINAL]
+    nominal, own = said(StartKind.NOMINAL), said(StartKind.OWN)
+    words = [h.response for h in heard if h.kind is StartKind.NOMINAL]
     omega = study.checked[index].model.omega
     return Row(
         response=study.plan.questions[study.asked.index(index)].start.response,
@@ -129,11 +129,11 @@ def _differences(study: Study, index: int, pool: SpicePool) -> list[Difference]:
     number = study.asked.index(index)
     question = study.plan.questions[number]
     answers = {a.sample: a for a in study.answers_to(index)}
-    heard = {h.sample: h for h in study.heard_of(index) if h.kind is Kind.NOMINAL}
+    heard = {h.sample: h for h in study.heard_of(index) if h.kind is StartKind.NOMINAL}
     met = [
         d
         for d in differences(list(answers.values()), study.heard_of(index), question)
-        if d.kind is Kind.NOMINAL
+        if d.kind is StartKind.NOMINAL
     ]
     peak = float(abs(question.start.extremes[0]).max())
     out = []

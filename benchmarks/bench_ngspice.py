@@ -38,7 +38,7 @@ from designer.circuit.nominal import on_circuit
 from designer.model.model_file import read_model_file
 from designer.spice import numerics_gate as gate
 from designer.spice.backends import ngspice_version
-from designer.spice.numerics_gate import WAVE_BOUND, GateResult, Subject
+from designer.spice.numerics_gate import WAVE_BOUND, GateResult, GateSubject
 from designer.spice.opamp_model import RUNGS
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
@@ -94,17 +94,17 @@ class Measured:
     seconds: float
 
 
-def subjects(made: Synthesis) -> dict[int, tuple[float, Subject]]:
+def subjects(made: Synthesis) -> dict[int, tuple[float, GateSubject]]:
     """Drive frequency and nominal subject of each 1-p-p response, by p; the first where several."""
     reduction = nominal.nominal_reduction(made.design)
     system = reduction.system()
-    out: dict[int, tuple[float, Subject]] = {}
+    out: dict[int, tuple[float, GateSubject]] = {}
     for r in made.found:
         orbit = on_circuit(system, made.design, r)
         if orbit.n == 1 and orbit.p == orbit.q and orbit.p not in out:
             frequency = made.design.errors.scales.frequency(r.omega)
             excitation = Excitation(frequency, made.design.amplitude(r.b))
-            out[orbit.p] = r.omega, Subject(reduction, excitation, orbit)
+            out[orbit.p] = r.omega, GateSubject(reduction, excitation, orbit)
     return out
 
 
@@ -125,7 +125,7 @@ def measure(samples: int = SAMPLES, runs: int = RUNS, most: int = 8) -> Measured
     return Measured(cases, speeds, sizes, jobs, time.perf_counter() - began)
 
 
-def _cases(pool: SpicePool, wanted: dict[int, tuple[float, Subject]]) -> list[Case]:
+def _cases(pool: SpicePool, wanted: dict[int, tuple[float, GateSubject]]) -> list[Case]:
     gates, warms = {}, {}
     for rung in RUNGS:
         on_rung = [replace(s, rung=rung) for _, s in wanted.values()]
@@ -153,7 +153,7 @@ def _cases(pool: SpicePool, wanted: dict[int, tuple[float, Subject]]) -> list[Ca
 
 
 def _speed(
-    pool: SpicePool, made: Synthesis, case: Case, nominal: Subject, samples: int, jobs: int
+    pool: SpicePool, made: Synthesis, case: Case, nominal: GateSubject, samples: int, jobs: int
 ) -> Speed:
     spec = made.modelfile.circuit
     spread = Spread.bench_1(

@@ -18,7 +18,7 @@ from designer.dynamics.orbit import MAX_PERIOD
 from designer.spice import numerics_gate, settling_periods
 from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
 from designer.spice.simulator import SimulationFailed, Waveforms
@@ -28,7 +28,7 @@ SETTLED = 400
 """Drive periods of the run that a warm start is held against."""
 
 
-def peak_of(subject: Subject) -> Array:
+def peak_of(subject: GateSubject) -> Array:
     """(states,) peaks of the exact orbit."""
     return np.asarray(np.abs(subject.orbit.extremes).max(axis=1))
 
@@ -56,14 +56,16 @@ class WarmStart:
     seconds: float
 
 
-def warm_job(subject: Subject, settings: SolverSettings, periods: int = SETTLED) -> SpiceJob[Read]:
+def warm_job(
+    subject: GateSubject, settings: SolverSettings, periods: int = SETTLED
+) -> SpiceJob[Read]:
     """The run of a warm start; every strobe comes back."""
     n = max(subject.orbit.n, 1)
     long = replace(subject, discard=periods - 4 * n)
     return numerics_gate.job(long, settings, whole=True)
 
 
-def warm(subject: Subject, result: Read, seconds: float = 0.0) -> WarmStart:
+def warm(subject: GateSubject, result: Read, seconds: float = 0.0) -> WarmStart:
     """What a `warm_job` shows."""
     n, peak = max(subject.orbit.n, 1), peak_of(subject)
     strobes = result.strobes
@@ -103,8 +105,8 @@ class Throughput:
 
 
 def boards(
-    circuit: Circuit, spread: Spread, nominal: Subject, samples: int, jobs: int, seed: int = 1
-) -> list[Subject]:
+    circuit: Circuit, spread: Spread, nominal: GateSubject, samples: int, jobs: int, seed: int = 1
+) -> list[GateSubject]:
     """Boards of a study, each on the orbit of the exact circuit that it settles on."""
     ensemble = Ensemble(draw_many(circuit, spread, seed, range(samples)))
     drives = [nominal.excitation.drive] * samples
@@ -118,7 +120,7 @@ def boards(
 
 
 def throughput(
-    pool: SpicePool, subjects: Sequence[Subject], settings: SolverSettings, jobs: int
+    pool: SpicePool, subjects: Sequence[GateSubject], settings: SolverSettings, jobs: int
 ) -> Throughput:
     """All subjects through the pool, as the study does it (without its refinements)."""
     began = time.perf_counter()
@@ -136,7 +138,7 @@ def throughput(
 NAIVE_PERIODS = 500
 
 
-def naive(subjects: Sequence[Subject], settings: SolverSettings, jobs: int) -> Throughput:
+def naive(subjects: Sequence[GateSubject], settings: SolverSettings, jobs: int) -> Throughput:
     """A process for every sample, from discharged capacitors, 500 periods; same settings."""
     rest = [
         replace(
@@ -161,7 +163,7 @@ def resident_megabytes(waves: Waveforms, reduce: Callable[[Waveforms], object]) 
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def memory(subject: Subject, settings: SolverSettings, runs: int) -> list[float]:
+def memory(subject: GateSubject, settings: SolverSettings, runs: int) -> list[float]:
     """Resident memory [MB] of one worker after each of so many runs."""
     todo = numerics_gate.job(subject, settings)
     look = partial(resident_megabytes, reduce=todo.reduce)

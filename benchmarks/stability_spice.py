@@ -175,7 +175,7 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
     row["rungs"] = {}
     for rung in case.rungs:
         levels = numerics_gate.LEVELS if rung == "ideal" else LEVELS
-        subject = numerics_gate.Subject(reduction, excitation, orbit, rung=rung)
+        subject = numerics_gate.GateSubject(reduction, excitation, orbit, rung=rung)
         (result,) = numerics_gate.check(pool, [subject], levels)
         row["rungs"][rung] = _of_gate(result)
         if rung == "ideal" and result.passed and case.spread is not None:
@@ -208,7 +208,7 @@ def _boards(
     pool: SpicePool,
 ) -> dict[str, Any]:
     """A few boards of the spread, each from its own orbit on the exact circuit."""
-    checked = checked_design.Checked(response, orbit, excitation, result)
+    checked = checked_design.CheckedResponse(response, orbit, excitation, result)
     plan = study_plan.plan_study(
         made.modelfile, made.design, [checked], made.catalog, samples=BOARDS, seed=SEED
     )

@@ -77,6 +77,15 @@ from .figure_style import (
     to_png as to_png,
     to_svg as to_svg,
 )
+from .guarded_reading import (
+    UNREADABLE as UNREADABLE,
+    csv_rows as csv_rows,
+    decode as decode,
+    parse_json as parse_json,
+    read_bytes as read_bytes,
+    read_text as read_text,
+    reading as reading,
+)
 from .hashing import (
     sha256 as sha256,
 )
@@ -107,7 +116,7 @@ from .keyed_store import (
 )
 from .manifest import (
     MANIFEST as MANIFEST,
-    Stage as Stage,
+    ManifestStage as ManifestStage,
     StageName as StageName,
     file_hash as file_hash,
     read_json as read_json,
@@ -135,15 +144,6 @@ from .progress import (
 )
 from .proportion import (
     wilson as wilson,
-)
-from .reading import (
-    UNREADABLE as UNREADABLE,
-    csv_rows as csv_rows,
-    decode as decode,
-    parse_json as parse_json,
-    read_bytes as read_bytes,
-    read_text as read_text,
-    reading as reading,
 )
 from .report_guard import (
     check_ours as check_ours,

@@ -23,7 +23,7 @@ from designer.base.manifest import (
     MANIFEST as MANIFEST,
     OF_DESIGN,
     Manifest,
-    Stage,
+    ManifestStage,
     StageName as StageName,
     State,
     file_hash as file_hash,
@@ -69,7 +69,7 @@ class Folder:
         known = None if self.manifest is None else self.manifest.stages.get(stage)
         if known is None:
             return "new"
-        if known.hash == Stage(dict(inputs)).hash:
+        if known.hash == ManifestStage(dict(inputs)).hash:
             return "same" if known.complete else "unfinished"
         if not grown(known.inputs, inputs):
             return "other"
@@ -168,7 +168,7 @@ class Folder:
             manifest.files = {
                 n: ("replaced" if s == stage else s, d) for n, (s, d) in manifest.files.items()
             }
-            manifest.stages[stage] = Stage(inputs, kept=dict(kept or {}))
+            manifest.stages[stage] = ManifestStage(inputs, kept=dict(kept or {}))
             manifest.files |= dict.fromkeys(names, (stage, None))
         for name in manifest.files:  # what a killed process left behind
             if name.endswith("/"):

@@ -16,7 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from designer.base.atomic_write import appearing
 from designer.base.errors import InputError
-from designer.base.reading import UNREADABLE, parse_json, read_bytes, reading
+from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes, reading
 from designer.base.seal import BLANK, intact, sealed
 
 Entry = TypeVar("Entry")
@@ -48,7 +48,8 @@ class Form(Protocol[Entry]):
         ``seal.BLANK``."""
 
     def decode(self, content: bytes) -> tuple[Mapping[str, Any], Entry]:
-        """Head and value of an entry; raises any of ``reading.UNREADABLE`` on other bytes."""
+        """Head and value of an entry; raises any of ``guarded_reading.UNREADABLE`` on other
+        bytes."""
 
 
 @dataclass

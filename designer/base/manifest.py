@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
 from designer.base.errors import MISSING, InputError
+from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes
 from designer.base.hashing import sha256
-from designer.base.reading import UNREADABLE, parse_json, read_bytes
 
 FORMAT = 1
 MANIFEST = "manifest.json"
@@ -54,7 +54,7 @@ _MAX_MANIFEST = 20_000_000
 
 
 @dataclass
-class Stage:
+class ManifestStage:
     """inputs : what decides the stage's files; equal inputs give equal files. kept : what the stage
     found when it began and is to know again when it goes on; gone once it is complete."""
 
@@ -71,7 +71,7 @@ class Stage:
 class Manifest:
     """stages by name; files: name → (stage, hash or None while unfinished)."""
 
-    stages: dict[str, Stage] = field(default_factory=dict)
+    stages: dict[str, ManifestStage] = field(default_factory=dict)
     files: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -161,7 +161,7 @@ def read_manifest(path: Path) -> Manifest | None:
     if value.get("tool") != "designer":
         raise InputError(file, "tool", value.get("tool"), '"designer": a manifest of this tool')
     known, listed = (_object(value.get(field), file, field) for field in ("stages", "files"))
-    stages: dict[str, Stage] = {
+    stages: dict[str, ManifestStage] = {
         name: _stage(known[name], file, f"stages.{name}") for name in STAGES if name in known
     }
     files = {}
@@ -175,7 +175,7 @@ def read_manifest(path: Path) -> Manifest | None:
     return Manifest(stages, files, _object(value.get("provenance", {}), file, "provenance"))
 
 
-def _stage(value: object, file: Path, field: str) -> Stage:
+def _stage(value: object, file: Path, field: str) -> ManifestStage:
     said = _object(value, file, field)
     inputs = _object(said.get("inputs"), file, f"{field}.inputs")
     kept = _object(said.get("kept", {}), file, f"{field}.kept")
@@ -185,7 +185,7 @@ def _stage(value: object, file: Path, field: str) -> Stage:
     layers = inputs.get("layers", [])
     if not (isinstance(layers, list) and all(isinstance(each, str) for each in layers)):
         raise InputError(file, f"{field}.inputs.layers", layers, "a list of names")
-    return Stage(inputs, complete, kept)
+    return ManifestStage(inputs, complete, kept)
 
 
 def _object(value: object, file: Path, field: str) -> dict[str, Any]:

@@ -36,7 +36,7 @@ BEAT = 1.0
 """s between two looks at whether it was silent too long."""
 
 
-class Stage:
+class ProgressStage:
     """One stage of the work: its steps, and when something was last said about it.
 
     total : steps, if that is known. say : takes a line about the stage.
@@ -77,7 +77,7 @@ class Progress:
     """Says nothing; what functions use that nobody watches."""
 
     _clock: Callable[[], float] = staticmethod(time.monotonic)
-    _stage: Stage | None = None
+    _stage: ProgressStage | None = None
     _parts: tuple[str, ...] = ()
     _ended: threading.Event | None = None
     _token: Token[Progress | None] | None = None
@@ -85,7 +85,7 @@ class Progress:
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         """A stage begins, with ``total`` steps if that is known; call the result at each step."""
         LOG.info("%s", text)
-        self._stage = Stage(total, self._say, self._clock)
+        self._stage = ProgressStage(total, self._say, self._clock)
         return self._stage.step
 
     def doing(self, text: str) -> None:
@@ -108,7 +108,7 @@ class Progress:
             self._stage.beat()
 
     def __enter__(self) -> Self:
-        self._stage = Stage(None, self._say, self._clock)
+        self._stage = ProgressStage(None, self._say, self._clock)
         self._stage.detail = "starting"
         self._token = _WATCHED.set(self)
         self._ended = threading.Event()
@@ -163,7 +163,7 @@ def part(text: str) -> Iterator[None]:
         watched._parts = above
 
 
-class Lines(Progress):
+class ProgressLines(Progress):
     """One line for each stage, and one every `EVERY` seconds about how far it is.
 
     clock : seconds, for tests.
@@ -307,4 +307,4 @@ def progress_for(quiet: bool) -> Progress:
     """The kind that suits standard error."""
     if quiet:
         return Progress()
-    return Terminal() if sys.stderr.isatty() else Lines()
+    return Terminal() if sys.stderr.isatty() else ProgressLines()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from designer.base.atomic_write import PART
 from designer.base.errors import InputError
-from designer.base.reading import parse_json, read_bytes
+from designer.base.guarded_reading import parse_json, read_bytes
 
 
 def check_ours(out: Path, names: Collection[str], data: str, command: str) -> None:

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.errors import InputError
+from designer.base.guarded_reading import parse_json, read_bytes
 from designer.base.keyed_store import SEAL, KeyedStore, Note, quiet
-from designer.base.reading import parse_json, read_bytes
 from designer.base.seal import BLANK, intact
 
 FOLDER = "cases"

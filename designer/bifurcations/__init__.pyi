@@ -28,7 +28,7 @@ from .flow_family import (
     Family as Family,
 )
 from .parameter_map import (
-    Cell as Cell,
+    MapCell as MapCell,
     MapPlan as MapPlan,
     ParameterMap as ParameterMap,
 )
@@ -37,7 +37,7 @@ from .point_captions import (
 )
 from .points import (
     Bifurcation as Bifurcation,
-    Kind as Kind,
+    PointKind as PointKind,
 )
 from .store import (
     GridStore as GridStore,

@@ -10,11 +10,11 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import parallel
-from designer.bifurcations.parameter_map import COURSE, Cell, CellStore, cell_of
+from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of
 from designer.bifurcations.subject import Subject
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
-from designer.dynamics.steady_state import Course, Setting
+from designer.dynamics.steady_state import Course, DrivenSystem
 
 SAME = 1e-5
 """Of the largest state: strobes of one orbit, from different starts, lie nearer than this."""
@@ -73,7 +73,7 @@ class Basins:
     numbered from 0. Aperiodic ones are not told apart: they are one."""
 
     plan: BasinPlan
-    cells: tuple[Cell, ...]
+    cells: tuple[MapCell, ...]
     attractors: tuple[Attractor, ...]
 
 
@@ -86,7 +86,7 @@ def run(
     """Make the basins, or what of them ``store`` has not; ``progress`` is called once a row."""
     (setting,) = plan.subject.settings([plan.changes])
 
-    def row(i: int) -> list[Cell]:
+    def row(i: int) -> list[MapCell]:
         cells = None if store is None else store.read(i)
         if cells is None:
             cells = [
@@ -102,7 +102,7 @@ def run(
     return _named(plan, setting, [cell for cells in rows for cell in cells])
 
 
-def _named(plan: BasinPlan, setting: Setting, cells: list[Cell]) -> Basins:
+def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basins:
     """Number the attractors: one orbit, whichever of its strobes a start came to."""
     flow = setting.flow()
     known: list[tuple[str, bool | None, Array]] = []

@@ -13,7 +13,7 @@ from designer.bifurcations.continuation import Branch, End, start, trace
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.loop_check import images, place
 from designer.bifurcations.orbit_curve import Curve
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.dynamics.attractors import mirrored_strobes
 from designer.dynamics.orbit import Orbit, OrbitStatus
 
@@ -142,4 +142,7 @@ def _least(laps: Array, x: Array, curve: Curve) -> float:
 
 def _leads(where: Bifurcation) -> bool:
     """Whether another branch leaves here and the change concerns a stable orbit."""
-    return where.kind in (Kind.PITCHFORK, Kind.DOUBLING) and where.stable[0] != where.stable[1]
+    return (
+        where.kind in (PointKind.PITCHFORK, PointKind.DOUBLING)
+        and where.stable[0] != where.stable[1]
+    )

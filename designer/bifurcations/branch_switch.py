@@ -10,7 +10,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.bifurcations.continuation import Branch, BranchPoint, End, apart, at, follow, linked
 from designer.bifurcations.orbit_curve import Curve, Solved
-from designer.bifurcations.points import Bifurcation, Birth, Kind
+from designer.bifurcations.points import Bifurcation, Birth, PointKind
 from designer.dynamics.attractors import mirrored_strobes
 from designer.dynamics.orbit import MAX_PERIOD
 
@@ -76,8 +76,8 @@ def _setting_out(parent: Branch, where: Bifurcation) -> tuple[Branch, Array] | N
     and the direction they set out in; None where there are none."""
     curve = parent.curve
     x, value = where.point.solved.x, where.value
-    doubled = where.kind is Kind.DOUBLING
-    if where.kind not in (Kind.PITCHFORK, Kind.DOUBLING):
+    doubled = where.kind is PointKind.DOUBLING
+    if where.kind not in (PointKind.PITCHFORK, PointKind.DOUBLING):
         return None
     n = 2 * curve.n if doubled else curve.n
     if n > MAX_PERIOD:
@@ -141,8 +141,8 @@ def _meeting(curve: Curve, where: Bifurcation, near: BranchPoint) -> BranchPoint
     the curve's point next to it, is far from it in all of its periods and their mirror images."""
     flow = curve.family.flow(where.value)
     n = where.point.orbit.n
-    wanted = n if where.kind is Kind.PITCHFORK else 2 * n
-    if where.kind not in (Kind.PITCHFORK, Kind.DOUBLING) or wanted != curve.n:
+    wanted = n if where.kind is PointKind.PITCHFORK else 2 * n
+    if where.kind not in (PointKind.PITCHFORK, PointKind.DOUBLING) or wanted != curve.n:
         return None
     laps = list(flow.run(where.point.solved.x, n).strobes[:-1])
     if flow.system.mirror is not None:

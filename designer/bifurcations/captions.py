@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.bifurcations.point_captions import caption, doubled, label
-from designer.bifurcations.points import Bifurcation, Birth, Kind
+from designer.bifurcations.points import Bifurcation, Birth, PointKind
 from designer.bifurcations.sweep import DOWN, Sweep
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
@@ -23,7 +23,7 @@ RISING = "rising"
 
 
 @dataclass(frozen=True)
-class Change:
+class TrackChange:
     """What one track shows before and after a point.
 
     track : "down" or "up", "rising" for fixed starts, or None where no track shows the change.
@@ -40,19 +40,19 @@ class Change:
         return {"track": self.track, "from": self.before, "to": self.after, "text": self.text}
 
 
-def changes(sweep: Sweep, point: Bifurcation) -> list[Change]:
+def changes(sweep: Sweep, point: Bifurcation) -> list[TrackChange]:
     """One for each track that changes at the point; of fixed starts the first that does.
 
     Where none does (it is not on this branch, or that is unstable on both sides), one without a
     track, that says what happens on the branch itself.
     """
-    out: list[Change] = []
+    out: list[TrackChange] = []
     for track in sweep.plan.tracks:
         shown = _on(sweep, track, point)
         if shown is None:
             continue
         name = track if sweep.plan.followed else RISING
-        out.append(Change(name, *shown, _text(point, *shown)))
+        out.append(TrackChange(name, *shown, _text(point, *shown)))
         if not sweep.plan.followed:
             break
     return out or [_of_branch(point)]
@@ -92,7 +92,7 @@ def _leaves(point: Bifurcation, before: Steady, after: Steady, step: int) -> boo
 
     step : 1 where the track rises through the parameter, -1 where it falls.
     """
-    if point.kind is Kind.FOLD:
+    if point.kind is PointKind.FOLD:
         return point.side == -step and any(point.stable) and _is(before, point, point.response)
     sides = point.stable_sides
     assert sides is not None
@@ -113,18 +113,18 @@ def _arrives(point: Bifurcation, before: Steady, after: Steady, step: int) -> bo
 
 def _begins(point: Bifurcation, after: Steady, step: int) -> bool:
     """Whether an orbit that a fixed start leads to is there only past this fold."""
-    fold = point.kind is Kind.FOLD and any(point.stable) and point.side == step
+    fold = point.kind is PointKind.FOLD and any(point.stable) and point.side == step
     return fold and _is(after, point, point.response)
 
 
 def _born(point: Bifurcation) -> Birth | None:
     """What is born, where that was not looked for: as where a stable orbit loses its stability."""
-    if point.born is not None or point.kind not in (Kind.DOUBLING, Kind.PITCHFORK):
+    if point.born is not None or point.kind not in (PointKind.DOUBLING, PointKind.PITCHFORK):
         return point.born
     if point.stable[0] is point.stable[1]:
         return None
     unstable = -point.direction if point.stable[1] else point.direction
-    twice = point.kind is Kind.DOUBLING
+    twice = point.kind is PointKind.DOUBLING
     response = doubled(point.response) if twice else point.response
     return Birth(response, False, unstable, True)
 
@@ -139,16 +139,18 @@ def _shown(step: Steady) -> str:
 
 
 def _text(point: Bifurcation, before: str, after: str) -> str:
-    if point.kind is not Kind.FOLD:
+    if point.kind is not PointKind.FOLD:
         return f"{before} → {after}"
     if family(before.split()[0]) == family(point.response):
         return f"{before} ends (fold) → {after}"
     return f"{before} → {after}, which begins (fold)"
 
 
-def _of_branch(point: Bifurcation) -> Change:
+def _of_branch(point: Bifurcation) -> TrackChange:
     """By the branch alone, from its stable side where it has one."""
     before, after = point.before, point.after
     if point.stable[1] and not point.stable[0]:
         before, after = after, before
-    return Change(None, before, after if point.kind is Kind.GRAZING else "", caption(point))
+    return TrackChange(
+        None, before, after if point.kind is PointKind.GRAZING else "", caption(point)
+    )

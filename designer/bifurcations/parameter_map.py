@@ -19,7 +19,7 @@ COURSE = Course(settle=134, keep=16, patience=1000)
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapCell:
     """What a grid point shows; the fields are those of ``Steady``.
 
     i, j : row and column. strobe : a state of the motion at drive phase 0. attractor : its number
@@ -48,10 +48,10 @@ class Cell:
 class CellStore(Protocol):
     """Where finished rows of a grid are kept."""
 
-    def read(self, row: int) -> list[Cell] | None:
+    def read(self, row: int) -> list[MapCell] | None:
         """The cells of a row; None where there is none."""
 
-    def write(self, row: int, cells: list[Cell]) -> None:
+    def write(self, row: int, cells: list[MapCell]) -> None:
         """Keep a finished row."""
 
 
@@ -86,7 +86,7 @@ class ParameterMap:
     """cells : (rows · columns,) row by row."""
 
     plan: MapPlan
-    cells: tuple[Cell, ...]
+    cells: tuple[MapCell, ...]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -102,7 +102,7 @@ def run(
 ) -> ParameterMap:
     """Make the map, or what of it ``store`` has not; ``progress`` is called once a row."""
 
-    def row(i: int) -> list[Cell]:
+    def row(i: int) -> list[MapCell]:
         cells = None if store is None else store.read(i)
         if cells is None:
             y = float(plan.ys[i])
@@ -119,13 +119,13 @@ def run(
     return ParameterMap(plan, tuple(cell for cells in rows for cell in cells))
 
 
-def cell_of(i: int, j: int, steady: Steady) -> Cell:
+def cell_of(i: int, j: int, steady: Steady) -> MapCell:
     """The cell that shows this motion."""
     s = steady
-    return Cell(i, j, s.status, s.n, s.p, s.q, s.symmetric, s.lyapunov, tuple(s.start.tolist()))
+    return MapCell(i, j, s.status, s.n, s.p, s.q, s.symmetric, s.lyapunov, tuple(s.start.tolist()))
 
 
-def count(cells: tuple[Cell, ...]) -> dict[str, int]:
+def count(cells: tuple[MapCell, ...]) -> dict[str, int]:
     """How many cells show each response, most frequent first."""
     out: dict[str, int] = {}
     for cell in cells:

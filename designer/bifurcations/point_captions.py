@@ -6,14 +6,14 @@ first orbits of what leaves it. What a sweep shows there is another matter (``po
 
 from __future__ import annotations
 
-from designer.bifurcations.points import SIDES, Bifurcation, Kind
+from designer.bifurcations.points import SIDES, Bifurcation, PointKind
 
 NAMES = {
-    Kind.PITCHFORK: "pitchfork",
-    Kind.DOUBLING: "period doubling",
-    Kind.FOLD: "fold",
-    Kind.GRAZING: "grazing",
-    Kind.TORUS: "torus bifurcation",
+    PointKind.PITCHFORK: "pitchfork",
+    PointKind.DOUBLING: "period doubling",
+    PointKind.FOLD: "fold",
+    PointKind.GRAZING: "grazing",
+    PointKind.TORUS: "torus bifurcation",
 }
 """Of the kinds, in a sentence."""
 
@@ -25,7 +25,9 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     parameter : how it is written; "" leaves out where the point lies. unit : of it.
     """
     place = f" at {parameter} = {point.value:.9g}{' ' + unit if unit else ''}" if parameter else ""
-    whose = "" if point.kind is Kind.GRAZING else f" of {label(point.response, point.symmetric)}"
+    whose = (
+        "" if point.kind is PointKind.GRAZING else f" of {label(point.response, point.symmetric)}"
+    )
     return f"{NAMES[point.kind]}{whose}{place}: {_what(point)}"
 
 
@@ -41,9 +43,9 @@ def doubled(response: str) -> str:
 
 
 def _what(point: Bifurcation) -> str:
-    if point.kind is Kind.FOLD:
+    if point.kind is PointKind.FOLD:
         return _fold(point)
-    if point.kind is Kind.GRAZING:
+    if point.kind is PointKind.GRAZING:
         above, below = point.after, point.before
         if point.direction < 0:
             above, below = below, above
@@ -70,15 +72,15 @@ def _fold(point: Bifurcation) -> str:
 
 
 def _born(point: Bifurcation) -> str:
-    if point.kind is Kind.TORUS:
+    if point.kind is PointKind.TORUS:
         return "quasi-periodic motion is born"
     born = point.born
     response = point.response if born is None else born.response
-    if point.kind is Kind.DOUBLING and born is None:
+    if point.kind is PointKind.DOUBLING and born is None:
         response = doubled(point.response)
     where = ""
     if born is not None:
         where = f" {SIDES[born.side]}, {'stable' if born.stable else 'unstable'}"
-    if point.kind is Kind.PITCHFORK:
+    if point.kind is PointKind.PITCHFORK:
         return f"its two asymmetric twins {response} are born{where}"
     return f"{response} is born{where}"

@@ -35,7 +35,7 @@ ZERO = 1e-3
 """Of its values on either side: a test function that is more than this at its root jumped."""
 
 
-class Kind(StrEnum):
+class PointKind(StrEnum):
     """What happens at a bifurcation point."""
 
     PITCHFORK = "pitchfork"
@@ -76,7 +76,7 @@ SIDES = {1: "above", -1: "below"}
 class Bifurcation:
     """A bifurcation point.
 
-    parameter, value : its name and where. kind : see ``Kind``. error : half the width of an
+    parameter, value : its name and where. kind : see ``PointKind``. error : half the width of an
     interval of the parameter that was seen to hold the point: the test function has different signs
     (for grazing: the counts of impacts differ) at its ends. point : the orbit there. before,
     after : the branch's responses right beside it, in the branch's own order; stable : whether
@@ -90,7 +90,7 @@ class Bifurcation:
 
     parameter: str
     value: float
-    kind: Kind
+    kind: PointKind
     error: float
     point: BranchPoint
     before: str
@@ -106,7 +106,7 @@ class Bifurcation:
     @property
     def response(self) -> str:
         """ "n-p-q" of the orbit at the point; of a grazing one, on the branch's first side."""
-        same = self.before == self.after or self.kind is Kind.GRAZING
+        same = self.before == self.after or self.kind is PointKind.GRAZING
         return self.before if same else self.point.response
 
     @property
@@ -183,7 +183,7 @@ def _beside(branch: Branch, where: Bifurcation, every: list[Bifurcation]) -> Bif
 Test = Callable[[BranchPoint], float]
 
 
-def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[Kind, Test]]:
+def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[PointKind, Test]]:
     """The test functions that change sign between two points of a branch."""
     if joined(curve, a, b):
         return []  # the branch joined its parent: that is where the point is located
@@ -197,16 +197,16 @@ def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[Kind, Tes
     def flip(p: BranchPoint) -> float:
         return float(np.linalg.det(eye + p.solved.jacobian))
 
-    flips = Kind.PITCHFORK if curve.symmetric else Kind.DOUBLING
-    tests: list[tuple[Kind, Test]] = [(Kind.FOLD, fold), (flips, flip)]
+    flips = PointKind.PITCHFORK if curve.symmetric else PointKind.DOUBLING
+    tests: list[tuple[PointKind, Test]] = [(PointKind.FOLD, fold), (flips, flip)]
     if _pair(a) * _pair(b) < 0.0:
-        tests.append((Kind.TORUS, _pair))
+        tests.append((PointKind.TORUS, _pair))
     out = [(kind, test) for kind, test in tests if test(a) * test(b) < 0.0]
     if not curve.symmetric and not (parted(curve, a) and parted(curve, b)):
         # Where it leaves its parent λ turns: that is no fold, and rounding decides the sign.
-        out = [(kind, test) for kind, test in out if kind is not Kind.FOLD]
+        out = [(kind, test) for kind, test in out if kind is not PointKind.FOLD]
     if a.counts != b.counts:
-        out.append((Kind.GRAZING, _gap(curve)))
+        out.append((PointKind.GRAZING, _gap(curve)))
     return out
 
 
@@ -231,7 +231,7 @@ def _locate(
     curve: Curve,
     a: BranchPoint,
     b: BranchPoint,
-    kind: Kind,
+    kind: PointKind,
     test: Test,
     index: int,
     number: int,
@@ -250,17 +250,19 @@ def _locate(
 
     def left(p: BranchPoint) -> bool:
         """Whether a point lies on a's side."""
-        return p.counts == a.counts if kind is Kind.GRAZING else test(p) * test(a) > 0.0
+        return p.counts == a.counts if kind is PointKind.GRAZING else test(p) * test(a) > 0.0
 
     try:
         if test(a) * test(b) < 0.0:
             root = float(brentq(lambda s: test(point(s)), 0.0, 1.0, xtol=1e-15, rtol=1e-14))
-        elif kind is Kind.GRAZING:
+        elif kind is PointKind.GRAZING:
             root = _bisect(lambda s: left(point(s)))
         else:
             return None
         middle = point(root)
-        if kind is not Kind.GRAZING and abs(test(middle)) > ZERO * max(abs(test(a)), abs(test(b))):
+        if kind is not PointKind.GRAZING and abs(test(middle)) > ZERO * max(
+            abs(test(a)), abs(test(b))
+        ):
             return None  # a jump over zero: two complex multipliers that became real
         stalled = max(1.0, middle.solved.residual / CONVERGED)
         error = _width(point, left, root, stalled * ROUNDING * float(curve.scale[-1]))
@@ -275,10 +277,10 @@ def _locate(
         before=a.response,
         after=b.response,
         stable=(a.stable, b.stable),
-        direction=0 if kind is Kind.FOLD else int(np.sign(b.value - a.value)),
+        direction=0 if kind is PointKind.FOLD else int(np.sign(b.value - a.value)),
         position=index + root,
         branch=number,
-        side=int(np.sign(a.value + b.value - 2.0 * middle.value)) if kind is Kind.FOLD else 0,
+        side=int(np.sign(a.value + b.value - 2.0 * middle.value)) if kind is PointKind.FOLD else 0,
         symmetric=_symmetric(curve, middle),
     )
 

@@ -20,7 +20,7 @@ import pyarrow as pa
 from designer.base.arrays import Array
 from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
 from designer.base.parquet_entry import ParquetForm, Rows
-from designer.bifurcations.parameter_map import Cell
+from designer.bifurcations.parameter_map import MapCell
 from designer.bifurcations.sweep import Sweep
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
@@ -155,7 +155,7 @@ class GridStore:
         """File name of a row, inside root."""
         return f"{kind}.parquet/row-{row:06d}.parquet"
 
-    def read(self, row: int) -> list[Cell] | None:
+    def read(self, row: int) -> list[MapCell] | None:
         """The cells of a finished row of this very work, or None."""
         rows = self._store.read(self.name(self.kind, row), self._key(row))
         if rows is None or len(rows) != len(self.xs):
@@ -165,10 +165,10 @@ class GridStore:
             del each[self.x], each[self.y]
             each["status"] = OrbitStatus(each["status"])
             each["strobe"] = tuple(each["strobe"])
-            out.append(Cell(**each))
+            out.append(MapCell(**each))
         return out
 
-    def write(self, row: int, cells: list[Cell]) -> None:
+    def write(self, row: int, cells: list[MapCell]) -> None:
         """Keep a finished row."""
         rows = []
         for cell in cells:

@@ -8,7 +8,7 @@ from typing import Protocol
 from designer.base.arrays import Array
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
-from designer.dynamics.steady_state import Setting
+from designer.dynamics.steady_state import DrivenSystem
 
 
 class Subject(Protocol):
@@ -46,7 +46,7 @@ class Subject(Protocol):
         """InputError that names the option, unless the parameter may have this value."""
         ...
 
-    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""
         ...
 

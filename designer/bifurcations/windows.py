@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from designer.bifurcations.branch_survey import Survey
 from designer.bifurcations.continuation import Branch, BranchPoint, End, start, trace
 from designer.bifurcations.flow_family import Family
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import Orbit
 
@@ -119,7 +119,7 @@ def _met(end: WindowEnd, points: Sequence[Bifurcation]) -> WindowEnd:
     if end.why != End.JOINED:
         return end
     for p in points:
-        if p.value == end.value and p.kind in (Kind.PITCHFORK, Kind.DOUBLING):
+        if p.value == end.value and p.kind in (PointKind.PITCHFORK, PointKind.DOUBLING):
             return WindowEnd(p.value, p.error, str(p.kind), p, p.point.orbit)
     return end
 

@@ -40,7 +40,7 @@ from .kicad_project import (
 from .kicad_reader import (
     PART_NUMBER as PART_NUMBER,
     BoardFile as BoardFile,
-    Footprint as Footprint,
+    PlacedFootprint as PlacedFootprint,
     check_belongs as check_belongs,
     read_board as read_board,
 )

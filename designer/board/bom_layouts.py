@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field
 
 from designer.base.csv_tables import csv_text
 from designer.base.errors import MISSING, InputError
-from designer.base.reading import read_text
+from designer.base.guarded_reading import read_text
 from designer.base.schema import (
     STRICT,
     Accepts,
@@ -36,7 +36,7 @@ _MAX_BYTES = 100_000
 
 
 @dataclass(frozen=True)
-class Column:
+class LayoutColumn:
     """title : its heading. field : of ``FIELDS``; None for a column of one text."""
 
     title: str
@@ -50,7 +50,7 @@ class Layout:
 
     name: str
     separator: str
-    columns: tuple[Column, ...]
+    columns: tuple[LayoutColumn, ...]
 
     @property
     def file(self) -> str:
@@ -65,7 +65,7 @@ class Layout:
         ]
         return csv_text(titles, rows)
 
-    def _cell(self, column: Column, one: Line) -> str:
+    def _cell(self, column: LayoutColumn, one: Line) -> str:
         if column.field is None:
             return column.text
         if column.field == "designators":
@@ -113,7 +113,7 @@ def _read(name: str, path: Path) -> Layout:
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None or not titles:
         raise InputError(path, "columns", twice or MISSING, "columns, each title once")
-    columns = tuple(Column(c.title, c.field, c.text or "") for c in table.columns)
+    columns = tuple(LayoutColumn(c.title, c.field, c.text or "") for c in table.columns)
     return Layout(name, table.separator, columns)
 
 

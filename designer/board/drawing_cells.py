@@ -72,7 +72,7 @@ class Amplifier:
 
 
 @dataclass(frozen=True)
-class Rows:
+class CellRows:
     """A cell of rows: each a chain, or a line of text. at : pads that carry a net."""
 
     title: str
@@ -80,7 +80,7 @@ class Rows:
     at: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
-Cell = Amplifier | Rows
+Cell = Amplifier | CellRows
 
 
 def chains(parts: Iterable[TwoPin], shown: frozenset[str]) -> list[Chain]:
@@ -125,7 +125,7 @@ def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
         rows.append(tuple(by_stage.pop(name) for name in wanted if name in by_stage))
     rows.append(tuple(by_stage.values()))  # amplifiers of no known kind
     zone = [cell for cell in cells.values() if cell.section.limits]
-    rest = tuple(Rows(f"dead zone · {net}", tuple(group)) for net, group in _groups(left))
+    rest = tuple(CellRows(f"dead zone · {net}", tuple(group)) for net, group in _groups(left))
     rows.append((*rest, *zone))
     return tuple(row for row in rows if row)
 
@@ -208,14 +208,14 @@ def board_cells(
     if tied:
         supply.append(f"spare, followers of ground: {', '.join(tied)}")
     cells = [
-        Rows("board: outputs", tuple(shown), pads),
-        Rows("board: generator", (*drive, *said)),
-        Rows("board: connectors", tuple(supply)),
+        CellRows("board: outputs", tuple(shown), pads),
+        CellRows("board: generator", (*drive, *said)),
+        CellRows("board: connectors", tuple(supply)),
     ]
     for rail in (NEGATIVE, POSITIVE):
         near = [p for p in fittings if isinstance(p, SupplyCapacitor) and rail in p.nets]
         rows = tuple(Chain(p.plus, p.minus, (p,)) for p in near)
-        cells.insert(2, Rows(f"board: decoupling of {rail}", rows))
+        cells.insert(2, CellRows(f"board: decoupling of {rail}", rows))
     return tuple(cell for cell in cells if cell.rows)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Pad:
+class PadShape:
     """A pad of width by height at (x, y). drill : of its hole [mm], 0 on the surface.
 
     first : whether it is drawn square, as pin 1 of a row of holes is.
@@ -26,14 +26,14 @@ class Pad:
 
 
 @dataclass(frozen=True)
-class Footprint:
+class FootprintShape:
     """body : width and height of the part seen from above. mark : whether pin 1 is marked.
 
     soldered : False for a bare pad, which nothing is soldered to.
     """
 
     name: str
-    pads: tuple[Pad, ...]
+    pads: tuple[PadShape, ...]
     body: tuple[float, float]
     mark: bool = False
     soldered: bool = True
@@ -73,7 +73,7 @@ TERMINALS = {
 """Length of a chip's terminals by the length and width of its body, as chip makers state them."""
 
 
-def chip(name: str, code: str) -> Footprint | None:
+def chip(name: str, code: str) -> FootprintShape | None:
     """A chip of metric code "1608": 1.6 mm by 0.8 mm."""
     sizes = {f"{round(10 * a):02d}{int(10 * b):02d}": (a, b) for a, b in TERMINALS}
     if code not in sizes:
@@ -82,100 +82,106 @@ def chip(name: str, code: str) -> Footprint | None:
     toe = 0.35 if length >= 1.6 else 0.2
     outer = length + 2.0 * toe
     inner = length - 2.0 * TERMINALS[length, width] - 0.1
-    return Footprint(name, _pair(outer, inner, width + 0.1), (length, width))
+    return FootprintShape(name, _pair(outer, inner, width + 0.1), (length, width))
 
 
-def small_diode(name: str, case: str) -> Footprint | None:
+def small_diode(name: str, case: str) -> FootprintShape | None:
     """SOD-123 and SOD-323: span over the leads, length of a foot, width of a lead, body."""
     known = {"123": (3.7, 0.45, 0.6, (2.7, 1.6)), "323": (2.5, 0.3, 0.35, (1.7, 1.25))}
     if case not in known:
         return None
     span, foot, lead, body = known[case]
     pads = _pair(span + 0.7, span - 2.0 * foot - 0.5, lead + 0.3)
-    return Footprint(name, pads, body, mark=True)
+    return FootprintShape(name, pads, body, mark=True)
 
 
-def sot23(name: str) -> Footprint:
+def sot23(name: str) -> FootprintShape:
     """Pads 1.3 mm by 0.6 mm, rows 2.1 mm apart, pitch 0.95 mm (Texas Instruments, DBZ0003A)."""
     at = {"1": (-1.05, -0.95), "2": (-1.05, 0.95), "3": (1.05, 0.0)}
-    pads = tuple(Pad(n, x, y, 1.3, 0.6) for n, (x, y) in at.items())
-    return Footprint(name, pads, (1.3, 2.92), mark=True)
+    pads = tuple(PadShape(n, x, y, 1.3, 0.6) for n, (x, y) in at.items())
+    return FootprintShape(name, pads, (1.3, 2.92), mark=True)
 
 
-def small_outline(name: str, count: int, width: float, length: float, pitch: float) -> Footprint:
+def small_outline(
+    name: str, count: int, width: float, length: float, pitch: float
+) -> FootprintShape:
     """Gull wings: a foot reaches 1.05 mm beyond the body (JEDEC MS-012); toe 0.45 mm."""
     outer, inner = width + 2.1 + 0.9, width - 0.9
     across, x = (outer - inner) / 2.0, (outer + inner) / 4.0
     pads = _two_rows(count, x, pitch, (across, 0.6))
-    return Footprint(name, pads, (width, length), mark=True)
+    return FootprintShape(name, pads, (width, length), mark=True)
 
 
-def dual_in_line(name: str, count: int, row: float) -> Footprint:
+def dual_in_line(name: str, count: int, row: float) -> FootprintShape:
     """Holes at 2.54 mm in two rows."""
     pads = _two_rows(count, row / 2.0, 2.54, (1.6, 1.6), drill=0.8)
-    return Footprint(name, pads, (6.35, 2.54 * count / 2.0), mark=True)
+    return FootprintShape(name, pads, (6.35, 2.54 * count / 2.0), mark=True)
 
 
 def two_holes(
     name: str, pitch: float, body: tuple[float, float], *, mark: bool = False, drill: float = 0.8
-) -> Footprint:
+) -> FootprintShape:
     """Two holes in a row; the body lies between and beyond them."""
     pads = tuple(
-        Pad(number, x, 0.0, 2.0 * drill, 2.0 * drill, drill, first=mark and number == "1")
+        PadShape(number, x, 0.0, 2.0 * drill, 2.0 * drill, drill, first=mark and number == "1")
         for number, x in (("1", -pitch / 2.0), ("2", pitch / 2.0))
     )
-    return Footprint(name, pads, body, mark=mark)
+    return FootprintShape(name, pads, body, mark=mark)
 
 
-def transistor_outline(name: str) -> Footprint:
+def transistor_outline(name: str) -> FootprintShape:
     """TO-92 with its legs in a row at 1.27 mm; body 5.2 mm by 4.0 mm (JEDEC TO-226)."""
     pads = tuple(
-        Pad(str(i + 1), 1.27 * (i - 1), 0.0, 0.95, 1.5, 0.6, first=i == 0) for i in range(3)
+        PadShape(str(i + 1), 1.27 * (i - 1), 0.0, 0.95, 1.5, 0.6, first=i == 0) for i in range(3)
     )
-    return Footprint(name, pads, (5.2, 4.0), mark=True)
+    return FootprintShape(name, pads, (5.2, 4.0), mark=True)
 
 
-def header(name: str, count: int, pitch: float) -> Footprint:
+def header(name: str, count: int, pitch: float) -> FootprintShape:
     """A column of holes for square pins of 0.64 mm."""
     pads = tuple(
-        Pad(str(i + 1), 0.0, (i - (count - 1) / 2.0) * pitch, 1.7, 1.7, 1.0, first=i == 0)
+        PadShape(str(i + 1), 0.0, (i - (count - 1) / 2.0) * pitch, 1.7, 1.7, 1.0, first=i == 0)
         for i in range(count)
     )
-    return Footprint(name, pads, (pitch, count * pitch), mark=True)
+    return FootprintShape(name, pads, (pitch, count * pitch), mark=True)
 
 
-def bare_pad(name: str, diameter: float) -> Footprint:
-    return Footprint(name, (Pad("1", 0, 0, diameter, diameter),), (0.0, 0.0), soldered=False)
+def bare_pad(name: str, diameter: float) -> FootprintShape:
+    return FootprintShape(
+        name, (PadShape("1", 0, 0, diameter, diameter),), (0.0, 0.0), soldered=False
+    )
 
 
-def bourns_3296w(name: str) -> Footprint:
+def bourns_3296w(name: str) -> FootprintShape:
     """Three pins in a row at 2.54 mm below a body of 9.53 mm by 4.83 mm (Bourns 3296)."""
     pads = tuple(
-        Pad(str(i + 1), 2.54 * (1 - i), 0.0, 1.44, 1.44, 0.8, first=i == 0) for i in range(3)
+        PadShape(str(i + 1), 2.54 * (1 - i), 0.0, 1.44, 1.44, 0.8, first=i == 0) for i in range(3)
     )
-    return Footprint(name, pads, (9.53, 4.83), mark=True)
+    return FootprintShape(name, pads, (9.53, 4.83), mark=True)
 
 
-def bourns_3224w(name: str) -> Footprint:
+def bourns_3224w(name: str) -> FootprintShape:
     """Two pads of 1.3 mm by 1.6 mm facing one of 2.0 mm by 1.6 mm, body 4.8 mm by 3.5 mm
     (Bourns 3224W; not compared with the sheet)."""
     pads = (
-        Pad("1", 1.25, -1.45, 1.3, 1.6),
-        Pad("2", 0.0, 1.45, 2.0, 1.6),
-        Pad("3", -1.25, -1.45, 1.3, 1.6),
+        PadShape("1", 1.25, -1.45, 1.3, 1.6),
+        PadShape("2", 0.0, 1.45, 2.0, 1.6),
+        PadShape("3", -1.25, -1.45, 1.3, 1.6),
     )
-    return Footprint(name, pads, (4.8, 3.5), mark=True)
+    return FootprintShape(name, pads, (4.8, 3.5), mark=True)
 
 
-def _pair(outer: float, inner: float, height: float) -> tuple[Pad, Pad]:
+def _pair(outer: float, inner: float, height: float) -> tuple[PadShape, PadShape]:
     """Pads 1 and 2 from ``inner`` to ``outer``, both over all, in steps of 0.01 mm."""
     width, x = round((outer - inner) / 2.0, 2), round((outer + inner) / 4.0, 2)
-    return Pad("1", -x, 0.0, width, round(height, 2)), Pad("2", x, 0.0, width, round(height, 2))
+    return PadShape("1", -x, 0.0, width, round(height, 2)), PadShape(
+        "2", x, 0.0, width, round(height, 2)
+    )
 
 
 def _two_rows(
     count: int, x: float, pitch: float, size: tuple[float, float], drill: float = 0.0
-) -> tuple[Pad, ...]:
+) -> tuple[PadShape, ...]:
     """Down on the left, up on the right, as packages are counted."""
     half = count // 2
     top = -(half - 1) * pitch / 2.0
@@ -184,5 +190,5 @@ def _two_rows(
         left = i < half
         y = top + (i if left else count - 1 - i) * pitch
         first = drill > 0.0 and i == 0
-        out.append(Pad(str(i + 1), -x if left else x, y, *size, drill=drill, first=first))
+        out.append(PadShape(str(i + 1), -x if left else x, y, *size, drill=drill, first=first))
     return tuple(out)

@@ -11,20 +11,20 @@ from collections.abc import Callable
 
 from designer.base.errors import InputError
 from designer.board import footprint_shapes as shapes
-from designer.board.footprint_shapes import Footprint
+from designer.board.footprint_shapes import FootprintShape
 from designer.board.kicad_names import footprint_name
 
-_Rule = Callable[[str, re.Match[str]], Footprint | None]
+_Rule = Callable[[str, re.Match[str]], FootprintShape | None]
 _NUMBER = r"(\d+(?:\.\d+)?)"
 
 
-def _two_holes(name: str, found: re.Match[str]) -> Footprint:
+def _two_holes(name: str, found: re.Match[str]) -> FootprintShape:
     """Length and height of the body and the pitch; a disc or a can may have one diameter."""
     length, height, pitch = (float(x) for x in found.groups())
     return shapes.two_holes(name, pitch, (length, height))
 
 
-def _can(name: str, found: re.Match[str]) -> Footprint:
+def _can(name: str, found: re.Match[str]) -> FootprintShape:
     diameter, pitch = (float(x) for x in found.groups())
     mark = name.startswith("CP")
     return shapes.two_holes(name, pitch, (diameter, diameter), mark=mark)
@@ -96,7 +96,7 @@ EXAMPLES = tuple(example for example, _, _ in _RULES)
 """A name of each kind that is understood."""
 
 
-def footprint(full_name: str) -> Footprint:
+def footprint(full_name: str) -> FootprintShape:
     """The footprint that a name, ``Library:Name`` or ``Name``, means.
 
     Raises

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from designer.base.sexpr import Expression, expression, word
-from designer.board.footprint_shapes import Footprint, Pad
+from designer.board.footprint_shapes import FootprintShape, PadShape
 from designer.board.kicad_names import LIBRARY, identifier
-from designer.board.kicad_placement import TEXT, Spot
+from designer.board.kicad_placement import TEXT, PlacedComponent
 from designer.board.pins import Pin
 
 FILE_VERSION = 20241229
@@ -16,7 +16,7 @@ ROUND = 0.25
 """Radius of a pad's corners, of its shorter side."""
 
 
-def module(shape: Footprint) -> Expression:
+def module(shape: FootprintShape) -> Expression:
     """The file ``.kicad_mod`` of the project's library."""
     return expression(
         "footprint",
@@ -34,7 +34,7 @@ def module(shape: Footprint) -> Expression:
 
 
 def on_board(
-    spot: Spot,
+    spot: PlacedComponent,
     *,
     owner: tuple[str, str],
     path: str,
@@ -74,7 +74,7 @@ def on_board(
 
 
 def _texts(
-    shape: Footprint, reference: str, value: str, angle: int, ids: tuple[str, ...]
+    shape: FootprintShape, reference: str, value: str, angle: int, ids: tuple[str, ...]
 ) -> Iterator[Expression]:
     """The reference above the courtyard as it is seen, the value on the drawing below it."""
     _, top, _, bottom = shape.courtyard
@@ -108,7 +108,7 @@ def _property(
     )
 
 
-def _attributes(shape: Footprint, *, bought: bool = True, fitted: bool = True) -> Expression:
+def _attributes(shape: FootprintShape, *, bought: bool = True, fitted: bool = True) -> Expression:
     kind = [] if not shape.soldered else ["through_hole" if shape.through_hole else "smd"]
     left_out = [] if shape.soldered else ["exclude_from_pos_files"]
     left_out += [] if bought and fitted and shape.soldered else ["exclude_from_bom"]
@@ -116,7 +116,7 @@ def _attributes(shape: Footprint, *, bought: bool = True, fitted: bool = True) -
     return expression("attr", *map(word, [*kind, *left_out]))
 
 
-def _drawing(shape: Footprint, ids: tuple[str, ...]) -> Iterator[Expression]:
+def _drawing(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression]:
     """Body, courtyard, an outline in silk, and a dot at pin 1 where it matters."""
     wide, high = shape.body[0] / 2.0, shape.body[1] / 2.0
     if wide and high:
@@ -159,7 +159,7 @@ def _box(
 
 
 def _pad(
-    pad: Pad,
+    pad: PadShape,
     angle: int,
     ids: tuple[str, ...],
     pin: Pin | None = None,

@@ -11,7 +11,7 @@ from designer.board.component import Component
 from designer.board.kicad_layout import Item
 from designer.board.kicad_names import LIBRARY, POWER, footprint_name, library_name
 from designer.board.kicad_sim import Fields, fields, sources
-from designer.board.kicad_symbols import Shape
+from designer.board.kicad_symbols import SymbolShape
 from designer.board.pins import SUPPLY_UNIT
 from designer.check.first_responses import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
@@ -55,7 +55,7 @@ def entries(
     return tuple(made)
 
 
-def shape(component: Component) -> Shape:
+def shape(component: Component) -> SymbolShape:
     """The symbol of a component."""
     numbers = {pin.name: pin.number for pin in component.pins}
     kind = component.kind

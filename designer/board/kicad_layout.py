@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from designer.board.kicad_names import POWER
-from designer.board.kicad_symbols import GRID, REACH, Shape, ShapePin, power
+from designer.board.kicad_symbols import GRID, REACH, ShapePin, SymbolShape, power
 
 Point = tuple[int, int]
 
@@ -39,7 +39,7 @@ class Item:
 
     reference: str
     value: str
-    shape: Shape
+    shape: SymbolShape
     pins: Mapping[str, str]
     stages: Mapping[int, str]
 
@@ -66,7 +66,7 @@ class Placed:
 
 
 @dataclass(frozen=True)
-class Label:
+class NetLabel:
     """A net's name at a point; left : whether it is written to the left of it."""
 
     net: str
@@ -84,24 +84,24 @@ class Note:
 
 
 @dataclass
-class Cell:
+class LayoutCell:
     """What stands together. wires : horizontal or vertical, from point to point."""
 
     title: str
     symbols: list[Placed] = field(default_factory=list)
     wires: list[tuple[Point, Point]] = field(default_factory=list)
-    labels: list[Label] = field(default_factory=list)
+    labels: list[NetLabel] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     open_pins: list[Point] = field(default_factory=list)
     height: int = 0
 
-    def moved(self, x: int, y: int) -> Cell:
+    def moved(self, x: int, y: int) -> LayoutCell:
         """The cell elsewhere."""
 
         def at(point: Point) -> Point:
             return point[0] + x, point[1] + y
 
-        return Cell(
+        return LayoutCell(
             self.title,
             [replace(s, x=s.x + x, y=s.y + y) for s in self.symbols],
             [(at(a), at(b)) for a, b in self.wires],
@@ -120,7 +120,7 @@ class Cell:
             made = Item(f"#PWR_{owner}", name, power(name), {"1": net}, {1: ""})
             self.symbols.append(Placed(made, 1, *at))
         else:
-            self.labels.append(Label(net, at, left))
+            self.labels.append(NetLabel(net, at, left))
 
     def wire(self, *points: Point) -> None:
         """A wire through these points; those that coincide take none."""
@@ -132,14 +132,14 @@ class Sheet:
     """The whole drawing. paper : its size."""
 
     paper: str
-    cells: tuple[Cell, ...]
+    cells: tuple[LayoutCell, ...]
 
     @property
     def symbols(self) -> tuple[Placed, ...]:
         return tuple(s for cell in self.cells for s in cell.symbols)
 
     @property
-    def labels(self) -> tuple[Label, ...]:
+    def labels(self) -> tuple[NetLabel, ...]:
         return tuple(s for cell in self.cells for s in cell.labels)
 
     @property
@@ -169,7 +169,7 @@ class Sheet:
         return tuple(sorted(p for p, n in meeting.items() if n > 2))
 
 
-def arrange(items: Sequence[Item], last: Cell) -> Sheet:
+def arrange(items: Sequence[Item], last: LayoutCell) -> Sheet:
     """The sheet of these items; ``last`` is the cell that stands behind all others."""
     cells = [*_amplifiers(items), last]
     for paper, (width, height) in PAPERS.items():
@@ -181,9 +181,9 @@ def arrange(items: Sequence[Item], last: Cell) -> Sheet:
     return Sheet("A0", _pack(cells, 18, 10**6) or ())
 
 
-def flow(title: str, items: Iterable[Item], notes: Sequence[str] = ()) -> Cell:
+def flow(title: str, items: Iterable[Item], notes: Sequence[str] = ()) -> LayoutCell:
     """A cell of parts in rows, named at every end; the notes stand below them."""
-    cell = Cell(title)
+    cell = LayoutCell(title)
     _rows(cell, list(items), 0)
     for i, text in enumerate(notes):
         cell.notes.append(Note(text, (0, cell.height + 2 * i + 2)))
@@ -191,7 +191,7 @@ def flow(title: str, items: Iterable[Item], notes: Sequence[str] = ()) -> Cell:
     return cell
 
 
-def _amplifiers(items: Sequence[Item]) -> list[Cell]:
+def _amplifiers(items: Sequence[Item]) -> list[LayoutCell]:
     """A cell for each section in the order of the stages, then one for each other stage."""
     sections = [
         (item, unit, item.stages[unit])
@@ -203,7 +203,7 @@ def _amplifiers(items: Sequence[Item]) -> list[Cell]:
     order = sorted({stage for item in items for stage in item.stages.values()}, key=_rank)
     sections.sort(key=lambda s: order.index(s[2]))
     free = [item for item in items if item.shape.prefix != "U"]
-    cells: dict[str, list[Cell]] = {}
+    cells: dict[str, list[LayoutCell]] = {}
     for item, unit, stage in sections:
         inverting, _, output = (item.pins[p.number] for p in item.shape.units[unit - 1].pins)
         near = [p for p in free if len(p.pins) == 2 and inverting in p.ends() and stage in _of(p)]
@@ -238,9 +238,9 @@ def _of(item: Item) -> tuple[str, ...]:
 
 def _section(
     item: Item, unit: int, stage: str, inputs: Sequence[Item], back: Sequence[Item]
-) -> Cell:
+) -> LayoutCell:
     """One section with its inputs on the left and its feedback above."""
-    cell = Cell(f"{stage} ({item.reference}{chr(64 + unit)})")
+    cell = LayoutCell(f"{stage} ({item.reference}{chr(64 + unit)})")
     y = PITCH * len(back) + 3
     amplifier = Placed(item, unit, AMPLIFIER, y)
     cell.symbols.append(amplifier)
@@ -270,7 +270,7 @@ def _section(
     elif node not in POWER:
         # Past the junction; above the bus where nothing leads on from there.
         where = (BUS + 1, 0) if back else (BUS, min(levels))
-        cell.labels.append(Label(node, where, left=False))
+        cell.labels.append(NetLabel(node, where, left=False))
     cell.wire((BUS, min(levels)), (BUS, max(levels)))
     cell.height = max(PITCH * (len(inputs) - 1) + 4, y + 6)
     return cell
@@ -283,7 +283,7 @@ def _turned(item: Item, right: str, at: Point) -> Placed:
     return placed if on_right else replace(placed, angle=180)
 
 
-def _far_end(cell: Cell, placed: Placed, node: str) -> None:
+def _far_end(cell: LayoutCell, placed: Placed, node: str) -> None:
     """The left end of a part whose right end is at the bus."""
     number = min(placed.item.pins, key=lambda n: placed.point(n)[0])
     at = placed.point(number)
@@ -293,7 +293,7 @@ def _far_end(cell: Cell, placed: Placed, node: str) -> None:
     )
 
 
-def _rows(cell: Cell, items: Sequence[Item], top: int) -> None:
+def _rows(cell: LayoutCell, items: Sequence[Item], top: int) -> None:
     """Parts from the left to the right and down, each with its own ends."""
     x, y, tallest = 0, top, 0
     for item in items:
@@ -317,7 +317,7 @@ def _size(item: Item) -> tuple[int, int]:
     return 25, max(p.y for p in pins) - min(p.y for p in pins) + 8
 
 
-def _alone(cell: Cell, item: Item, x: int, y: int) -> None:
+def _alone(cell: LayoutCell, item: Item, x: int, y: int) -> None:
     """One part with the names of its nets at its pins."""
     if item.shape.prefix == "U":
         (unit,) = item.stages
@@ -357,7 +357,7 @@ def _on(p: Point, a: Point, b: Point) -> bool:
     return y == ya and min(xa, xb) <= x <= max(xa, xb)
 
 
-def _pack(cells: Sequence[Cell], columns: int, rows: int) -> tuple[Cell, ...] | None:
+def _pack(cells: Sequence[LayoutCell], columns: int, rows: int) -> tuple[LayoutCell, ...] | None:
     """The cells in columns of this many rows, in their order; None where they do not fit."""
     left = top = int(MARGIN / GRID)
     column, y = 0, 0

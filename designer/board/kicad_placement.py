@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from designer.board.board_parts import outputs
 from designer.board.component import Component
-from designer.board.footprint_shapes import Footprint
+from designer.board.footprint_shapes import FootprintShape
 from designer.board.footprints import footprint
 from designer.circuit.netlist import GROUND, Circuit, Section
 from designer.circuit.stage_title import INTERFACE, SUPPLY, stage_names
@@ -31,23 +31,23 @@ ORIGIN = (25.0, 25.0)
 
 
 @dataclass(frozen=True)
-class Spot:
+class PlacedComponent:
     """A component at (x, y), turned by angle [degrees]."""
 
     component: Component
-    footprint: Footprint
+    footprint: FootprintShape
     x: float = 0.0
     y: float = 0.0
     angle: int = 0
 
     @property
-    def box(self) -> Box:
+    def box(self) -> PlacedBox:
         """Its courtyard with the room for its reference above it."""
         left, top, right, bottom = self.footprint.courtyard
         if self.angle == 180:
             left, top, right, bottom = -right, -bottom, -left, -top
         half = LETTER * len(self.component.reference) / 2.0
-        return Box(
+        return PlacedBox(
             self.x + min(left, -half),
             self.y + top - TEXT - 0.4,
             self.x + max(right, half),
@@ -60,12 +60,12 @@ class Spot:
         sign = -1.0 if self.angle == 180 else 1.0
         return self.x + sign * found.x, self.y + sign * found.y
 
-    def moved(self, x: float, y: float) -> Spot:
+    def moved(self, x: float, y: float) -> PlacedComponent:
         return replace(self, x=self.x + x, y=self.y + y)
 
 
 @dataclass(frozen=True)
-class Box:
+class PlacedBox:
     left: float
     top: float
     right: float
@@ -84,15 +84,15 @@ class Box:
 class Placement:
     """Every component with a footprint; outline : of the board."""
 
-    spots: tuple[Spot, ...]
-    outline: Box
+    spots: tuple[PlacedComponent, ...]
+    outline: PlacedBox
 
 
 def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
     """The board; InputError for a footprint that is not known here."""
-    spots = {c.reference: Spot(c, footprint(c.footprint)) for c in components}
+    spots = {c.reference: PlacedComponent(c, footprint(c.footprint)) for c in components}
     owner = _owners(circuit, components)
-    blocks: list[list[Spot]] = []
+    blocks: list[list[PlacedComponent]] = []
     packages = [c for c in components if c.kind == "op-amp"]
     for package in packages:
         near = [spots.pop(c.reference) for c in components if c.near == package.reference]
@@ -107,7 +107,7 @@ def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
     incoming, outgoing = _sides(circuit, spots.values())
     left, right = _strip(incoming, height), _strip(outgoing, height)
     columns = [column for column in (left, middle, right) if column]
-    out: list[Spot] = []
+    out: list[PlacedComponent] = []
     x = 0.0
     for column in columns:
         box = _bounds(column)
@@ -116,11 +116,11 @@ def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
     return _on_board(out)
 
 
-def _on_board(spots: Sequence[Spot]) -> Placement:
+def _on_board(spots: Sequence[PlacedComponent]) -> Placement:
     """The outline round the parts, its corner at ``ORIGIN``, everything on steps of 0.05 mm."""
     box = _bounds(spots)
     dx, dy = ORIGIN[0] + EDGE - box.left, ORIGIN[1] + EDGE - box.top
-    outline = Box(
+    outline = PlacedBox(
         *ORIGIN,
         ORIGIN[0] + math.ceil(box.width + 2.0 * EDGE),
         ORIGIN[1] + math.ceil(box.height + 2.0 * EDGE),
@@ -151,7 +151,11 @@ def _owners(circuit: Circuit, components: Sequence[Component]) -> dict[str, list
     return out
 
 
-def _block(package: Spot, near: Sequence[Spot], mine: Mapping[str, Sequence[Spot]]) -> list[Spot]:
+def _block(
+    package: PlacedComponent,
+    near: Sequence[PlacedComponent],
+    mine: Mapping[str, Sequence[PlacedComponent]],
+) -> list[PlacedComponent]:
     """A package with its decoupling beside the supply pins and its sections' parts around."""
     out = [package, *_decoupling(package, near)]
     core = _bounds(out)
@@ -171,9 +175,9 @@ def _block(package: Spot, near: Sequence[Spot], mine: Mapping[str, Sequence[Spot
     return out
 
 
-def _decoupling(package: Spot, near: Sequence[Spot]) -> list[Spot]:
+def _decoupling(package: PlacedComponent, near: Sequence[PlacedComponent]) -> list[PlacedComponent]:
     """Each capacitor with one pad at the supply pin of the same net."""
-    out: list[Spot] = []
+    out: list[PlacedComponent] = []
     for spot in near:
         nets = spot.component.nets
         pin = next(
@@ -197,16 +201,18 @@ def _decoupling(package: Spot, near: Sequence[Spot]) -> list[Spot]:
     return out
 
 
-def _rows(parts: Iterable[Spot], *, right: bool, width: float | None = None) -> list[Spot]:
+def _rows(
+    parts: Iterable[PlacedComponent], *, right: bool, width: float | None = None
+) -> list[PlacedComponent]:
     """Parts in rows from top to bottom, against the right or the left edge at x = 0."""
     held = list(parts)
     if not held:
         return []
     widest = max(s.box.width for s in held)
     limit = max(13.0, 2.1 * widest) if width is None else max(width, widest)
-    out: list[Spot] = []
+    out: list[PlacedComponent] = []
     y = 0.0
-    row: list[Spot] = []
+    row: list[PlacedComponent] = []
 
     def close() -> None:
         nonlocal y
@@ -228,9 +234,9 @@ def _rows(parts: Iterable[Spot], *, right: bool, width: float | None = None) -> 
     return out
 
 
-def _stack(blocks: Sequence[Sequence[Spot]]) -> list[Spot]:
+def _stack(blocks: Sequence[Sequence[PlacedComponent]]) -> list[PlacedComponent]:
     """Blocks below one another, their packages in one column."""
-    out: list[Spot] = []
+    out: list[PlacedComponent] = []
     y = 0.0
     for block in blocks:
         box = _bounds(block)
@@ -239,10 +245,12 @@ def _stack(blocks: Sequence[Sequence[Spot]]) -> list[Spot]:
     return out
 
 
-def _sides(circuit: Circuit, spots: Iterable[Spot]) -> tuple[list[Spot], list[Spot]]:
+def _sides(
+    circuit: Circuit, spots: Iterable[PlacedComponent]
+) -> tuple[list[PlacedComponent], list[PlacedComponent]]:
     """What comes in, and what goes out: parts that a state's or the dead zone's output drives."""
-    incoming: list[Spot] = []
-    outgoing: list[Spot] = []
+    incoming: list[PlacedComponent] = []
+    outgoing: list[PlacedComponent] = []
     simulated = set(circuit.nets) | {GROUND}
     for spot in spots:
         own = {net for net in spot.component.nets.values() if net and net not in simulated}
@@ -254,9 +262,9 @@ def _sides(circuit: Circuit, spots: Iterable[Spot]) -> tuple[list[Spot], list[Sp
     return incoming, outgoing
 
 
-def _strip(spots: Sequence[Spot], height: float) -> list[Spot]:
+def _strip(spots: Sequence[PlacedComponent], height: float) -> list[PlacedComponent]:
     """Columns of parts about as high as the blocks."""
-    columns: list[list[Spot]] = []
+    columns: list[list[PlacedComponent]] = []
     y = math.inf
     for s in spots:
         tall = s.box.height + ROOM
@@ -265,7 +273,7 @@ def _strip(spots: Sequence[Spot], height: float) -> list[Spot]:
             y = 0.0
         columns[-1].append(s.moved(-s.box.left, y - s.box.top))
         y += tall
-    out: list[Spot] = []
+    out: list[PlacedComponent] = []
     x = 0.0
     for column in columns:
         box = _bounds(column)
@@ -274,9 +282,9 @@ def _strip(spots: Sequence[Spot], height: float) -> list[Spot]:
     return out
 
 
-def _bounds(spots: Iterable[Spot]) -> Box:
+def _bounds(spots: Iterable[PlacedComponent]) -> PlacedBox:
     boxes = [s.box for s in spots]
-    return Box(
+    return PlacedBox(
         min(b.left for b in boxes),
         min(b.top for b in boxes),
         max(b.right for b in boxes),
@@ -284,7 +292,7 @@ def _bounds(spots: Iterable[Spot]) -> Box:
     )
 
 
-def _overlap(a: Box, b: Box) -> bool:
+def _overlap(a: PlacedBox, b: PlacedBox) -> bool:
     return a.left < b.right and b.left < a.right and a.top < b.bottom and b.top < a.bottom
 
 

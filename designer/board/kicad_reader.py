@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from designer.base.errors import InputError
+from designer.base.guarded_reading import read_bytes, reading
 from designer.base.natural_sort import natural
-from designer.base.reading import read_bytes, reading
 from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
@@ -35,7 +35,7 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Pad:
+class PlacedPad:
     """net : the circuit's name of it, "" where none is connected. at : on the board [mm].
 
     corners : of the copper, or of the rectangle around it, in order [mm]; a circle's are many, and
@@ -49,7 +49,7 @@ class Pad:
 
 
 @dataclass(frozen=True)
-class Footprint:
+class PlacedFootprint:
     """reference : its designator. value : as written. courtyard : whether it has one.
 
     library, name : of the footprint; library is "" where none is written. part_number : the field
@@ -58,7 +58,7 @@ class Footprint:
 
     reference: str
     value: str
-    pads: tuple[Pad, ...]
+    pads: tuple[PlacedPad, ...]
     courtyard: bool
     library: str
     name: str
@@ -89,17 +89,17 @@ class BoardFile:
 
     path: Path
     text: str
-    footprints: tuple[Footprint, ...]
+    footprints: tuple[PlacedFootprint, ...]
     tracks: tuple[Track, ...]
     vias: tuple[str, ...]
     zones: tuple[str, ...]
     outline: Outline
 
-    def footprint(self, reference: str) -> Footprint | None:
+    def footprint(self, reference: str) -> PlacedFootprint | None:
         """That of one component."""
         return next((f for f in self.footprints if f.reference == reference), None)
 
-    def pads(self, reference: str) -> tuple[Pad, ...]:
+    def pads(self, reference: str) -> tuple[PlacedPad, ...]:
         """Pads of one component."""
         footprint = self.footprint(reference)
         return () if footprint is None else footprint.pads
@@ -159,7 +159,7 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
     InputError : designators or nets differ; says which.
     """
     wanted = {c.reference: c for c in components if View.BOARD in c.views}
-    there: dict[str, Footprint] = {}
+    there: dict[str, PlacedFootprint] = {}
     for footprint in board.footprints:
         if footprint.reference in there and footprint.reference in wanted:
             raise InputError(
@@ -208,12 +208,12 @@ def _check_version(board: Expression) -> None:
         )
 
 
-def _footprint(found: Expression) -> Footprint:
+def _footprint(found: Expression) -> PlacedFootprint:
     at = found.get("at")
     x, y = at.number(0), at.number(1)
     turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
     library, _, name = found.text(0).rpartition(":")
-    return Footprint(
+    return PlacedFootprint(
         reference=_field(found, "Reference") or "",
         value=_field(found, "Value") or "",
         pads=tuple(_pad(pad, (x, y), turn) for pad in found.all("pad")),
@@ -237,11 +237,11 @@ def _field(found: Expression, name: str) -> str | None:
     return None
 
 
-def _pad(found: Expression, origin: Point, turn: float) -> Pad:
+def _pad(found: Expression, origin: Point, turn: float) -> PlacedPad:
     at = found.get("at")
     place = turned((at.number(0), at.number(1)), origin, turn)
     net = found.find("net")
-    return Pad(
+    return PlacedPad(
         found.text(0),
         circuit_net(net.text(1)) if net is not None and not _unconnected(net.text(1)) else "",
         place,

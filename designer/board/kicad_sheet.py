@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from designer.base.sexpr import Expression, expression
 from designer.board import kicad_symbols as symbols
 from designer.board.kicad_items import SIMULATION, Entry
-from designer.board.kicad_layout import Item, Label, Note, Placed, Sheet, arrange, flow
+from designer.board.kicad_layout import Item, NetLabel, Note, Placed, Sheet, arrange, flow
 from designer.board.kicad_names import LIBRARY, identifier, safe_text
-from designer.board.kicad_symbols import GRID, Shape, effects, position, stroke
+from designer.board.kicad_symbols import GRID, SymbolShape, effects, position, stroke
 
 FILE_VERSION = 20250114
 """Of schematics, as KiCad 9 writes them."""
@@ -22,7 +22,7 @@ def layout(entries: Sequence[Entry], directives: Sequence[str]) -> Sheet:
     return arrange(others, flow(SIMULATION, simulated, directives))
 
 
-def shapes(sheet: Sheet) -> tuple[Shape, ...]:
+def shapes(sheet: Sheet) -> tuple[SymbolShape, ...]:
     """Each symbol that the sheet uses, by name."""
     return tuple({s.item.shape.name: s.item.shape for s in sheet.symbols}.values())
 
@@ -100,7 +100,7 @@ def _wiring(project: str, sheet: Sheet) -> Iterator[Expression]:
         )
 
 
-def _label(project: str, label: Label) -> Expression:
+def _label(project: str, label: NetLabel) -> Expression:
     return expression(
         "label",
         label.net,
@@ -172,7 +172,7 @@ def _power(item: Item) -> bool:
     return item.shape.power
 
 
-def _distinct(labels: Iterable[Label]) -> tuple[Label, ...]:
+def _distinct(labels: Iterable[NetLabel]) -> tuple[NetLabel, ...]:
     return tuple(dict.fromkeys(labels))
 
 

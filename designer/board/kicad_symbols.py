@@ -35,7 +35,7 @@ class ShapePin:
 
 
 @dataclass(frozen=True)
-class Unit:
+class SymbolUnit:
     """One of the drawings that a symbol consists of. lines : polylines of (x, y)."""
 
     pins: tuple[ShapePin, ...]
@@ -44,7 +44,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Shape:
+class SymbolShape:
     """A symbol: prefix : of its references. power : whether it names its net.
 
     texts : where reference and value stand, (x, y) with y upwards. names : whether pins show
@@ -53,7 +53,7 @@ class Shape:
 
     name: str
     prefix: str
-    units: tuple[Unit, ...]
+    units: tuple[SymbolUnit, ...]
     texts: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1.9), (0.0, -1.9))
     power: bool = False
     names: bool = False
@@ -76,7 +76,7 @@ def two_pins(
     lines: Sequence[Sequence[tuple[float, float]]],
     body: float,
     kind: str = "passive",
-) -> Shape:
+) -> SymbolShape:
     """A part of two pins in a row; left, right : number and name. body : its half length."""
     length = REACH - int(body)
     inner = [((-float(REACH - length), 0.0), (-body, 0.0)), ((body, 0.0), (REACH - length, 0.0))]
@@ -85,15 +85,15 @@ def two_pins(
         ShapePin(*left, kind, -REACH, 0, 0, length),
         ShapePin(*right, kind, REACH, 0, 180, length),
     )
-    return Shape(name, prefix, (Unit(pins, tuple(drawn), filled=False),))
+    return SymbolShape(name, prefix, (SymbolUnit(pins, tuple(drawn), filled=False),))
 
 
-def resistor() -> Shape:
+def resistor() -> SymbolShape:
     box = ((-2.0, -0.8), (2.0, -0.8), (2.0, 0.8), (-2.0, 0.8), (-2.0, -0.8))
     return two_pins("R", "R", ("1", "1"), ("2", "2"), [box], 2.0)
 
 
-def capacitor() -> Shape:
+def capacitor() -> SymbolShape:
     plates = [((-0.4, -1.1), (-0.4, 1.1)), ((0.4, -1.1), (0.4, 1.1))]
     return two_pins("C", "C", ("1", "+"), ("2", "-"), plates, 0.4)
 
@@ -106,7 +106,7 @@ def diode(
     prefix: str = "D",
     zener: bool = False,
     free: Sequence[tuple[str, str]] = (),
-) -> Shape:
+) -> SymbolShape:
     """anode, cathode : pin numbers. The anode is on the left.
 
     free : number and name of each pin of the case that stays open, below.
@@ -124,7 +124,7 @@ def diode(
     return replace(made, units=(unit,), texts=((0.0, 1.9), (0.0, -4.2)))
 
 
-def source(name: str) -> Shape:
+def source(name: str) -> SymbolShape:
     """A source that only the simulation has; its first pin is positive and on the left."""
     circle = tuple(
         (2.0 * x, 2.0 * y)
@@ -137,10 +137,12 @@ def source(name: str) -> Shape:
     )
     plus = [((-1.5, 0.0), (-0.7, 0.0)), ((-1.1, -0.4), (-1.1, 0.4)), ((0.7, -0.4), (0.7, 0.4))]
     made = two_pins(name, "V", ("1", "+"), ("2", "-"), [circle, *plus], 2.0)
-    return Shape(name, "V", made.units, ((0.0, 2.8), (0.0, -2.8)))
+    return SymbolShape(name, "V", made.units, ((0.0, 2.8), (0.0, -2.8)))
 
 
-def row(name: str, prefix: str, pins: Sequence[tuple[str, str, str]], pitch: int = 3) -> Shape:
+def row(
+    name: str, prefix: str, pins: Sequence[tuple[str, str, str]], pitch: int = 3
+) -> SymbolShape:
     """A box with its pins below one another on the left: (number, name, electrical type)."""
     width = 5.0 if any(n != p for n, p, _ in pins) else 2.0
     placed = tuple(
@@ -150,13 +152,17 @@ def row(name: str, prefix: str, pins: Sequence[tuple[str, str, str]], pitch: int
     low = -float(pitch) * (len(pins) - 1) - 1.5
     box = ((-1.0, 1.5), (width, 1.5), (width, low), (-1.0, low), (-1.0, 1.5))
     texts = ((0.0, 2.6), (0.0, low - 1.1))
-    return Shape(name, prefix, (Unit(placed, (box,)),), texts, names=width > 2.0, numbers=True)
+    return SymbolShape(
+        name, prefix, (SymbolUnit(placed, (box,)),), texts, names=width > 2.0, numbers=True
+    )
 
 
-def test_point() -> Shape:
+def test_point() -> SymbolShape:
     ring = ((0.0, 0.0), (0.0, 1.0), (-0.6, 1.6), (0.0, 2.2), (0.6, 1.6), (0.0, 1.0))
     pin = ShapePin("1", "1", "passive", 0, 0, 90, 0)
-    return Shape("TestPoint", "TP", (Unit((pin,), (ring,), False),), ((2.6, 1.4), (2.6, 0.0)))
+    return SymbolShape(
+        "TestPoint", "TP", (SymbolUnit((pin,), (ring,), False),), ((2.6, 1.4), (2.6, 0.0))
+    )
 
 
 test_point.__test__ = False  # type: ignore[attr-defined]  # no test, whatever its name says
@@ -166,14 +172,16 @@ INVERTING, NONINVERTING, OUTPUT = (-6, 2), (-6, -2), (6, 0)
 """Where the pins of a section are."""
 
 
-def opamp(name: str, sections: Sequence[tuple[str, str, str]], supply: tuple[str, str]) -> Shape:
+def opamp(
+    name: str, sections: Sequence[tuple[str, str, str]], supply: tuple[str, str]
+) -> SymbolShape:
     """An op-amp package: pin numbers (inverting, noninverting, output) of each section in order,
     then of the positive and the negative supply, which are the last unit."""
     triangle = ((-4.0, -4.0), (-4.0, 4.0), (4.0, 0.0), (-4.0, -4.0))
     minus, plus = ((-3.4, 2.0), (-2.4, 2.0)), ((-3.4, -2.0), (-2.4, -2.0))
     upright = ((-2.9, -2.5), (-2.9, -1.5))
     units = [
-        Unit(
+        SymbolUnit(
             (
                 ShapePin(n_inverting, "-", "input", *INVERTING, 0, 2),
                 ShapePin(n_noninverting, "+", "input", *NONINVERTING, 0, 2),
@@ -185,7 +193,7 @@ def opamp(name: str, sections: Sequence[tuple[str, str, str]], supply: tuple[str
     ]
     box = ((-1.5, 2.0), (1.5, 2.0), (1.5, -2.0), (-1.5, -2.0), (-1.5, 2.0))
     units.append(
-        Unit(
+        SymbolUnit(
             (
                 ShapePin(supply[0], "V+", "power_in", 0, 4, 270, 2),
                 ShapePin(supply[1], "V-", "power_in", 0, -4, 90, 2),
@@ -193,10 +201,10 @@ def opamp(name: str, sections: Sequence[tuple[str, str, str]], supply: tuple[str
             (box,),
         )
     )
-    return Shape(name, "U", tuple(units), ((1.0, 4.6), (1.0, -4.6)), numbers=True)
+    return SymbolShape(name, "U", tuple(units), ((1.0, 4.6), (1.0, -4.6)), numbers=True)
 
 
-def power(net: str) -> Shape:
+def power(net: str) -> SymbolShape:
     """A power symbol: ground points down, VEE down, any other up."""
     down = net in ("GND", "VEE")
     sign = -1.0 if down else 1.0
@@ -209,10 +217,10 @@ def power(net: str) -> Shape:
         lines = (((0.0, 0.0), (0.0, sign)), ((-0.7, sign), (0.7, sign)))
     pin = ShapePin("1", net, "power_in", 0, 0, 270 if down else 90, 0)
     texts = ((0.0, -3.0), (0.0, sign * (2.6 if net == "GND" else 2.0)))
-    return Shape(net, "#PWR", (Unit((pin,), lines, False),), texts, power=True)
+    return SymbolShape(net, "#PWR", (SymbolUnit((pin,), lines, False),), texts, power=True)
 
 
-def flag() -> Shape:
+def flag() -> SymbolShape:
     """Tells the electrical rule check that a net is fed from outside."""
     lines = (
         ((0.0, 0.0), (0.0, 1.0)),
@@ -220,10 +228,10 @@ def flag() -> Shape:
     )
     pin = ShapePin("1", "pwr", "power_out", 0, 0, 90, 0)
     texts = ((0.0, 4.0), (0.0, 3.0))
-    return Shape("PWR_FLAG", "#FLG", (Unit((pin,), lines, False),), texts, power=True)
+    return SymbolShape("PWR_FLAG", "#FLG", (SymbolUnit((pin,), lines, False),), texts, power=True)
 
 
-def library(shapes: Iterable[Shape]) -> Expression:
+def library(shapes: Iterable[SymbolShape]) -> Expression:
     """The project's symbol library."""
     return expression(
         "kicad_symbol_lib",
@@ -234,7 +242,7 @@ def library(shapes: Iterable[Shape]) -> Expression:
     )
 
 
-def symbol(shape: Shape, name: str) -> Expression:
+def symbol(shape: SymbolShape, name: str) -> Expression:
     """The definition of a symbol; its name has the library's before it inside a sheet."""
     units = [
         expression(
@@ -261,7 +269,7 @@ def symbol(shape: Shape, name: str) -> Expression:
     )
 
 
-def _properties(shape: Shape) -> Iterator[Expression]:
+def _properties(shape: SymbolShape) -> Iterator[Expression]:
     (rx, ry), (vx, vy) = shape.texts
     texts = {
         "Reference": (shape.prefix, rx, ry, shape.power),

@@ -19,8 +19,8 @@ from designer.board.component import Numbers, designator
 from designer.board.drawing_cells import (
     Amplifier,
     Cell,
+    CellRows,
     Chain,
-    Rows,
     TwoPin,
     board_cells,
     circuit_cells,
@@ -183,7 +183,7 @@ class _Page:
         )
         return after + 0.6 + 0.2 * len(net) + 0.4 - x, y - bottom + 0.5 * ROW
 
-    def rows(self, x: float, y: float, cell: Rows) -> tuple[float, float]:
+    def rows(self, x: float, y: float, cell: CellRows) -> tuple[float, float]:
         """A chain or a line of text a row."""
         width, below = 0.0, y
         for row in cell.rows:

@@ -9,11 +9,11 @@ from .design_rule import (
     FAIL as FAIL,
     NOT_RUN as NOT_RUN,
     PASS as PASS,
-    Found as Found,
+    DesignRule as DesignRule,
+    Finding as Finding,
     NotRun as NotRun,
-    Outcome as Outcome,
     Override as Override,
-    Rule as Rule,
+    RuleOutcome as RuleOutcome,
     Scope as Scope,
     judged as judged,
     not_run as not_run,
@@ -32,7 +32,7 @@ from .diode_curve import (
 from .entries import (
     FORBIDDEN as FORBIDDEN,
     PRICE_CLASSES as PRICE_CLASSES,
-    Diode as Diode,
+    DiodeEntry as DiodeEntry,
     Figure as Figure,
     Kind as Kind,
     Mounting as Mounting,
@@ -40,7 +40,7 @@ from .entries import (
     PartChoice as PartChoice,
     PartFamily as PartFamily,
     Rating as Rating,
-    Reference as Reference,
+    ReferenceEntry as ReferenceEntry,
     Use as Use,
 )
 from .folders import (

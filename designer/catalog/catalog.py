@@ -27,7 +27,7 @@ from designer.base.units import format_quantity
 from designer.catalog.entries import (
     FORBIDDEN,
     UNITS,
-    Diode,
+    DiodeEntry,
     Header,
     Kind,
     Mounting,
@@ -35,8 +35,8 @@ from designer.catalog.entries import (
     PartChoice,
     PartFamily,
     Price,
-    Reference,
-    Trimmer,
+    ReferenceEntry,
+    TrimmerEntry,
     Use,
     mounting_of,
 )
@@ -44,8 +44,8 @@ from designer.catalog.folders import read_folders
 from designer.catalog.shortage import Offer, no_part, no_values, other_case
 
 _SAME = 1e-9  # relative; values and grades closer than this are the same
-_NamedT = TypeVar("_NamedT", OpAmp, Diode, Reference, PartFamily)
-_CasedT = TypeVar("_CasedT", OpAmp, Diode, Reference, Trimmer)
+_NamedT = TypeVar("_NamedT", OpAmp, DiodeEntry, ReferenceEntry, PartFamily)
+_CasedT = TypeVar("_CasedT", OpAmp, DiodeEntry, ReferenceEntry, TrimmerEntry)
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class Catalog:
 
     families: tuple[PartFamily, ...]
     opamps: tuple[OpAmp, ...]
-    diodes: tuple[Diode, ...]
-    references: tuple[Reference, ...]
+    diodes: tuple[DiodeEntry, ...]
+    references: tuple[ReferenceEntry, ...]
     hash: str
     folders: tuple[Path, ...]
-    trimmers: tuple[Trimmer, ...] = ()
+    trimmers: tuple[TrimmerEntry, ...] = ()
     headers: tuple[Header, ...] = ()
     prices: tuple[Price, ...] = ()
     mounting: Mounting = "mixed"
@@ -209,17 +209,17 @@ class Catalog:
         others = [other for other in self.opamps if other.takes(rails)]
         return self._cased(named, f"op-amps for ± {rails:g} V", others)
 
-    def diode(self, name: str) -> Diode:
+    def diode(self, name: str) -> DiodeEntry:
         """The diode of this name; InputError as for ``opamp``."""
         return self._cased(_named(self.diodes, name, "circuit.diode"), "diodes", self.diodes)
 
-    def reference(self, name: str) -> Reference:
+    def reference(self, name: str) -> ReferenceEntry:
         """The voltage reference of this name; InputError as for ``opamp``."""
         named = _named(self.references, name, "circuit.reference")
         same = [r for r in self.references if math.isclose(r.voltage, named.voltage, rel_tol=_SAME)]
         return self._cased(named, f"references of {format_quantity(named.voltage, 'V')}", same)
 
-    def trimmer(self, value: float) -> Trimmer:
+    def trimmer(self, value: float) -> TrimmerEntry:
         """The first trimmer of this value [Ω]; InputError names the values that there are."""
         same = [t for t in self.trimmers if math.isclose(t.value, value, rel_tol=_SAME)]
         if same:
@@ -312,11 +312,11 @@ def load_catalog(extra: Path | None = None) -> Catalog:
     return Catalog(
         tuple(entry for entry in entries if isinstance(entry, PartFamily)),
         tuple(entry for entry in entries if isinstance(entry, OpAmp)),
-        tuple(entry for entry in entries if isinstance(entry, Diode)),
-        tuple(entry for entry in entries if isinstance(entry, Reference)),
+        tuple(entry for entry in entries if isinstance(entry, DiodeEntry)),
+        tuple(entry for entry in entries if isinstance(entry, ReferenceEntry)),
         held.hash,
         held.folders,
-        tuple(entry for entry in entries if isinstance(entry, Trimmer)),
+        tuple(entry for entry in entries if isinstance(entry, TrimmerEntry)),
         tuple(entry for entry in entries if isinstance(entry, Header)),
         tuple(entry for entry in entries if isinstance(entry, Price)),
     )
@@ -328,7 +328,7 @@ def _nearest(ascending: Sequence[float], value: float) -> float:
     return min(ascending[max(above - 1, 0) : above + 1], key=lambda each: abs(each - value))
 
 
-def _footprints(entry: OpAmp | Diode | Reference | Trimmer) -> tuple[str, ...]:
+def _footprints(entry: OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry) -> tuple[str, ...]:
     """Of every case that it is sold in."""
     return entry.footprint, *(case.footprint for case in entry.cases)
 

@@ -19,7 +19,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Rule:
+class DesignRule:
     """One rule, without the function that looks at it.
 
     id : its name, in rules.json and in ``[rules.<id>]``. unit : of the limit; "" for a ratio or a
@@ -49,7 +49,7 @@ class Rule:
 
 
 @dataclass(frozen=True)
-class Found:
+class Finding:
     """What a rule found: the worst value, where it is, and the limit that holds there.
 
     limit : None takes the rule's own. more : what else a reader should know.
@@ -70,13 +70,13 @@ class Override:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RuleOutcome:
     """A rule and what became of it. value, limit : nan where it was not run.
 
     override : the limit is the model file's; ``usual`` then holds the one it replaces.
     """
 
-    rule: Rule
+    rule: DesignRule
     status: Status
     found: str
     value: float = float("nan")
@@ -120,7 +120,9 @@ class NotRun(Exception):
     """A rule cannot be looked at; says why in words. Never a pass."""
 
 
-def judged(rule: Rule, found: Iterable[Found], override: Override | None = None) -> Outcome:
+def judged(
+    rule: DesignRule, found: Iterable[Finding], override: Override | None = None
+) -> RuleOutcome:
     """Pass or fail by the worst of what was found, under the model file's limit or the usual one.
 
     Raises
@@ -137,27 +139,27 @@ def judged(rule: Rule, found: Iterable[Found], override: Override | None = None)
     text += f" at {worst.where}" if worst.where else ""
     text += f"; {worst.more}" if worst.more else ""
     status = PASS if rule.keeps(worst.value, limit) else FAIL
-    return Outcome(rule, status, text, worst.value, limit, worst.where, override, usual)
+    return RuleOutcome(rule, status, text, worst.value, limit, worst.where, override, usual)
 
 
-def usual_limit(rule: Rule, found: Found) -> float:
+def usual_limit(rule: DesignRule, found: Finding) -> float:
     """The limit of a rule where no model file changes it."""
     limit = found.limit if found.limit is not None else rule.limit
     assert limit is not None, f"{rule.id} has no limit"
     return limit
 
 
-def _excess(rule: Rule, found: Found, override: Override | None) -> float:
+def _excess(rule: DesignRule, found: Finding, override: Override | None) -> float:
     """How far past its limit, in limits; a value that is no number is the worst."""
     limit = usual_limit(rule, found) if override is None else override.limit
     over = (limit - found.value) if rule.least else (found.value - limit)
     return float("inf") if over != over else over / (abs(limit) or 1.0)
 
 
-def not_run(rule: Rule, why: str, override: Override | None = None) -> Outcome:
+def not_run(rule: DesignRule, why: str, override: Override | None = None) -> RuleOutcome:
     """What a rule says that could not be looked at."""
     limit = float("nan") if override is None else override.limit
-    return Outcome(rule, NOT_RUN, why, limit=limit, override=override)
+    return RuleOutcome(rule, NOT_RUN, why, limit=limit, override=override)
 
 
 def shown(value: float, unit: str) -> str:

@@ -6,7 +6,7 @@ The functions that look at a design stand in ``rule_nets``, ``rule_ratings``, ``
 
 from __future__ import annotations
 
-from designer.catalog.design_rule import Rule
+from designer.catalog.design_rule import DesignRule
 
 OWN = "this tool's margin"
 
@@ -21,10 +21,10 @@ def _rule(
     *,
     least: bool = False,
     board: bool = False,
-) -> Rule:
+) -> DesignRule:
     """limit : a number, or in words what decides it."""
     fixed = not isinstance(limit, str)
-    return Rule(
+    return DesignRule(
         id=id_,
         scope="board" if board else "circuit",
         title=title,
@@ -37,7 +37,7 @@ def _rule(
     )
 
 
-RULES: tuple[Rule, ...] = (
+RULES: tuple[DesignRule, ...] = (
     # Nets and pins.
     _rule(
         "feedback",
@@ -350,5 +350,5 @@ RULES: tuple[Rule, ...] = (
     ),
 )  # fmt: skip
 
-BY_ID: dict[str, Rule] = {rule.id: rule for rule in RULES}
+BY_ID: dict[str, DesignRule] = {rule.id: rule for rule in RULES}
 """The rules by id."""

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 from designer.base.errors import InputError
-from designer.catalog.entries import Diode
+from designer.catalog.entries import DiodeEntry
 
 TEST_CURRENT = 10e-3
 """Current [A] at which the catalogue's forward voltage is meant."""
@@ -68,7 +68,7 @@ class DiodeModel:
         return self.forward(WORKING_CURRENT)
 
 
-def diode_model(diode: Diode) -> DiodeModel:
+def diode_model(diode: DiodeEntry) -> DiodeModel:
     """The curve of a catalogued diode.
 
     It passes through the typical forward voltage at ``TEST_CURRENT`` and leaks less than the sheet
@@ -106,7 +106,7 @@ def diode_model(diode: Diode) -> DiodeModel:
     )
 
 
-def _no_diode(diode: Diode, volts: float, leakage: float) -> InputError:
+def _no_diode(diode: DiodeEntry, volts: float, leakage: float) -> InputError:
     found = f"{volts:g} V at {TEST_CURRENT:g} A beside {leakage:g} A of leakage"
     return InputError(None, f"diode {diode.name}", found, "the figures of a diode")
 

@@ -67,7 +67,7 @@ class Rating:
 
 
 @dataclass(frozen=True)
-class Case:
+class PartCase:
     """Another case that a part is sold in; pins : as of the part, where they differ."""
 
     part_number: str
@@ -92,7 +92,7 @@ class Price:
 
 
 @dataclass(frozen=True)
-class Section:
+class SectionPins:
     """One amplifier of a package, with its pin numbers."""
 
     name: str
@@ -123,7 +123,7 @@ class OpAmp:
     name: str
     manufacturer: str
     part_number: str
-    pins: tuple[Section, ...]
+    pins: tuple[SectionPins, ...]
     supply_pins: tuple[str, str]
     rated_supply: float
     supply: Figure
@@ -152,7 +152,7 @@ class OpAmp:
     spice: VendorModel | None = None
     # What no simulation knows of stays out of repr, which is part of what a study is known by.
     input_current: Figure | None = field(default=None, repr=False)
-    cases: tuple[Case, ...] = field(default=(), repr=False)
+    cases: tuple[PartCase, ...] = field(default=(), repr=False)
 
     @property
     def sections(self) -> int:
@@ -169,7 +169,7 @@ class OpAmp:
 
 
 @dataclass(frozen=True)
-class Diode:
+class DiodeEntry:
     """A diode: forward_voltage [V], reverse_current [A], capacitance [F], recovery [s].
 
     pins : name to number of the footprint's pad; KiCad's have the cathode at 1.
@@ -189,11 +189,11 @@ class Diode:
     pins: Mapping[str, str] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )
-    cases: tuple[Case, ...] = ()
+    cases: tuple[PartCase, ...] = ()
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceEntry:
     """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in,
     dynamic impedance [Ω], which may be missing. pins : name to number; a name that is neither
     cathode nor anode is not connected."""
@@ -212,7 +212,7 @@ class Reference:
     pins: Mapping[str, str] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )
-    cases: tuple[Case, ...] = ()
+    cases: tuple[PartCase, ...] = ()
 
     @property
     def least_current(self) -> float:
@@ -226,7 +226,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Trimmer:
+class TrimmerEntry:
     """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper.
 
     adjustability : how finely it can be set as a divider, ± as a fraction of the voltage across it.
@@ -243,7 +243,7 @@ class Trimmer:
     footprint: str
     sources: tuple[str, ...]
     assumed: tuple[str, ...] = ()
-    cases: tuple[Case, ...] = ()
+    cases: tuple[PartCase, ...] = ()
     adjustability: float = 0.0
 
 

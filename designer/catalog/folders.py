@@ -16,7 +16,7 @@ from pathlib import Path
 import platformdirs
 
 from designer.base.errors import MISSING, InputError, InputErrors
-from designer.base.reading import read_bytes, reading
+from designer.base.guarded_reading import read_bytes, reading
 from designer.catalog.read import Entry, read_catalog_file
 
 ENVIRONMENT = "DESIGNER_CATALOGS"

@@ -15,22 +15,22 @@ from pydantic import BaseModel
 
 from designer.base.errors import MISSING, InputError, InputErrors, problems_in
 from designer.base.eseries import series_values
-from designer.base.reading import csv_rows, decode, read_bytes
+from designer.base.guarded_reading import csv_rows, decode, read_bytes
 from designer.base.schema import one_of, parse_toml, validated
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.entries import (
     UNITS,
-    Case,
-    Diode,
+    DiodeEntry,
     Header,
     OpAmp,
+    PartCase,
     PartFamily,
     PartNumber,
     Price,
     Rating,
-    Reference,
-    Section,
-    Trimmer,
+    ReferenceEntry,
+    SectionPins,
+    TrimmerEntry,
 )
 from designer.catalog.tables import (
     CaseTable,
@@ -45,7 +45,7 @@ from designer.catalog.tables import (
 )
 from designer.catalog.vendor_model import read_vendor_model
 
-Entry = PartFamily | OpAmp | Diode | Reference | Trimmer | Header | Price
+Entry = PartFamily | OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry | Header | Price
 
 _MAX_BYTES = 4_000_000
 
@@ -227,7 +227,7 @@ def _values(table: FamilyTable, unit: str) -> tuple[float, ...]:
 
 
 def _opamp(table: OpAmpTable, file: str, place: str) -> OpAmp:
-    sections = tuple(Section(**dict(section)) for section in table.section)
+    sections = tuple(SectionPins(**dict(section)) for section in table.section)
     problems: list[InputError] = []
     pins = [*table.supply_pins]
     for section in sections:
@@ -255,17 +255,17 @@ def _opamp(table: OpAmpTable, file: str, place: str) -> OpAmp:
     return OpAmp(**{**figures, "pins": sections, "spice": spice, "cases": cases})
 
 
-def _cases(tables: Iterable[CaseTable]) -> tuple[Case, ...]:
-    return tuple(Case(**dict(table)) for table in tables)
+def _cases(tables: Iterable[CaseTable]) -> tuple[PartCase, ...]:
+    return tuple(PartCase(**dict(table)) for table in tables)
 
 
-def _cased(entry: type[Diode] | type[Reference]) -> Callable[[Any, str, str], Entry]:
+def _cased(entry: type[DiodeEntry] | type[ReferenceEntry]) -> Callable[[Any, str, str], Entry]:
     return lambda table, _file, _place: entry(**{**dict(table), "cases": _cases(table.cases)})
 
 
-def _trimmer(table: TrimmerTable, _file: str, _place: str) -> Trimmer:
+def _trimmer(table: TrimmerTable, _file: str, _place: str) -> TrimmerEntry:
     rating = Rating(**dict(table.rating))
-    return Trimmer(**{**dict(table), "rating": rating, "cases": _cases(table.cases)})
+    return TrimmerEntry(**{**dict(table), "rating": rating, "cases": _cases(table.cases)})
 
 
 def _header(table: HeaderTable, _file: str, _place: str) -> Header:
@@ -279,8 +279,8 @@ def _price(table: PriceTable, _file: str, _place: str) -> Price:
 _SORTS: dict[str, tuple[type[BaseModel], Callable[[Any, str, str], Entry]]] = {
     "family": (FamilyTable, _family),
     "opamp": (OpAmpTable, _opamp),
-    "diode": (DiodeTable, _cased(Diode)),
-    "reference": (ReferenceTable, _cased(Reference)),
+    "diode": (DiodeTable, _cased(DiodeEntry)),
+    "reference": (ReferenceTable, _cased(ReferenceEntry)),
     "trimmer": (TrimmerTable, _trimmer),
     "header": (HeaderTable, _header),
     "price": (PriceTable, _price),

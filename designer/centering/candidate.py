@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from scipy.stats import norm
 
-from designer.centering.levers import Choice
+from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import Agreement
 from designer.centering.places import Scored
 from designer.centering.windows import Stretch
@@ -30,7 +30,7 @@ class Candidate:
     scored : by response.
     """
 
-    choice: Choice
+    choice: DesignChoice
     design: Design
     found: tuple[ModelResponse, ...]
     scored: tuple[Scored, ...]

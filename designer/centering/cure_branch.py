@@ -30,7 +30,7 @@ def kind_named(name: str) -> str | None:
 
 
 @dataclass(frozen=True)
-class Branch:
+class CureBranch:
     """made : its design. extra : price over the design that is cured [euro]."""
 
     upgrades: Upgrades
@@ -65,7 +65,9 @@ def better_opamps(now: OpAmp, supply: float, catalog: Catalog) -> tuple[OpAmp, .
     )
 
 
-def branches(base: Synthesis, without: frozenset[str] = frozenset()) -> Iterator[Branch | Refused]:
+def branches(
+    base: Synthesis, without: frozenset[str] = frozenset()
+) -> Iterator[CureBranch | Refused]:
     """The design as it is, then every other branch; made one after the other, as they are asked
     for."""
     least = price(base)
@@ -84,7 +86,9 @@ def branches(base: Synthesis, without: frozenset[str] = frozenset()) -> Iterator
                 yield branch_of(base, Upgrades(opamp=name, dead_zone=zone), least)
 
 
-def branch_of(base: Synthesis, upgrades: Upgrades, least: float | None = None) -> Branch | Refused:
+def branch_of(
+    base: Synthesis, upgrades: Upgrades, least: float | None = None
+) -> CureBranch | Refused:
     """The branch with this op-amp and this dead zone, whatever else is upgraded.
 
     least : price of the base, where it is known.
@@ -92,7 +96,7 @@ def branch_of(base: Synthesis, upgrades: Upgrades, least: float | None = None) -
     upgrades = Upgrades(opamp=upgrades.opamp, dead_zone=upgrades.dead_zone)
     least = price(base) if least is None else least
     if upgrades == Upgrades():
-        return Branch(upgrades, base, 0.0)
+        return CureBranch(upgrades, base, 0.0)
     modelfile = upgraded_file(base.modelfile, upgrades)
     try:
         made = None
@@ -104,7 +108,7 @@ def branch_of(base: Synthesis, upgrades: Upgrades, least: float | None = None) -
             made = synthesis_result.synthesise(modelfile, base.catalog)
     except InputError as error:
         return Refused(upgrades, str(error))
-    return Branch(upgrades, made, price(made) - least)
+    return CureBranch(upgrades, made, price(made) - least)
 
 
 def cured(base: Synthesis, upgrades: Upgrades) -> Synthesis:
@@ -120,7 +124,7 @@ def cured(base: Synthesis, upgrades: Upgrades) -> Synthesis:
     return applied(made, upgrades)
 
 
-def applied(branch: Branch, upgrades: Upgrades) -> Synthesis:
+def applied(branch: CureBranch, upgrades: Upgrades) -> Synthesis:
     """The branch's design with the other upgrades."""
     more = replace(upgrades, opamp=None, dead_zone=None)
     if more == Upgrades():

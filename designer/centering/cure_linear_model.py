@@ -17,14 +17,14 @@ from functools import cache
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.centering.cure_branch import TRIM, TRIMMER, Branch
+from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch
 from designer.centering.cure_couplings import couplings, finest
 from designer.centering.cure_measure import Book, asked
-from designer.centering.cure_milp import Demand, Option, Program, Slot
+from designer.centering.cure_milp import CureProgram, Demand, Option, Slot
 from designer.centering.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
 from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways
 from designer.centering.cure_upgrade import PartNetwork, Upgrades, rebuilt, upgraded_file
-from designer.centering.cure_ways import SAMPLES, Looker, Way, foretold
+from designer.centering.cure_ways import SAMPLES, Looker, ResponseWay, foretold
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.spread.part_rules import spread_of
@@ -46,14 +46,14 @@ STREAM = "cure:"
 
 
 @dataclass(frozen=True)
-class Picture:
+class LinearModel:
     """branch, its slots part by part, the ways of each response, and the standard deviation of each
     quantity by name under option j of its slot, over that as it is: ratios[j]. matched : by slot
     and option of an array, the covariance (n, n) of its elements, in the same units."""
 
-    branch: Branch
+    branch: CureBranch
     parts: tuple[PartSlot, ...]
-    ways: tuple[tuple[Way, ...], ...]
+    ways: tuple[tuple[ResponseWay, ...], ...]
     ratios: tuple[Mapping[str, float], ...]
     trim: float
     seed: int
@@ -96,7 +96,7 @@ class Picture:
             ),
         )
 
-    def taken(self, pick: Sequence[int]) -> tuple[Way, ...]:
+    def taken(self, pick: Sequence[int]) -> tuple[ResponseWay, ...]:
         """The way of each response."""
         chosen = pick[len(self.parts) :]
         return tuple(row[i] for row, i in zip(self.ways, chosen, strict=True))
@@ -169,7 +169,7 @@ class Picture:
         z: Mapping[tuple[int, int, int], float],
         shrink: Mapping[tuple[int, int], float],
         spoiled: frozenset[tuple[int, int]] = frozenset(),
-    ) -> Program:
+    ) -> CureProgram:
         """The program for these quantiles.
 
         shrink : by (response, way), a factor on the room of its demands: what was learnt where the
@@ -193,7 +193,7 @@ class Picture:
                     name = f"response {r + 1}: {limit.what}"
                     demands.append(Demand(name, room - fixed, tuple(rows), when))
         kinds = [[w.kind for w in row] for row in self.ways]
-        return Program(slots, (*demands, *couplings(slots, self.parts, kinds)))
+        return CureProgram(slots, (*demands, *couplings(slots, self.parts, kinds)))
 
     def _shares(self, margin: Margin, number: int) -> tuple[list[Array], float]:
         """What the options of each part add to a limit's variance, and what no upgrade changes, in
@@ -233,7 +233,7 @@ def _quantile(form: Array, target: float) -> float:
 
 
 def picture(
-    branch: Branch,
+    branch: CureBranch,
     target: float,
     seed: int,
     book: Book,
@@ -243,7 +243,7 @@ def picture(
     missed: Collection[int] = (),
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-) -> Picture | None:
+) -> LinearModel | None:
     """The picture of a branch; None where its nominal circuit does not show every response.
 
     The response that the fewest boards show is looked at first, and where all its ways are hopeless
@@ -256,17 +256,19 @@ def picture(
     questions = [q for q in asked(made, made.found) if q is not None]
     if len(questions) < len(made.found):
         return None
-    bare = Picture(branch, parts, (), (), trim, seed)
+    bare = LinearModel(branch, parts, (), (), trim, seed)
     best = tuple(
         StudyPlan(*bare.spread(pick), seed, SAMPLES, ()) for pick in finest(parts, made.catalog)
     )
     looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress, missed)
-    rows = [[looker.seen(Way(r, "as it is", question))] for r, question in enumerate(questions)]
+    rows = [
+        [looker.seen(ResponseWay(r, "as it is", question))] for r, question in enumerate(questions)
+    ]
     order = sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r))
     firsts = [rows[r][0] for r in order]
 
     @cache
-    def fitted() -> tuple[PartSlot, list[Way]] | None:
+    def fitted() -> tuple[PartSlot, list[ResponseWay]] | None:
         slot = trimmer_slot(made, without)
         found = (
             None if slot is None or slot.trim is None else trimmer_ways(looker, slot.trim, firsts)
@@ -299,7 +301,9 @@ def picture(
     return pictured(bare, which, jobs, progress)
 
 
-def _needs_no_picture(way: Way, rows: Sequence[Sequence[Way]], target: float) -> bool:
+def _needs_no_picture(
+    way: ResponseWay, rows: Sequence[Sequence[ResponseWay]], target: float
+) -> bool:
     """Whether a way is taken as it was seen, or not at all. The trimmer is, where it is enough for
     every response."""
     if way.kind == TRIMMER:
@@ -309,11 +313,11 @@ def _needs_no_picture(way: Way, rows: Sequence[Sequence[Way]], target: float) ->
 
 
 def pictured(
-    seen: Picture,
+    seen: LinearModel,
     which: Sequence[tuple[int, int]],
     jobs: int,
     progress: Callable[[], None] = lambda: None,
-) -> Picture:
+) -> LinearModel:
     """The same with margins of these ways (response, way)."""
     made = seen.branch.made
     circuit = made.design.circuit
@@ -359,12 +363,12 @@ def pictured(
 
 
 def _ratios(
-    branch: Branch, parts: Sequence[PartSlot], seed: int
+    branch: CureBranch, parts: Sequence[PartSlot], seed: int
 ) -> tuple[Mapping[str, float], ...]:
     """Under option j of every slot (its last, where it has fewer), the standard deviation of each
     quantity over that as it is."""
     most = max((len(p.slot.options) for p in parts), default=1)
-    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    bare = LinearModel(branch, tuple(parts), (), (), 0.0, seed)
     columns: list[dict[str, float]] = []
     names = [name for p in parts for name in p.parts]
     for j in range(most):
@@ -376,11 +380,11 @@ def _ratios(
 
 
 def _matched(
-    branch: Branch, parts: Sequence[PartSlot], seed: int
+    branch: CureBranch, parts: Sequence[PartSlot], seed: int
 ) -> Mapping[tuple[int, int], Array]:
     """By slot and option of an array, the covariance of its elements on drawn boards, in units of
     each part's own standard deviation as it is."""
-    bare = Picture(branch, tuple(parts), (), (), 0.0, seed)
+    bare = LinearModel(branch, tuple(parts), (), (), 0.0, seed)
     none = [0] * len(parts)
     found = {}
     plain = bare.boards(none).values if any(p.network for p in parts) else {}

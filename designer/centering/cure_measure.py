@@ -102,7 +102,7 @@ class Book:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredYield:
     """A yield, and whether its 95 % interval says on which side of the target it is."""
 
     counts: Yield
@@ -155,14 +155,14 @@ def measure(
     first: int | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-) -> Measured:
+) -> MeasuredYield:
     """The yield of a plan of one question on ``least`` boards, and on more until it is decided.
 
     most : boards at which it gives up. first : boards after which, and after each block from there,
     it ends where the target is missed and ``LOST`` boards are lost; None: never before ``least``.
     progress : called once a block.
     """
-    letters, found, most = "", Measured(Yield(0, 0, 0, 0), target), max(least, most)
+    letters, found, most = "", MeasuredYield(Yield(0, 0, 0, 0), target), max(least, most)
     while len(letters) < least or (len(letters) < most and not found.decided):
         lost = found.counts.lost + found.counts.grazing
         if first is not None and found.missed and lost >= LOST:
@@ -172,7 +172,7 @@ def measure(
             stop = first
         indices = range(len(letters), min(stop, most))
         letters += book.block(replace(plan, samples=most), indices, trim, jobs)[0]
-        found = Measured(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
+        found = MeasuredYield(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
         progress()
     return found
 
@@ -184,7 +184,7 @@ def measure_together(
     *,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-) -> tuple[Measured, ...]:
+) -> tuple[MeasuredYield, ...]:
     """The yields of several responses that all have to reach the target.
 
     One block of boards each. Once a response has missed the target the choice is out, whatever
@@ -193,7 +193,7 @@ def measure_together(
     plans : each with what its boards are trimmed by (``Book.block``), None: as built; None where
     there is no response to ask for, which misses.
     """
-    found = [Measured(Yield(0, 0, 0, 0), target) for _ in plans]
+    found = [MeasuredYield(Yield(0, 0, 0, 0), target) for _ in plans]
     for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):
         for k, asked_for in enumerate(plans):
             out = None in plans or any(m.missed for m in found)

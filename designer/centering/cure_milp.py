@@ -67,7 +67,7 @@ class Demand:
 
 
 @dataclass(frozen=True)
-class Program:
+class CureProgram:
     """What is to be chosen, and what the choice must keep."""
 
     slots: tuple[Slot, ...]
@@ -94,7 +94,7 @@ class Program:
         yield from itertools.product(*(range(len(s.options)) for s in self.slots))
 
 
-def cheapest(program: Program) -> tuple[int, ...] | None:
+def cheapest(program: CureProgram) -> tuple[int, ...] | None:
     """The number of the option taken of each slot; None where no choice keeps the demands.
 
     Raises

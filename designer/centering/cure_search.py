@@ -16,21 +16,21 @@ import numpy as np
 
 from designer.base.checks import cores
 from designer.base.progress import Progress
-from designer.centering.cure_branch import TRIMMER, Branch, Refused, branches
+from designer.centering.cure_branch import TRIMMER, CureBranch, Refused, branches
 from designer.centering.cure_couplings import finest
-from designer.centering.cure_linear_model import Picture, picture, pictured
+from designer.centering.cure_linear_model import LinearModel, picture, pictured
 from designer.centering.cure_measure import (
     FIRST,
     MOST,
     Book,
-    Measured,
+    MeasuredYield,
     asked,
     fresh,
     measure,
     measure_together,
     plan_of,
 )
-from designer.centering.cure_milp import Program, cheapest
+from designer.centering.cure_milp import CureProgram, cheapest
 from designer.centering.cure_tighten import cut, shown
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
@@ -101,8 +101,8 @@ class _Search:
         self.base, self.target, self.budget, self.trim = base, target, budget, trim
         self.without, self.seed, self.jobs, self.book, self.said = without, seed, jobs, book, said
         self.waiting = branches(base, without)
-        self.known: list[Branch] = []
-        self.pictures: list[Picture] = []
+        self.known: list[CureBranch] = []
+        self.pictures: list[LinearModel] = []
         self.refused: list[Refused] = []
         self.shrink: dict[tuple[int, int, int], float] = {}
         self.spoiled: set[tuple[int, int, int]] = set()
@@ -180,14 +180,14 @@ class _Search:
             best = self._better(best, len(self.pictures) - 1, target)
         return None if best is None else best[1:]
 
-    def _next_branch(self, least: float | None) -> Branch | None:
+    def _next_branch(self, least: float | None) -> CureBranch | None:
         """A branch that has no picture and may be cheaper than ``least``: None where there is none.
 
         All are made as soon as one is asked for beyond the first: their prices must be known.
         """
         if not self.pictures and not self.known and not self.refused:
             first = next(self.waiting)
-            assert isinstance(first, Branch)
+            assert isinstance(first, CureBranch)
             return first
         if least is not None and least <= 0.0:
             return None
@@ -259,11 +259,11 @@ class _Search:
 
     def _price(self, which: int, pick: Sequence[int]) -> float:
         seen = self.pictures[which]
-        return seen.branch.extra + Program(seen.slots, ()).price(pick)
+        return seen.branch.extra + CureProgram(seen.slots, ()).price(pick)
 
     def _cost(self, which: int, pick: Sequence[int]) -> float:
         seen = self.pictures[which]
-        return seen.branch.extra + Program(seen.slots, ()).cost(pick)
+        return seen.branch.extra + CureProgram(seen.slots, ()).cost(pick)
 
     def _trial(
         self,
@@ -289,7 +289,7 @@ class _Search:
             if way.kind == TRIMMER and seen.trimmer is not None:
                 setting = seen.trimmer.on(circuit)
             plans.append((StudyPlan(circuit, spread, drawn, MOST, (way.question,)), setting))
-        found: tuple[Measured, ...]
+        found: tuple[MeasuredYield, ...]
         if boards is None:
             found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         else:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from designer.centering.cure_milp import Program
-from designer.centering.cure_ways import Way
+from designer.centering.cure_milp import CureProgram
+from designer.centering.cure_ways import ResponseWay
 from designer.circuit.board_arrays import Boards
 
 TIGHTER = 0.95
@@ -17,7 +17,7 @@ LARGEST_STEP = 2.0
 is so wrong says little about by how much."""
 
 
-def cut(program: Program, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
+def cut(program: CureProgram, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
     """A factor on a way's room under which this choice no longer keeps its demands."""
     r, w = key
     own = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]
@@ -25,7 +25,7 @@ def cut(program: Program, pick: Sequence[int], key: tuple[int, int], parts: int)
     return min(TIGHTER, 0.999 * max(shares, default=1.0))
 
 
-def shown(way: Way, boards: Boards, rate: float) -> float:
+def shown(way: ResponseWay, boards: Boards, rate: float) -> float:
     """By which factor the room of a way's demands is to shrink for the picture to promise what was
     measured: the square of the ratio of the distances at which that share of boards is lost; 1
     where more are ok than was promised."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from designer.centering.cure_branch import Refused
-from designer.centering.cure_linear_model import Picture
-from designer.centering.cure_measure import Measured
+from designer.centering.cure_linear_model import LinearModel
+from designer.centering.cure_measure import MeasuredYield
 from designer.centering.cure_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
 
@@ -22,11 +22,11 @@ class Trial:
     upgrades: Upgrades
     price: float
     predicted: tuple[float, ...]
-    measured: tuple[Measured, ...]
+    measured: tuple[MeasuredYield, ...]
     target: float
 
     @property
-    def worst(self) -> Measured:
+    def worst(self) -> MeasuredYield:
         """Of the response that the fewest boards show."""
         return min(self.measured, key=lambda m: (m.rate, m.counts.interval))
 
@@ -55,7 +55,7 @@ class Cure:
     limits: tuple[str, ...]
     front: tuple[Trial, ...]
     refused: tuple[Refused, ...] = ()
-    pictures: tuple[Picture, ...] = field(default=(), repr=False)
+    pictures: tuple[LinearModel, ...] = field(default=(), repr=False)
 
     @property
     def best(self) -> Trial:

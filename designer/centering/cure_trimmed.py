@@ -18,7 +18,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.centering.cure_branch import TRIMMER
-from designer.centering.cure_ways import FEW, SAMPLES, Looker, Way, foretold
+from designer.centering.cure_ways import FEW, SAMPLES, Looker, ResponseWay, foretold
 from designer.spread.board_quantities import column
 from designer.spread.spread import draw_many
 from designer.yields import margins
@@ -30,7 +30,9 @@ FITTED = 1000
 """Boards from which is learnt what moves the wiper."""
 
 
-def trimmer_ways(looker: Looker, trim: DcTrim, firsts: Sequence[Way]) -> list[Way] | None:
+def trimmer_ways(
+    looker: Looker, trim: DcTrim, firsts: Sequence[ResponseWay]
+) -> list[ResponseWay] | None:
     """The trimmer as a way to each response; None where it is hopeless for one of them.
 
     trim : of the branch's circuit. firsts : the responses as they are, in the order in which they
@@ -40,7 +42,7 @@ def trimmer_ways(looker: Looker, trim: DcTrim, firsts: Sequence[Way]) -> list[Wa
     finest = [trimmed_boards(trim.on(p.circuit), p, range(2 * FEW))[0] for p in looker.best]
     found = []
     for first in firsts:
-        way = looker.seen(Way(first.response, TRIMMER, first.question), boards)
+        way = looker.seen(ResponseWay(first.response, TRIMMER, first.question), boards)
         found.append(looker.bounded(way, finest))
         if found[-1].hopeless:
             return None

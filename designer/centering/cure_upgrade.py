@@ -34,7 +34,7 @@ from designer.synthesis import output_loads, side_conditions
 
 
 @dataclass(frozen=True)
-class Place:
+class WindowPlace:
     """Where in its window a response is shown, in the model's units."""
 
     omega: float
@@ -63,7 +63,7 @@ class Upgrades:
     dead_zone: str | None = None
     reference: str | None = None
     grades: Mapping[str, float] = field(default_factory=dict)
-    places: Mapping[int, Place] = field(default_factory=dict)
+    places: Mapping[int, WindowPlace] = field(default_factory=dict)
     trim: float | None = None
     trimmer: bool = False
     networks: tuple[PartNetwork, ...] = ()
@@ -90,7 +90,7 @@ class Upgrades:
             dead_zone=said["dead_zone"],
             reference=said["reference"],
             grades=dict(said["grades"]),
-            places={p["response"] - 1: Place(p["omega"], p["b"]) for p in said["places"]},
+            places={p["response"] - 1: WindowPlace(p["omega"], p["b"]) for p in said["places"]},
             trim=said["trim"],
             trimmer=said.get("trimmer", False),
             networks=tuple(

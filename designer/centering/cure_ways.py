@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import binom
 
-from designer.centering.cure_branch import PLACE, TRIM, Branch
+from designer.centering.cure_branch import PLACE, TRIM, CureBranch
 from designer.centering.cure_measure import Book, asked, measure, plan_of
-from designer.centering.cure_upgrade import Place, Upgrades, upgraded_file, with_parts_kept
+from designer.centering.cure_upgrade import Upgrades, WindowPlace, upgraded_file, with_parts_kept
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.part_rules import spread_of
@@ -40,7 +40,7 @@ RARE = 1e-3
 
 
 @dataclass(frozen=True)
-class Way:
+class ResponseWay:
     """One way of showing a response.
 
     response : its number. kind : "as it is", "omega", "b", "trim" or "trimmer". place : another
@@ -52,7 +52,7 @@ class Way:
     response: int
     kind: str
     question: Question
-    place: Place | None = None
+    place: WindowPlace | None = None
     margin: Margin | None = None
     rate: float = float("nan")
     most: float = 1.0
@@ -111,7 +111,7 @@ class Looker:
     responses that are known to miss the target as they are, whatever the look at few boards says.
     """
 
-    branch: Branch
+    branch: CureBranch
     target: float
     seed: int
     book: Book
@@ -129,7 +129,7 @@ class Looker:
         spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
         return StudyPlan(made.design.circuit, spread, self.seed, SAMPLES, ())
 
-    def seen(self, way: Way, boards: Boards | None = None) -> Way:
+    def seen(self, way: ResponseWay, boards: Boards | None = None) -> ResponseWay:
         """A way with the share of boards that show it.
 
         boards : that are asked; None: with the parts as they are.
@@ -139,7 +139,7 @@ class Looker:
         self.progress()
         return replace(way, rate=0.0 if np.isnan(found.rate) else found.rate)
 
-    def bounded(self, way: Way, finest: Sequence[Boards] | None = None) -> Way:
+    def bounded(self, way: ResponseWay, finest: Sequence[Boards] | None = None) -> ResponseWay:
         """A way with what the best parts make of it.
 
         finest : (2 ``FEW``,) boards with them; None: not trimmed.
@@ -180,11 +180,11 @@ class Looker:
     def _too_many(self, lost: int, total: int) -> bool:
         return bool(binom.sf(lost - 1, total, 1.0 - self.target) < RARE)
 
-    def enough(self, first: Way) -> bool:
+    def enough(self, first: ResponseWay) -> bool:
         """Whether a response needs no way but ``first``, the one as it is."""
         return first.rate >= self.target and first.response not in self.missed
 
-    def ways(self, first: Way) -> list[Way]:
+    def ways(self, first: ResponseWay) -> list[ResponseWay]:
         """A response's ways, ``first`` the one as it is. What asks more of people is looked for
         only where nothing before it is certain."""
         row = [self.bounded(first)]
@@ -206,12 +206,12 @@ class Looker:
             self.progress()
             hopeless = few.rate < self.target
             row.append(
-                Way(first.response, "trim", first.question,
+                ResponseWay(first.response, "trim", first.question,
                     rate=few.rate, most=few.rate, hopeless=hopeless)
             )  # fmt: skip
         return row
 
-    def _moved(self, way: Way, plan: StudyPlan, over: str) -> Way | None:
+    def _moved(self, way: ResponseWay, plan: StudyPlan, over: str) -> ResponseWay | None:
         """Another place of the response in its window, where more boards show it."""
         number, made = way.response, self.branch.made
         response = made.found[number]
@@ -231,9 +231,13 @@ class Looker:
         if best is None:
             return None
         value = float(f"{best:.4g}")
-        place = Place(value, response.b) if over == "omega" else Place(response.omega, value)
+        place = (
+            WindowPlace(value, response.b)
+            if over == "omega"
+            else WindowPlace(response.omega, value)
+        )
         question = moved_question(self.branch, {number: place})
-        return None if question is None else Way(number, over, question, place)
+        return None if question is None else ResponseWay(number, over, question, place)
 
 
 def drawn(plan: StudyPlan, number: int) -> Boards:
@@ -241,7 +245,7 @@ def drawn(plan: StudyPlan, number: int) -> Boards:
     return draw_many(plan.circuit, plan.spread, plan.seed, range(number))
 
 
-def moved_question(branch: Branch, places: Mapping[int, Place]) -> Question | None:
+def moved_question(branch: CureBranch, places: Mapping[int, WindowPlace]) -> Question | None:
     """What boards are asked of one response at another place; None where the circuit does not show
     it there, or a side condition breaks that held."""
     made = branch.made

@@ -25,11 +25,19 @@ from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.centering.candidate import Candidate, Contribution, Listened, Searched, Step, better
 from designer.centering.distance import Stretched
-from designer.centering.levers import LEVERS, PLACES, TOPOLOGY, Choice, slower, topologies, variants
+from designer.centering.levers import (
+    LEVERS,
+    PLACES,
+    TOPOLOGY,
+    DesignChoice,
+    slower,
+    topologies,
+    variants,
+)
 from designer.centering.memory import Memory
 from designer.centering.ngspice_check import LISTENED, RUNG, Agreement, Listen
 from designer.centering.places import MANY, places, room_of, score
-from designer.centering.windows import Place, Stretch, open_in, stretches
+from designer.centering.windows import ResponsePlace, Stretch, open_in, stretches
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses
@@ -110,7 +118,7 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
             check_board(modelfile, catalog, spec)
         except Unreachable as error:
             short.append(error)
-        if choice == Choice.of(modelfile.circuit):
+        if choice == DesignChoice.of(modelfile.circuit):
             zone = zone_of_spec(modelfile.model, spec, catalog)
             check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone))
     if len(short) == len(wanted):
@@ -172,7 +180,7 @@ class _Hunt:
 
     def _topology(self, middle: tuple[ModelResponse, ...]) -> tuple[Candidate | None, Candidate]:
         """The match design, if there is one, and the best of all op-amps and dead zones."""
-        own = Choice.of(self.modelfile.circuit)
+        own = DesignChoice.of(self.modelfile.circuit)
         start: Candidate | None = None
         best: Candidate | None = None
         for choice in topologies(self.modelfile, self.catalog):
@@ -216,7 +224,7 @@ class _Hunt:
         self._note(PLACES, setting, made, gained)
         return made if made is not None and gained else best
 
-    def _try(self, lever: str, setting: str, choice: Choice, best: Candidate) -> Candidate:
+    def _try(self, lever: str, setting: str, choice: DesignChoice, best: Candidate) -> Candidate:
         made = self._candidate(choice, best.found, f"{lever} {setting}")
         gained = made is not None and better(made.rank, best.rank)
         self._note(lever, setting, made, gained)
@@ -254,13 +262,13 @@ class _Hunt:
         return kept
 
     def _bench(
-        self, choice: Choice, found: Sequence[ModelResponse], design: Design, boards: int
+        self, choice: DesignChoice, found: Sequence[ModelResponse], design: Design, boards: int
     ) -> Stretched:
         spread = spread_of(self._resolved(choice, found), design.circuit, self.catalog)
         return Stretched(design, spread, self.seed, boards, jobs=self.jobs, memory=self.memory)
 
     def _candidate(
-        self, choice: Choice, found: tuple[ModelResponse, ...], what: str
+        self, choice: DesignChoice, found: tuple[ModelResponse, ...], what: str
     ) -> Candidate | None:
         """A design made so; None where there is none, and then ``short`` says why."""
         step = self.said.stage(f"candidate {self.candidates + 1}: {what}")
@@ -285,7 +293,9 @@ class _Hunt:
             return None
         bench = self._bench(choice, found, design, BOARDS)
         scored = tuple(
-            score(bench, r.spec, [Place(r.omega, r.b, r.orbit.start)], BOARDS, progress=step)[0]
+            score(
+                bench, r.spec, [ResponsePlace(r.omega, r.b, r.orbit.start)], BOARDS, progress=step
+            )[0]
             for r in found
         )
         self.places += len(scored)
@@ -322,11 +332,13 @@ class _Hunt:
                 )
         return tuple(out)
 
-    def _rank(self, choice: Choice, found: tuple[ModelResponse, ...]) -> tuple[float, float] | None:
+    def _rank(
+        self, choice: DesignChoice, found: tuple[ModelResponse, ...]
+    ) -> tuple[float, float] | None:
         made = self._candidate(choice, found, "what a lever is worth")
         return None if made is None else made.rank
 
-    def _there(self, spec: Response, ranked: Sequence[Place]) -> ModelResponse:
+    def _there(self, spec: Response, ranked: Sequence[ResponsePlace]) -> ModelResponse:
         """The first of these places at which ``find_responses.find`` meets the response too."""
         model = self.modelfile.model
         for place in ranked:
@@ -348,7 +360,7 @@ class _Hunt:
             "within this range",
         )
 
-    def _resolved(self, choice: Choice, found: Sequence[ModelResponse]) -> ModelFile:
+    def _resolved(self, choice: DesignChoice, found: Sequence[ModelResponse]) -> ModelFile:
         wanted = tuple(r.spec for r in found)
         return replace(
             self.modelfile, circuit=choice.spec(self.modelfile.circuit), responses=wanted

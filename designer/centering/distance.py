@@ -22,14 +22,14 @@ from scipy.stats import norm
 
 from designer.base.plain_json import plain
 from designer.centering.memory import Memory
-from designer.centering.windows import Place
+from designer.centering.windows import ResponsePlace
 from designer.circuit.design import Design
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.response_table import Response
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spread.board_quantities import between
 from designer.spread.spread import Spread, draw_many
 from designer.yields.study_identity import nine_digits
@@ -77,7 +77,7 @@ class Stand:
     """A place on the nominal board of a design: the orbit there, which boards start from."""
 
     spec: Response
-    place: Place
+    place: ResponsePlace
     drive: Drive
     orbit: Orbit
 
@@ -108,7 +108,7 @@ class Stretched:
         circuit = design.circuit
         self._whose = [circuit.opamp, sorted(circuit.values.items()), plain(spread.as_dict()), seed]
 
-    def stands(self, wanted: Sequence[tuple[Response, Place]]) -> list[Stand | None]:
+    def stands(self, wanted: Sequence[tuple[Response, ResponsePlace]]) -> list[Stand | None]:
         """Each place on the nominal board; None where that does not show the response there."""
         if not wanted:
             return []
@@ -164,23 +164,23 @@ class Stretched:
         asked = [boards.start, boards.stop, list(stretches)]
         return [self._whose, nine_digits(setting), wanted, asked]
 
-    def excitation(self, place: Place) -> Excitation:
+    def excitation(self, place: ResponsePlace) -> Excitation:
         """The generator's setting for a place."""
         frequency = self.design.errors.scales.frequency(place.omega)
         return Excitation(frequency, self.design.amplitude(place.b))
 
-    def nominal(self, stand: Stand) -> Subject:
+    def nominal(self, stand: Stand) -> GateSubject:
         """The nominal board at a place, for ngspice."""
-        return Subject(self._boards.reduction(0), self.excitation(stand.place), stand.orbit)
+        return GateSubject(self._boards.reduction(0), self.excitation(stand.place), stand.orbit)
 
-    def subjects(self, stand: Stand, boards: range, stretch: float) -> list[Subject]:
+    def subjects(self, stand: Stand, boards: range, stretch: float) -> list[GateSubject]:
         """Those of these boards that show the response at this stretch, for ngspice."""
         rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
         starts = np.tile(stand.orbit.start, (len(rows), 1))
         found = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
         excitation = self.excitation(stand.place)
         return [
-            Subject(self._boards.reduction(row), excitation, orbit)
+            GateSubject(self._boards.reduction(row), excitation, orbit)
             for row, orbit in zip(rows, found, strict=True)
             if orbit is not None and _shows(orbit, stand)
         ]

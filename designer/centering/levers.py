@@ -25,7 +25,7 @@ NOISE_GAINS = (30.0, 6.0)
 
 
 @dataclass(frozen=True)
-class Choice:
+class DesignChoice:
     """How a design is made. frequency : band for ω = 1 [Hz]. aims : inside its conditions."""
 
     opamp: str
@@ -34,7 +34,7 @@ class Choice:
     aims: Aims = NO_AIMS
 
     @classmethod
-    def of(cls, spec: CircuitSpec) -> Choice:
+    def of(cls, spec: CircuitSpec) -> DesignChoice:
         """What the model file says."""
         return cls(spec.opamp, spec.dead_zone, spec.frequency)
 
@@ -61,7 +61,7 @@ class Choice:
             "time scale": self.frequency,
         }[lever]
 
-    def with_lever(self, lever: str, value: Any) -> Choice:
+    def with_lever(self, lever: str, value: Any) -> DesignChoice:
         """The same with one lever elsewhere."""
         field = {"amplitude": "swing", "state scales": "share", "noise gain": "noise_gain"}
         if lever in field:
@@ -72,7 +72,7 @@ class Choice:
         return replace(self, **moved)
 
 
-def topologies(modelfile: ModelFile, catalog: Catalog) -> list[Choice]:
+def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
     """Every op-amp with every dead zone that the search may take, the file's own first if it is
     one of them.
 
@@ -80,7 +80,7 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[Choice]:
     ------
     InputError : an op-amp that the catalogue does not have.
     """
-    own, spec = Choice.of(modelfile.circuit), modelfile.search
+    own, spec = DesignChoice.of(modelfile.circuit), modelfile.search
     for name in spec.opamps:
         try:
             catalog.opamp(name, modelfile.circuit.supply)
@@ -94,7 +94,7 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[Choice]:
     return sorted(found, key=lambda choice: choice != own)
 
 
-def variants(choice: Choice, lever: str) -> Iterator[Choice]:
+def variants(choice: DesignChoice, lever: str) -> Iterator[DesignChoice]:
     """The other settings of one of the levers after the dead zone."""
     low, high = choice.frequency
     ratio = (high / low) ** (1.0 / 3.0)
@@ -109,7 +109,7 @@ def variants(choice: Choice, lever: str) -> Iterator[Choice]:
             yield choice.with_lever(lever, value)
 
 
-def slower(choice: Choice, frequency: float, low: float) -> Iterator[Choice]:
+def slower(choice: DesignChoice, frequency: float, low: float) -> Iterator[DesignChoice]:
     """The same at half of a frequency for ω = 1 [Hz], a quarter, and so on, not below ``low``."""
     high = frequency / 2.0
     while high > low * math.sqrt(2.0):

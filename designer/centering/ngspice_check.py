@@ -17,7 +17,7 @@ from functools import partial
 from designer.centering.distance import Stand, Stretched
 from designer.centering.memory import Memory
 from designer.spice import numerics_gate
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
 from designer.yields.ngspice_runs import Query, confirm, way_to_rung
@@ -105,5 +105,5 @@ class Listener:
         return [(len(there), kept.count(True), len(there) - answers)]
 
 
-def _started(subject: Subject) -> Subject:
+def _started(subject: GateSubject) -> GateSubject:
     return replace(subject, rung=RUNG, discard=way_to_rung(subject.orbit))

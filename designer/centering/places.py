@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from designer.centering.distance import LADDER, Counts, Stand, Stretched
-from designer.centering.windows import CLEARANCE_STEP, Place, Stretch
+from designer.centering.windows import CLEARANCE_STEP, ResponsePlace, Stretch
 from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
@@ -34,7 +34,7 @@ MOST = 12
 class Scored:
     """A place with what boards showed there; stand None: the nominal board shows it not."""
 
-    place: Place
+    place: ResponsePlace
     stand: Stand | None
     counts: Counts
 
@@ -44,25 +44,25 @@ class Scored:
 
 
 @dataclass(frozen=True)
-class Room:
+class PlaceRange:
     """How far a place may go. omega, b : closed ranges; equal ends where it is not open."""
 
     omega: tuple[float, float]
     b: tuple[float, float]
 
 
-def room_of(spec: Response, b: float, omega: tuple[float, float]) -> Room:
+def room_of(spec: Response, b: float, omega: tuple[float, float]) -> PlaceRange:
     """What a response leaves open. b : the model's clearance. omega : band of a search."""
     one = spec.b if isinstance(spec.b, float) else b
     ends = spec.b if isinstance(spec.b, tuple) else (one, one)
-    return Room(omega if spec.omega is None else (spec.omega, spec.omega), ends)
+    return PlaceRange(omega if spec.omega is None else (spec.omega, spec.omega), ends)
 
 
 def places(
     bench: Stretched,
     spec: Response,
     stretches: Sequence[Stretch],
-    room: Room,
+    room: PlaceRange,
     *,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[list[Scored], int]:
@@ -87,7 +87,7 @@ def places(
 def score(
     bench: Stretched,
     spec: Response,
-    wanted: Sequence[Place],
+    wanted: Sequence[ResponsePlace],
     boards: int,
     ladder: Sequence[float] = LADDER,
     progress: Callable[[], None] = lambda: None,
@@ -109,7 +109,7 @@ def best(found: Sequence[Scored], count: int) -> list[Scored]:
     return sorted(there, key=lambda s: -s.distance)[:count]
 
 
-def _step(stretches: Sequence[Stretch], place: Place) -> float:
+def _step(stretches: Sequence[Stretch], place: ResponsePlace) -> float:
     """Of ln ω: half the distance of the places that were scanned."""
     home = next(s for s in stretches if any(p is place for p in s.places))
     return max(math.log(home.high / home.low) * 0.1, 1e-3)
@@ -118,8 +118,8 @@ def _step(stretches: Sequence[Stretch], place: Place) -> float:
 def _pattern(
     bench: Stretched,
     spec: Response,
-    start: Place,
-    room: Room,
+    start: ResponsePlace,
+    room: PlaceRange,
     step: float,
     progress: Callable[[], None],
 ) -> tuple[list[Scored], int]:
@@ -129,7 +129,7 @@ def _pattern(
     for _ in range(MOST):
         if halved == PATTERN:
             break
-        around: list[Place] = []
+        around: list[ResponsePlace] = []
         for i in (-1, 0, 1):
             for j in (-1, 0, 1):
                 omega, b = (

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.toml_writer import toml_text
-from designer.centering.levers import Choice
+from designer.centering.levers import DesignChoice
 from designer.check.synthesis_result import Synthesis
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, parse_model_file
 
 
-def resolved(asked: ModelFile, made: Synthesis, choice: Choice, source: Path) -> ModelFile:
+def resolved(asked: ModelFile, made: Synthesis, choice: DesignChoice, source: Path) -> ModelFile:
     """The model file that a design folder holds, as if read from ``source``.
 
     ω and b of each response, op-amp and dead zone are values; ``objective`` stays "yield". What
@@ -27,7 +27,7 @@ def resolved(asked: ModelFile, made: Synthesis, choice: Choice, source: Path) ->
     return replace(file, measured=asked.measured)
 
 
-def _text(asked: ModelFile, found: Sequence[ModelResponse], choice: Choice) -> str:
+def _text(asked: ModelFile, found: Sequence[ModelResponse], choice: DesignChoice) -> str:
     data: dict[str, Any] = tomllib.loads(asked.text.lstrip("\ufeff"))
     data.setdefault("title", asked.title)
     for table, spec, response in zip(data["response"], asked.responses, found, strict=True):

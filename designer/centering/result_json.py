@@ -11,7 +11,7 @@ from scipy.stats import norm
 from designer.centering.candidate import Candidate, Contribution, Searched
 from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
-from designer.centering.levers import Choice
+from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import RUNG, STRETCH
 from designer.yields.ngspice_sampling import Hearing
 from designer.yields.verdict import Answer, Verdict
@@ -100,7 +100,7 @@ def confirmation_json(
     return out
 
 
-def _choice(choice: Choice) -> dict[str, Any]:
+def _choice(choice: DesignChoice) -> dict[str, Any]:
     return {
         "opamp": choice.opamp,
         "dead_zone": choice.dead_zone,

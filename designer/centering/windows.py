@@ -33,7 +33,7 @@ COURSE = Course(settle=300, keep=10, patience=300)
 
 
 @dataclass(frozen=True)
-class Place:
+class ResponsePlace:
     """Where a response is asked for. start : (4,) a strobe of its orbit, in model units."""
 
     omega: float
@@ -45,7 +45,7 @@ class Place:
 class Stretch:
     """Neighbouring places at one clearance that show one response, by ascending ω."""
 
-    places: tuple[Place, ...]
+    places: tuple[ResponsePlace, ...]
 
     @property
     def b(self) -> float:
@@ -59,7 +59,7 @@ class Stretch:
     def high(self) -> float:
         return self.places[-1].omega
 
-    def at(self, shares: Sequence[float]) -> list[Place]:
+    def at(self, shares: Sequence[float]) -> list[ResponsePlace]:
         """The places nearest to these shares of the way from the lower end to the upper, in the
         order of the shares."""
         last = len(self.places) - 1
@@ -167,12 +167,12 @@ def _grid(ends: tuple[float, float]) -> Array:
 def _runs(
     response: Response, omegas: Array, b: float, tracks: Sequence[Sequence[Steady]]
 ) -> list[Stretch]:
-    places: list[Place | None] = []
+    places: list[ResponsePlace | None] = []
     for i, omega in enumerate(omegas):
         step = next((t[i] for t in tracks if shows(response, t[i])), None)
-        places.append(None if step is None else Place(float(omega), b, step.start))
+        places.append(None if step is None else ResponsePlace(float(omega), b, step.start))
     out: list[Stretch] = []
-    run: list[Place] = []
+    run: list[ResponsePlace] = []
     for place in [*places, None]:
         if place is not None:
             run.append(place)
@@ -184,7 +184,7 @@ def _runs(
 
 def _single(model: Dimensionless, response: Response, omega: float, b: float) -> list[Stretch]:
     found = find_responses.find(model, [replace(response, omega=omega, b=b)])[0]
-    return [Stretch((Place(omega, b, found.orbit.start),))] if found.found else []
+    return [Stretch((ResponsePlace(omega, b, found.orbit.start),))] if found.found else []
 
 
 def _refuse(number: int, response: Response, spec: SearchSpec) -> None:

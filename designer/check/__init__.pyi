@@ -4,7 +4,7 @@ from . import (
     synthesis_result as synthesis_result,
 )
 from .checked_design import (
-    Checked as Checked,
+    CheckedResponse as CheckedResponse,
     traces as traces,
 )
 from .coexistence import (
@@ -14,12 +14,12 @@ from .deck_notes import (
     circuit_notes as circuit_notes,
     simulator_notes as simulator_notes,
 )
+from .deck_runs import (
+    response_runs as response_runs,
+)
 from .first_responses import (
     FirstRun as FirstRun,
     first_run as first_run,
-)
-from .response_runs import (
-    response_runs as response_runs,
 )
 from .simulation import (
     Simulated as Simulated,

@@ -40,7 +40,7 @@ from designer.synthesis.parts_choice import check_choices, synthesise
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedResponse:
     """A wanted response on all three engines, for the nominal circuit.
 
     circuit : orbit of the exact circuit rung, in volts and seconds. gate : ngspice's settings and
@@ -132,7 +132,7 @@ def check(
     progress: Callable[[str], None] = lambda _: None,
     *,
     gates: Sequence[GateResult] | None = None,
-) -> tuple[Checked, ...]:
+) -> tuple[CheckedResponse, ...]:
     """Every response on the exact circuit and, with a pool, in ngspice behind the gate.
 
     gates : what ngspice's gate found of this very design before; it is not asked again then.
@@ -153,16 +153,16 @@ def check(
         met = list(
             gate.check(
                 pool,
-                [gate.Subject(reduction, e, o) for e, o in zip(settings, orbits, strict=True)],
+                [gate.GateSubject(reduction, e, o) for e, o in zip(settings, orbits, strict=True)],
             )
         )
     return tuple(
-        Checked(r, o, e, g, design, flow)
+        CheckedResponse(r, o, e, g, design, flow)
         for r, o, e, g, flow in zip(found, orbits, settings, met, flows, strict=True)
     )
 
 
-def traces(design: Design, checked: Checked) -> dict[str, Trace]:
+def traces(design: Design, checked: CheckedResponse) -> dict[str, Trace]:
     """Orbits of each engine in model units, for overlays: "model", "circuit", "ngspice"."""
     out: dict[str, Trace] = {}
     b = checked.model.b

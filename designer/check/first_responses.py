@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from designer.base.arrays import Array
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction, on_circuit
@@ -27,7 +27,7 @@ class FirstRun:
     initial: Array | None
 
 
-def first_run(made: Synthesis, checked: Checked | None = None) -> FirstRun:
+def first_run(made: Synthesis, checked: CheckedResponse | None = None) -> FirstRun:
     """The first response, ω = 1 where there is none.
 
     checked : of that response; its gate's settings are used.

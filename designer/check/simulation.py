@@ -18,7 +18,7 @@ from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.coexistence import Coexistence
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.check.trust import Trust
@@ -330,7 +330,9 @@ def _in_ngspice(
         frequency = made.design.errors.scales.frequency(r.omega)
         excitation = Excitation(frequency, made.design.amplitude(r.b))
         started = [o for o in orbits if len(o.start)]
-        subjects += [numerics_gate.Subject(reduction, excitation, o, rung=rung) for o in started]
+        subjects += [
+            numerics_gate.GateSubject(reduction, excitation, o, rung=rung) for o in started
+        ]
         rows.append((r, excitation, len(started)))
         step()
     said.stage("ngspice, numerics gate")
@@ -340,7 +342,7 @@ def _in_ngspice(
     for r, excitation, count in rows:
         volts, scale = made.design.volts(r.b), made.design.errors.scales.seconds
         gates = [next(results) for _ in range(count)]
-        asked = [Checked(r, r.orbit, excitation, g).ngspice for g in gates]
+        asked = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
         heard = [o for o in asked if o is not None] or [Orbit(OrbitStatus.FAILED)]
         shown = [dimensionless(o, volts, scale) for o in heard]
         out.append(

@@ -30,7 +30,7 @@ from .dead_zone_parts import (
 )
 from .design import (
     Certificate as Certificate,
-    Check as Check,
+    ConditionCheck as ConditionCheck,
     Design as Design,
     settings as settings,
 )
@@ -60,7 +60,7 @@ from .nodal import (
     Solution as Solution,
 )
 from .noise_gains import (
-    Stage as Stage,
+    SectionStage as SectionStage,
     stages as stages,
 )
 from .nominal import (
@@ -77,7 +77,7 @@ from .packing import (
 )
 from .paper_values import (
     MODEL as MODEL,
-    Candidate as Candidate,
+    ComparedCircuit as ComparedCircuit,
 )
 from .reduction import (
     FloatingCircuit as FloatingCircuit,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from designer.catalog.catalog import Catalog
-from designer.catalog.entries import Diode, Reference
+from designer.catalog.entries import DiodeEntry, ReferenceEntry
 
 Kind = Literal["saturation", "rectifier"]
 Sides = Literal["both", "upper", "lower"]
@@ -24,8 +24,8 @@ class Zone:
 
     kind: Kind = "saturation"
     sides: Sides = "both"
-    diode: Diode | None = None
-    reference: Reference | None = None
+    diode: DiodeEntry | None = None
+    reference: ReferenceEntry | None = None
 
     @property
     def positions(self) -> tuple[int, ...]:

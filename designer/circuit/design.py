@@ -29,7 +29,7 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class Check:
+class ConditionCheck:
     """A side condition on the finished circuit, as verified outside the search.
 
     name : of the condition, as in a model file. quantity : what is limited, with its unit, such as
@@ -78,7 +78,7 @@ class Design:
     conditions: dict[str, float]
     solver: dict[str, str]
     seconds: float
-    checks: tuple[Check, ...] = ()
+    checks: tuple[ConditionCheck, ...] = ()
     binding: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -106,7 +106,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Setting:
+class GeneratorSetting:
     """The generator for one response: Hz, volts peak into a high impedance, volts of offset."""
 
     omega: float
@@ -116,10 +116,10 @@ class Setting:
     offset_v: float = 0.0
 
 
-def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[Setting, ...]:
+def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[GeneratorSetting, ...]:
     """The generator's settings, in the order of the responses."""
     scales = design.errors.scales
     return tuple(
-        Setting(r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b))
+        GeneratorSetting(r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b))
         for r in found
     )

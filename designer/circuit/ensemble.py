@@ -42,7 +42,7 @@ RULES = np.array(
 
 
 @dataclass(frozen=True)
-class Response:
+class SettledBoard:
     """An orbit with the displacement (n · POINTS,) over its n drive periods; empty where none was
     drawn."""
 
@@ -104,12 +104,12 @@ class Ensemble:
         *,
         jobs: int = 1,
         progress: Callable[[], None] = lambda: None,
-    ) -> list[Response]:
+    ) -> list[SettledBoard]:
         """``settle``, with the displacement that each orbit draws."""
         index = np.asarray(which, dtype=np.int64)
         states = np.ascontiguousarray(starts, dtype=np.float64)
 
-        def chunk(first: int) -> list[Response]:
+        def chunk(first: int) -> list[SettledBoard]:
             heed()
             part = slice(first, first + CHUNK)
             found = self._compiled(index[part], drives[part], states[part])
@@ -176,7 +176,7 @@ class Ensemble:
 
         return list(parallel(one, range(len(which)), jobs))
 
-    def _alone(self, board: int, drive: Drive, start: Array) -> Response:
+    def _alone(self, board: int, drive: Drive, start: Array) -> SettledBoard:
         """One question, in Python."""
         try:
             system = self.reduction(board).system()
@@ -189,14 +189,14 @@ class Ensemble:
             if orbit.status is OrbitStatus.PERIODIC:
                 trace = displacement(flow, orbit)
         except (FloatingCircuit, ArithmeticError, np.linalg.LinAlgError) as error:
-            return Response(failed(str(error)), np.zeros(0))
-        return Response(orbit, trace)
+            return SettledBoard(failed(str(error)), np.zeros(0))
+        return SettledBoard(orbit, trace)
 
     def _compiled(
         self, which: kernel.Int, drives: Sequence[Drive], starts: Array
-    ) -> list[Response | None]:
+    ) -> list[SettledBoard | None]:
         """None for each question that the compiled way leaves open."""
-        out: list[Response | None] = [None] * len(which)
+        out: list[SettledBoard | None] = [None] * len(which)
         if self._modes is None:
             return out
         asked = np.flatnonzero(self._good[which])
@@ -232,7 +232,7 @@ class Ensemble:
 
     def _response(
         self, answers: kernel.Answers, e: int, period: float, multipliers: Complex, j: int
-    ) -> Response:
+    ) -> SettledBoard:
         """Answer e in the normal form; the rules are those of ``attractors.describe``."""
         n, p, q, spent, mode, met = (int(v) for v in answers.whole[e, 1:])
         real = answers.real[e]
@@ -262,7 +262,7 @@ class Ensemble:
             reason=f"while classifying period {n}" if grazing else "",
             periods=spent,
         )
-        return Response(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+        return SettledBoard(orbit, answers.trace[e, : n * kernel.POINTS].copy())
 
 
 def _faint(orbit: Orbit, drive: Drive) -> bool:

@@ -12,7 +12,7 @@ from designer.circuit.netlist import GROUND, Circuit, Resistor, Section
 
 
 @dataclass(frozen=True)
-class Branch:
+class Conductance:
     """Conductance [S] between two nets."""
 
     a: str
@@ -23,10 +23,10 @@ class Branch:
         return self.b if net == self.a else self.a
 
 
-def branches(circuit: Circuit) -> tuple[Branch, ...]:
+def branches(circuit: Circuit) -> tuple[Conductance, ...]:
     """The resistors, with the nets that only resistors meet taken out, star to mesh: the middle of
     two in series, the tap of a divider."""
-    found = [Branch(r.a, r.b, 1.0 / r.value) for r in circuit.resistors]
+    found = [Conductance(r.a, r.b, 1.0 / r.value) for r in circuit.resistors]
     held = {GROUND, circuit.generator.net, *(supply.net for supply in circuit.supplies)}
     held = held.union(*(p.nets for p in circuit.parts if not isinstance(p, Resistor)))
     for net in circuit.nets:
@@ -36,14 +36,14 @@ def branches(circuit: Circuit) -> tuple[Branch, ...]:
         total = sum(f.siemens for f in star)
         found = [f for f in found if f not in star]
         found += [
-            Branch(one.other(net), two.other(net), one.siemens * two.siemens / total)
+            Conductance(one.other(net), two.other(net), one.siemens * two.siemens / total)
             for one, two in combinations(star, 2)
         ]
     return tuple(found)
 
 
 @dataclass(frozen=True)
-class Stage:
+class SectionStage:
     """One section with what is connected to it.
 
     load : of its output, every resistor there taken to ground [ohm]; infinite without one.
@@ -63,7 +63,7 @@ class Stage:
         return self.gain * frequency + self.corner
 
 
-def stages(circuit: Circuit) -> Iterator[Stage]:
+def stages(circuit: Circuit) -> Iterator[SectionStage]:
     """The stages of a circuit whose amplifiers all invert, in its order."""
     wires = branches(circuit)
     for s in circuit.sections:
@@ -80,7 +80,7 @@ def stages(circuit: Circuit) -> Iterator[Stage]:
             for c in circuit.capacitors
             if node in c.nets and (set(c.nets) - {node}) <= outputs
         )
-        yield Stage(
+        yield SectionStage(
             section=s,
             load=1.0 / load if load > 0.0 else float("inf"),
             integrates=farads > 0.0,

@@ -67,7 +67,7 @@ PRINTED_FREQUENCY = 357.419
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ComparedCircuit:
     """A circuit with its generator's settings, to be compared.
 
     name : a short one. what : one sentence. frequency [Hz] at ω = 1; amplitude [V peak] at the
@@ -98,7 +98,9 @@ def can_build(model: Dimensionless) -> str | None:
     return None
 
 
-def candidates(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> tuple[Candidate, ...]:
+def candidates(
+    model: Dimensionless, spec: CircuitSpec, catalog: Catalog
+) -> tuple[ComparedCircuit, ...]:
     """What stands beside a design of this model: empty where the paper's circuit cannot follow it.
 
     The paper's case: its values as printed, corrected, and corrected and rounded to the values of
@@ -111,7 +113,7 @@ def candidates(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> tup
     if is_the_papers(model):
         exact, name = corrected(), "paper, corrected"
         what = "the printed values with R50 and R204, amplitude and frequency corrected"
-        first = Candidate(
+        first = ComparedCircuit(
             AS_PRINTED,
             "the printed values, driven with 1.28 V and f = 357.419 ω",
             circuit(model, PRINTED, opamp),
@@ -122,10 +124,10 @@ def candidates(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> tup
     else:
         exact, name, out = way(model), "paper's way", []
         what = "the paper's four chosen values, the rest from the corrected Eq. (14), exact"
-    out.append(Candidate(name, what, circuit(model, exact, opamp), *generator(model, exact)))
+    out.append(ComparedCircuit(name, what, circuit(model, exact, opamp), *generator(model, exact)))
     near = rounded(exact, spec, catalog)
     out.append(
-        Candidate(
+        ComparedCircuit(
             f"{name}, rounded",
             f"{what}; every value the nearest that can be bought",
             circuit(model, near, opamp),

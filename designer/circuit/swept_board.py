@@ -18,7 +18,7 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
-from designer.dynamics.steady_state import Setting
+from designer.dynamics.steady_state import DrivenSystem
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
 from designer.model.si_units import NO_UNITS
 from designer.model.swept_model import GREATEST, SMALLEST
@@ -73,13 +73,13 @@ class BoardSubject:
         elif name == "amplitude" and value <= 0.0:
             raise InputError(None, option, value, "an amplitude > 0 V")
 
-    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""
         out = []
         for change in changes:
             drive = self.excitation(change).drive
             out.append(
-                Setting(lambda d=drive: Flow(self.system, d), drive.period)  # type: ignore[misc]
+                DrivenSystem(lambda d=drive: Flow(self.system, d), drive.period)  # type: ignore[misc]
             )
         return out
 

@@ -12,7 +12,7 @@ from designer.base.errors import InputError
 from designer.cli.app import Jobs, Log, Quiet, Resume, Verbose, app, compiling, session
 
 
-class Subject(StrEnum):
+class ReproducedPart(StrEnum):
     """What is reproduced."""
 
     DYNAMICS = "dynamics"
@@ -21,16 +21,16 @@ class Subject(StrEnum):
 
 
 PLACES = {
-    Subject.DYNAMICS: Path("reports/paper-dynamics"),
-    Subject.CIRCUIT: Path("reports/paper-circuit"),
-    Subject.TOLERANCE: Path("reports/tolerance"),
+    ReproducedPart.DYNAMICS: Path("reports/paper-dynamics"),
+    ReproducedPart.CIRCUIT: Path("reports/paper-circuit"),
+    ReproducedPart.TOLERANCE: Path("reports/tolerance"),
 }
 
 
 @app.command()
 def reproduce(
     what: Annotated[
-        Subject,
+        ReproducedPart,
         typer.Argument(
             metavar="dynamics|circuit|tolerance",
             help="Which part of the paper.",
@@ -64,18 +64,18 @@ def reproduce(
         if jobs is not None:
             at_least("--jobs", jobs, 1)
         place = PLACES[what] if out is None else out
-        if what is not Subject.TOLERANCE:
+        if what is not ReproducedPart.TOLERANCE:
             for name, value in (("--samples", samples), ("--seed", seed)):
                 if value is not None:
                     raise InputError(None, name, value, f"nothing: {what.value} draws no boards")
-        if what is Subject.DYNAMICS:
+        if what is ReproducedPart.DYNAMICS:
             from designer.paper import reproduce_dynamics
 
             if resume:
                 expected = "nothing: dynamics is made anew each time"
                 raise InputError(None, "--resume", "given", expected)
             reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
-        elif what is Subject.CIRCUIT:
+        elif what is ReproducedPart.CIRCUIT:
             from designer.paper import reproduce_circuit
 
             reproduce_circuit.reproduce(place, jobs=jobs, progress=progress, resume=resume)

@@ -17,7 +17,7 @@ from designer.catalog.catalog import Catalog
 from designer.report import compare_table
 
 if TYPE_CHECKING:
-    from designer.spice.opamp_check import Check
+    from designer.spice.opamp_check import FigureCheck
 
 
 def run(answer: Mapping[str, Any]) -> None:
@@ -299,7 +299,7 @@ def pictures(folder: Path, names: Sequence[str]) -> None:
     print_line(new_console(), f"{folder}: {said}")
 
 
-def checks(name: str, measured: Sequence[Check]) -> None:
+def checks(name: str, measured: Sequence[FigureCheck]) -> None:
     """An op-amp's figures, by the catalogue and by its model in ngspice."""
     table = new_table(f"{name} in ngspice", "figure", "catalogue", "measured", "")
     for row in measured:

@@ -67,7 +67,7 @@ def trade(
             numbers = folder_numbers.own(Folder(folder), "trade", tuple(given)) | numbers
         seed = numbers.get("seed", SEED)
         options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
-        extent = trade_job.Extent(boards=numbers.get("boards", TRADE_BOARDS))
+        extent = trade_job.TradeExtent(boards=numbers.get("boards", TRADE_BOARDS))
         answer, _ = trade_job.answer(modelfile, folder, options, extent, progress)
     if json:
         print_json(answer)

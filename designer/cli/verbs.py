@@ -37,7 +37,7 @@ from designer.cli.app import (
 )
 
 if TYPE_CHECKING:
-    from designer.jobs.synthesise_job import Outcome
+    from designer.jobs.synthesise_job import JobOutcome
 
 STUDY_KEYS = (
     "format",
@@ -312,7 +312,7 @@ def new(
     return 0
 
 
-def print_answer(outcome: Outcome, json: bool, quiet: bool, verb: str) -> int:
+def print_answer(outcome: JobOutcome, json: bool, quiet: bool, verb: str) -> int:
     answer = outcome.answer
     if verb == "tolerance":
         answer = {k: answer[k] for k in STUDY_KEYS if k in answer} | {

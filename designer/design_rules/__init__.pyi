@@ -7,5 +7,5 @@ from .kicad_drc import (
     kicad_version as kicad_version,
 )
 from .subject import (
-    Subject as Subject,
+    RuleSubject as RuleSubject,
 )

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from designer.catalog.design_rule import FAIL, NOT_RUN, Outcome
+from designer.catalog.design_rule import FAIL, NOT_RUN, RuleOutcome
 
 
-def report(title: str, outcomes: Sequence[Outcome]) -> str:
+def report(title: str, outcomes: Sequence[RuleOutcome]) -> str:
     """An XML text: one test case a rule; what was not run is skipped, with the reason.
 
     Characters that XML 1.0 cannot hold become "?".

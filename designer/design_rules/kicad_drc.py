@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.errors import InputError
-from designer.base.reading import parse_json
+from designer.base.guarded_reading import parse_json
 from designer.base.sexpr import Expression, expression_text, read
 from designer.board.kicad_names import circuit_net
 from designer.board.kicad_reader import BoardFile

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from designer.catalog.design_rule import Rule, Scope
+from designer.catalog.design_rule import DesignRule, Scope
 from designer.catalog.design_rules import RULES
 
 TITLES: dict[Scope, str] = {"circuit": "On the circuit", "board": "On the board"}
@@ -15,7 +15,7 @@ def table(scope: Scope) -> str:
     return "\n".join([*head, *rows]) + "\n"
 
 
-def _row(rule: Rule) -> str:
+def _row(rule: DesignRule) -> str:
     limit = rule.limit_is
     if rule.limit is not None:
         limit = rule.bound(rule.limit)

@@ -19,11 +19,11 @@ from designer.board.outline import LAYER
 from designer.catalog.design_rule import (
     FAIL,
     PASS,
-    Found,
+    DesignRule,
+    Finding,
     NotRun,
-    Outcome,
     Override,
-    Rule,
+    RuleOutcome,
     judged,
     not_run,
     shown,
@@ -53,7 +53,7 @@ COPPER = frozenset({"clearance"})
 
 def without_board(
     rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str = NO_BOARD
-) -> tuple[Outcome, ...]:
+) -> tuple[RuleOutcome, ...]:
     """Every rule on a board, none of them run."""
     return tuple(_idle(rule, rules, overrides, why) for rule in _wanted())
 
@@ -63,7 +63,7 @@ def checked(
     components: Sequence[Component],
     rules: Sequence[CustomRule],
     overrides: Mapping[str, Override],
-) -> tuple[Outcome, ...]:
+) -> tuple[RuleOutcome, ...]:
     """Every rule on a board, with KiCad where that is installed and answers."""
     try:
         told: DesignRuleCheck | str = check(board, rules)
@@ -78,7 +78,7 @@ def on_board(
     rules: Sequence[CustomRule],
     overrides: Mapping[str, Override],
     told: DesignRuleCheck | str,
-) -> tuple[Outcome, ...]:
+) -> tuple[RuleOutcome, ...]:
     """Every rule on a board. told : what KiCad found, or why it was not asked."""
     said = {custom.id: custom for custom in rules}
     out = []
@@ -98,7 +98,7 @@ def on_board(
     return tuple(out)
 
 
-def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """Between centres of pads [mm]: each supply pin, and the nearest pad on its net of the
     capacitors that belong to the package."""
     for package in components:
@@ -118,10 +118,10 @@ def decoupling_distance(board: BoardFile, components: Sequence[Component]) -> It
                 raise NotRun(f"{package.reference} has no decoupling capacitor on {pad.net}")
             distance, reference = min(near)
             where = f"{package.reference}.{pad.number}"
-            yield Found(distance, where, more=f"to {reference}; {_READ}")
+            yield Finding(distance, where, more=f"to {reference}; {_READ}")
 
 
-def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """From each pad of the design's components to the board's edge [mm]."""
     if not len(board.outline.sides):
         raise NotRun(f"the board has no edge: nothing on {LAYER}")
@@ -133,10 +133,10 @@ def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator
             if not pad.corners:
                 raise NotRun(f"{where} has a shape that is not read")
             room = board.outline.room(np.array(pad.corners))
-            yield Found(room, where, more=_READ)
+            yield Finding(room, where, more=_READ)
 
 
-def unconnected(board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
+def unconnected(board: BoardFile, told: DesignRuleCheck) -> Iterator[Finding]:
     """Open connections, with the nets that they are on.
 
     Raises
@@ -149,20 +149,20 @@ def unconnected(board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
         raise NotRun(f"nothing is routed yet: {count} connections of {nets} nets are open")
     names = [f"{POWER.get(net, net)} ({n})" for net, n in sorted(told.unconnected.items())]
     more = f" and {len(names) - NETS} more nets" if len(names) > NETS else ""
-    yield Found(count, more=f"not routed: {', '.join(names[:NETS])}{more}" if names else "")
+    yield Finding(count, more=f"not routed: {', '.join(names[:NETS])}{more}" if names else "")
 
 
-def short_circuits(board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
+def short_circuits(board: BoardFile, told: DesignRuleCheck) -> Iterator[Finding]:
     """Places where copper of two nets touches."""
-    yield Found(len(told.shorts), more="; ".join(told.shorts[:MOST]))
+    yield Finding(len(told.shorts), more="; ".join(told.shorts[:MOST]))
 
 
-REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Found]]] = {
+REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Finding]]] = {
     OPEN: unconnected,
     SHORT: short_circuits,
 }
 """Rules that KiCad's check says by itself, without a custom rule."""
-READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] = {
+READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Finding]]] = {
     **on_parts.READ,
     "decoupling-distance": decoupling_distance,
     "board-outline": board_outline,
@@ -170,19 +170,19 @@ READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] 
 """Rules that KiCad is not asked about: they are read from the file."""
 
 
-def _reported(rule: Rule, board: BoardFile, told: DesignRuleCheck) -> Iterator[Found]:
+def _reported(rule: DesignRule, board: BoardFile, told: DesignRuleCheck) -> Iterator[Finding]:
     if rule.id in told.misunderstood:
         raise NotRun(UNHEARD)
     return REPORTED[rule.id](board, told)
 
 
 def _by_kicad(
-    rule: Rule,
+    rule: DesignRule,
     custom: CustomRule,
     board: BoardFile,
     told: DesignRuleCheck,
     override: Override | None,
-) -> Outcome:
+) -> RuleOutcome:
     if custom.id in told.misunderstood:
         raise NotRun(UNHEARD)
     mine = [v for v in told.violations if v.rule == custom.id]
@@ -202,24 +202,24 @@ def _by_kicad(
         if bare:
             raise NotRun(f"footprints without a courtyard: {', '.join(bare[:MOST])}")
     usual = _usual(rule, custom, override)
-    return Outcome(
+    return RuleOutcome(
         rule, PASS, "no violation in KiCad's check", limit=custom.limit, override=override,
         usual=usual,
     )  # fmt: skip
 
 
 def _broken(
-    rule: Rule, custom: CustomRule, found: Sequence[Violation], override: Override | None
-) -> Outcome:
+    rule: DesignRule, custom: CustomRule, found: Sequence[Violation], override: Override | None
+) -> RuleOutcome:
     worst = (min if rule.least else max)(found, key=lambda v: v.actual)
     text = f"{shown(worst.actual, rule.unit)} at {worst.where}"
     if len(found) > 1:
         text += f"; {len(found)} places in all"
     usual = _usual(rule, custom, override)
-    return Outcome(rule, FAIL, text, worst.actual, custom.limit, worst.where, override, usual)
+    return RuleOutcome(rule, FAIL, text, worst.actual, custom.limit, worst.where, override, usual)
 
 
-def _usual(rule: Rule, custom: CustomRule, override: Override | None) -> float:
+def _usual(rule: DesignRule, custom: CustomRule, override: Override | None) -> float:
     """The limit without the model file's; nan where only the table would say."""
     if override is None:
         return custom.limit
@@ -227,15 +227,15 @@ def _usual(rule: Rule, custom: CustomRule, override: Override | None) -> float:
 
 
 def _idle(
-    rule: Rule, rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str
-) -> Outcome:
+    rule: DesignRule, rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str
+) -> RuleOutcome:
     limits = {custom.id: custom.limit for custom in rules}
     made = not_run(rule, why, overrides.get(rule.id))
-    return Outcome(
+    return RuleOutcome(
         made.rule, made.status, made.found, limit=limits.get(rule.id, made.limit),
         override=made.override,
     )  # fmt: skip
 
 
-def _wanted() -> list[Rule]:
+def _wanted() -> list[DesignRule]:
     return [rule for rule in RULES if rule.scope == "board"]

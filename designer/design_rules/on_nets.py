@@ -9,7 +9,7 @@ import numpy as np
 
 from designer.board.component import Component
 from designer.board.pins import Pin
-from designer.catalog.design_rule import Found
+from designer.catalog.design_rule import Finding
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Section
 from designer.dynamics.piecewise_linear import ModeKey
 
@@ -19,7 +19,7 @@ OPEN = 1e-15
 """Conductance [S] from every net to ground, so that none is without an answer."""
 
 
-def feedback(circuit: Circuit) -> Iterator[Found]:
+def feedback(circuit: Circuit) -> Iterator[Finding]:
     """What comes back of each section's output, its neighbours' outputs held: at rest and in each
     contact, for a diode may open the loop."""
     keys = dict.fromkeys([circuit.rest])
@@ -27,7 +27,7 @@ def feedback(circuit: Circuit) -> Iterator[Found]:
         keys |= dict.fromkeys(circuit.carrying(contact) for _, contact in stop.contacts)
     for key in keys:
         for section in circuit.sections:
-            yield Found(_returned(circuit, section, key), section.name)
+            yield Finding(_returned(circuit, section, key), section.name)
 
 
 def _returned(circuit: Circuit, section: Section, key: ModeKey) -> float:
@@ -67,7 +67,7 @@ def _returned(circuit: Circuit, section: Section, key: ModeKey) -> float:
     return at(section.inverting) - at(section.noninverting)
 
 
-def drivers(found: Sequence[Component], generator: str) -> Iterator[Found]:
+def drivers(found: Sequence[Component], generator: str) -> Iterator[Finding]:
     """Sources on each net: op-amp outputs, the rails, ground, the generator."""
     on: dict[str, list[str]] = {POSITIVE: ["the supply"], NEGATIVE: ["the supply"]}
     on |= {GROUND: ["ground"], generator: ["the generator"]}
@@ -75,10 +75,10 @@ def drivers(found: Sequence[Component], generator: str) -> Iterator[Found]:
         if pin.electrical == "output" and pin.net:
             on.setdefault(pin.net, []).append(f"{component.reference}{pin.unit}")
     for net, names in on.items():
-        yield Found(len(names), net, more=", ".join(names) if len(names) > 1 else "")
+        yield Finding(len(names), net, more=", ".join(names) if len(names) > 1 else "")
 
 
-def floating_inputs(found: Sequence[Component], generator: str) -> Iterator[Found]:
+def floating_inputs(found: Sequence[Component], generator: str) -> Iterator[Finding]:
     """Inputs that no resistor, reference or trimmer joins to a driven net."""
     reached = {GROUND, POSITIVE, NEGATIVE, generator}
     reached |= {pin.net for _, pin in _pins(found) if pin.electrical == "output"}
@@ -99,27 +99,27 @@ def floating_inputs(found: Sequence[Component], generator: str) -> Iterator[Foun
         for component, pin in _pins(found)
         if pin.electrical == "input" and pin.net not in reached
     ]
-    yield Found(len(lost), ", ".join(lost))
+    yield Finding(len(lost), ", ".join(lost))
 
 
-def single_pins(found: Sequence[Component]) -> Iterator[Found]:
+def single_pins(found: Sequence[Component]) -> Iterator[Finding]:
     """Nets that one pin alone is on."""
     on: dict[str, list[str]] = {}
     for component, pin in _pins(found):
         if pin.net:
             on.setdefault(pin.net, []).append(f"{component.reference}.{pin.number}")
     lost = [f"{net} ({names[0]})" for net, names in on.items() if len(names) == 1]
-    yield Found(len(lost), ", ".join(lost))
+    yield Finding(len(lost), ", ".join(lost))
 
 
-def duplicates(found: Sequence[Component]) -> Iterator[Found]:
+def duplicates(found: Sequence[Component]) -> Iterator[Finding]:
     """Designators that stand twice."""
     counted = Counter(c.reference for c in found)
     twice = sorted(name for name, count in counted.items() if count > 1)
-    yield Found(len(twice), ", ".join(twice))
+    yield Finding(len(twice), ", ".join(twice))
 
 
-def supply_pins(found: Sequence[Component], pair: tuple[str, str]) -> Iterator[Found]:
+def supply_pins(found: Sequence[Component], pair: tuple[str, str]) -> Iterator[Finding]:
     """Supply pins of op-amps. pair : numbers of the positive and the negative pin."""
     wrong = []
     for component in found:
@@ -130,10 +130,10 @@ def supply_pins(found: Sequence[Component], pair: tuple[str, str]) -> Iterator[F
             if nets.get(number) != rail:
                 on = nets.get(number) or "nothing"
                 wrong.append(f"{component.reference}.{number} is on {on}, not on {rail}")
-    yield Found(len(wrong), "; ".join(wrong))
+    yield Finding(len(wrong), "; ".join(wrong))
 
 
-def decoupling(found: Sequence[Component]) -> Iterator[Found]:
+def decoupling(found: Sequence[Component]) -> Iterator[Finding]:
     """Farads from each rail to ground at each op-amp package."""
     for package in found:
         if package.kind != "op-amp":
@@ -146,7 +146,7 @@ def decoupling(found: Sequence[Component]) -> Iterator[Found]:
                 and c.near == package.reference
                 and set(c.nets.values()) == {rail, GROUND}
             )
-            yield Found(total, f"{package.reference}, {rail}")
+            yield Finding(total, f"{package.reference}, {rail}")
 
 
 def _pins(found: Sequence[Component]) -> Iterator[tuple[Component, Pin]]:

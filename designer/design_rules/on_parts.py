@@ -12,8 +12,8 @@ from designer.base.units import parse_quantity
 from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_names import LIBRARY, footprint_name
-from designer.board.kicad_reader import PART_NUMBER, BoardFile, Footprint
-from designer.catalog.design_rule import Found, NotRun
+from designer.board.kicad_reader import PART_NUMBER, BoardFile, PlacedFootprint
+from designer.catalog.design_rule import Finding, NotRun
 
 MOST = 5
 """Parts that a message names."""
@@ -22,16 +22,16 @@ LONGEST = 40
 UNITS = {"resistor": "Ω", "capacitor": "F", "trimmer": "Ω"}
 """Kinds of parts whose value is a quantity."""
 
-Pair = tuple[Component, Footprint]
+Pair = tuple[Component, PlacedFootprint]
 
 
-def values(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+def values(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """Parts whose value is another one. A quantity may be written in any way ("22.1k", "22k1")."""
     pairs = [(c, f) for c, f in _pairs(board, components) if c.bought is not None]
     yield from _count(pairs, _other_value)
 
 
-def numbers(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+def numbers(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """Parts with another part number than the one that is to be bought, or than its substitute's.
 
     Raises
@@ -44,17 +44,17 @@ def numbers(board: BoardFile, components: Sequence[Component]) -> Iterator[Found
     yield from _count(pairs, _other_number)
 
 
-def footprints(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+def footprints(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """Parts in another footprint, of the project's library or of KiCad's that has the same name."""
     yield from _count(_pairs(board, components), _other_footprint)
 
 
-def fitted(board: BoardFile, components: Sequence[Component]) -> Iterator[Found]:
+def fitted(board: BoardFile, components: Sequence[Component]) -> Iterator[Finding]:
     """Parts that are left out on the board and not by the design, or the other way round."""
     yield from _count(_pairs(board, components), _other_mark)
 
 
-READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Found]]] = {
+READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Finding]]] = {
     "part-value": values,
     "part-number": numbers,
     "part-footprint": footprints,
@@ -69,17 +69,17 @@ def _pairs(board: BoardFile, components: Sequence[Component]) -> list[Pair]:
 
 
 def _count(
-    pairs: Sequence[Pair], difference: Callable[[Component, Footprint], str]
-) -> Iterator[Found]:
+    pairs: Sequence[Pair], difference: Callable[[Component, PlacedFootprint], str]
+) -> Iterator[Finding]:
     """How many parts differ, and how; nothing where there is no part at all."""
     if not pairs:
         return
     differ = [f"{c.reference} {text}" for c, f in pairs if (text := difference(c, f))]
     more = [f"and {len(differ) - MOST} more"] if len(differ) > MOST else []
-    yield Found(len(differ), more="; ".join(differ[:MOST] + more))
+    yield Finding(len(differ), more="; ".join(differ[:MOST] + more))
 
 
-def _other_value(component: Component, there: Footprint) -> str:
+def _other_value(component: Component, there: PlacedFootprint) -> str:
     unit = UNITS.get(component.kind)
     if unit is None or component.quantity is None:
         same = _plain(there.value) == _plain(component.value)
@@ -92,7 +92,7 @@ def _other_value(component: Component, there: Footprint) -> str:
     return "" if same else f"is {_shown(there.value)}, not {component.value}"
 
 
-def _other_number(component: Component, there: Footprint) -> str:
+def _other_number(component: Component, there: PlacedFootprint) -> str:
     assert component.bought is not None
     found, wanted = there.part_number or "", component.bought.part_number
     # A substitute is written with its maker in front.
@@ -101,7 +101,7 @@ def _other_number(component: Component, there: Footprint) -> str:
     return f"is ordered as {_shown(found)}, not {wanted}"
 
 
-def _other_footprint(component: Component, there: Footprint) -> str:
+def _other_footprint(component: Component, there: PlacedFootprint) -> str:
     library = component.footprint.rpartition(":")[0]
     name = footprint_name(component.footprint)
     if there.name != name:
@@ -111,7 +111,7 @@ def _other_footprint(component: Component, there: Footprint) -> str:
     return ""
 
 
-def _other_mark(component: Component, there: Footprint) -> str:
+def _other_mark(component: Component, there: PlacedFootprint) -> str:
     if there.fitted == component.fitted:
         return ""
     return (

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from designer.catalog.catalog import Catalog
-from designer.catalog.design_rule import Found
+from designer.catalog.design_rule import Finding
 from designer.catalog.entries import OpAmp
 from designer.circuit.netlist import Circuit, Diode
 from designer.design_rules.force_at_clearance import Forces, leftover, thermal
@@ -27,28 +27,28 @@ STEP = 1e-5
 """Relative change of a resistor for a sensitivity."""
 
 
-def offset(opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float) -> Iterator[Found]:
+def offset(opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float) -> Iterator[Finding]:
     """All sections' largest offsets, independent of each other. drive : amplitude [V]."""
     limit = opamp.offset.max if opamp.offset.max is not None else opamp.offset_limit
     share = {s.name: abs(forces.offset[s.name]) * limit / drive for s in circuit.sections}
     worst = max(share, key=lambda name: share[name])
     total = float(np.sqrt(sum(each**2 for each in share.values())))
     more = f"{shown_volts(limit)} at each of {len(share)} sections"
-    yield Found(total, f"{worst}, which has most of it", more=more)
+    yield Finding(total, f"{worst}, which has most of it", more=more)
 
 
-def bias(opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float) -> Iterator[Found]:
+def bias(opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float) -> Iterator[Finding]:
     """All inputs' largest bias currents, added up."""
     limit = opamp.bias.max if opamp.bias.max is not None else opamp.bias.nominal
     share = {s.name: abs(forces.current.get(s.inverting, 0.0)) for s in circuit.sections}
     worst = max(share, key=lambda name: share[name])
     total = sum(share.values()) * limit / drive
-    yield Found(total, f"{worst}, which has most of it", more=f"{limit:.3g} A at each input")
+    yield Finding(total, f"{worst}, which has most of it", more=f"{limit:.3g} A at each input")
 
 
 def noise(
     opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float, frequency: float
-) -> Iterator[Found]:
+) -> Iterator[Finding]:
     """RMS of op-amps and resistors from ``SLOWEST`` to ``frequency`` [Hz]."""
     corner = opamp.noise_corner.nominal if opamp.noise_corner is not None else 0.0
     white = frequency - SLOWEST
@@ -57,10 +57,10 @@ def noise(
     amplifiers = sum((forces.offset[s.name] * density) ** 2 for s in circuit.sections)
     resistors = sum((forces.between(r.a, r.b) * thermal(r.value)) ** 2 for r in circuit.resistors)
     total = float(np.sqrt(amplifiers * (white + flicker) + resistors * white)) / drive
-    yield Found(total, more=f"{SLOWEST:g} Hz to {frequency:.4g} Hz")
+    yield Finding(total, more=f"{SLOWEST:g} Hz to {frequency:.4g} Hz")
 
 
-def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) -> Iterator[Found]:
+def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) -> Iterator[Finding]:
     """A rail through the board into one summing node; with it whatever leaks through diodes.
 
     Opposed diodes at one node leak less than that: neither sees a voltage there.
@@ -80,12 +80,12 @@ def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) ->
             more += ", and through the diodes"
         if any(node in pair for pair in opposed):
             more += "; the protection's diodes see no voltage"
-        yield Found((over_board + through) / drive, f"{section.name}, node {node}", more=more)
+        yield Finding((over_board + through) / drive, f"{section.name}, node {node}", more=more)
 
 
 def absorption(
     circuit: Circuit, dielectrics: Mapping[str, str], forces: Forces, drive: float
-) -> Iterator[Found]:
+) -> Iterator[Finding]:
     """Charge that an integrator's capacitor gives back after its output stood at its limit.
 
     dielectrics : of the capacitors, in words, by name.
@@ -97,10 +97,10 @@ def absorption(
         current = share * capacitor.value * circuit.saturation / RETURNS
         force = abs(forces.between(capacitor.plus, capacitor.minus)) * current / drive
         more = f"{100 * share:g} % of {circuit.saturation:g} V, {words or 'dielectric not known'}"
-        yield Found(force, capacitor.name, more=more)
+        yield Finding(force, capacitor.name, more=more)
 
 
-def stiffness(circuit: Circuit, mu: float, grades: Mapping[str, float]) -> Iterator[Found]:
+def stiffness(circuit: Circuit, mu: float, grades: Mapping[str, float]) -> Iterator[Finding]:
     """What the dead zone leaves, in units of K1: |nominal| and a standard deviation.
 
     mu : the stop's stiffness over K1. grades : of each resistor as it is bought, spread evenly.
@@ -118,7 +118,7 @@ def stiffness(circuit: Circuit, mu: float, grades: Mapping[str, float]) -> Itera
     worst = max(shares, key=lambda name: abs(shares[name]))
     bought = " and ".join(f"{100 * g:g}" for g in sorted({grades[name] for name in change}))
     more = f"nominal {abs(nominal):.2g}, deviation {deviation:.2g} at {bought} % resistors"
-    yield Found(float(abs(nominal) + deviation), f"{worst}, which has most of it", more=more)
+    yield Finding(float(abs(nominal) + deviation), f"{worst}, which has most of it", more=more)
 
 
 def shown_volts(volts: float) -> str:

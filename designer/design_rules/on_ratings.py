@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from designer.catalog.design_rule import Found
+from designer.catalog.design_rule import Finding
 from designer.catalog.entries import OpAmp
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode
-from designer.circuit.noise_gains import Stage, stages
+from designer.circuit.noise_gains import SectionStage, stages
 from designer.design_rules.operating_point import Operating, Peak
 from designer.synthesis.limits import bandwidth_limit, guaranteed
 from designer.synthesis.side_conditions import saturating
@@ -20,7 +20,7 @@ HEAVY, LIGHT = 2e3, 10e3
 """Loads that data sheets state the swing for [Ω]."""
 
 
-def swing(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Found]:
+def swing(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
     """Peaks of every output but those that reach their limits in contact."""
     meant = saturating(circuit)
     for section in circuit.sections:
@@ -28,7 +28,9 @@ def swing(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Found]:
             continue
         peak = max(met.high[section.output], met.low[section.output], key=lambda p: p.value)
         current = met.source[section.name].value
-        yield Found(peak.value, _at(section.name, peak), guaranteed_swing(opamp, circuit, current))
+        yield Finding(
+            peak.value, _at(section.name, peak), guaranteed_swing(opamp, circuit, current)
+        )
 
 
 def guaranteed_swing(opamp: OpAmp, circuit: Circuit, current: float) -> float:
@@ -46,22 +48,22 @@ def guaranteed_swing(opamp: OpAmp, circuit: Circuit, current: float) -> float:
     return light + share * (heavy - light) + shift
 
 
-def load(circuit: Circuit) -> Iterator[Found]:
+def load(circuit: Circuit) -> Iterator[Finding]:
     """Resistance on each output."""
     for stage in stages(circuit):
         if stage.load < float("inf"):
-            yield Found(stage.load, stage.section.name)
+            yield Finding(stage.load, stage.section.name)
 
 
-def output_current(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Found]:
+def output_current(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
     """Peak current of each output."""
     limit = guaranteed(opamp.output_current)
     for section in circuit.sections:
         peak = met.source[section.name]
-        yield Found(peak.value, _at(section.name, peak), limit)
+        yield Finding(peak.value, _at(section.name, peak), limit)
 
 
-def fault_current(circuit: Circuit, opamp: OpAmp) -> Iterator[Found]:
+def fault_current(circuit: Circuit, opamp: OpAmp) -> Iterator[Finding]:
     """From the generator into each input with the supply off, every output and rail at 0 V.
 
     A pair of opposed diodes to ground at the node takes the current in the input's place; the two
@@ -81,7 +83,7 @@ def fault_current(circuit: Circuit, opamp: OpAmp) -> Iterator[Found]:
         more = ""
         if ways == {True, False}:
             current, more = current / 2.0, "shared with the diodes at the node"
-        yield Found(current, f"{section.name}, node {node}", limit, more)
+        yield Finding(current, f"{section.name}, node {node}", limit, more)
 
 
 def _towards(circuit: Circuit, source: str, node: str, held: set[str]) -> float:
@@ -99,13 +101,13 @@ def _towards(circuit: Circuit, source: str, node: str, held: set[str]) -> float:
     return total
 
 
-def power(ratings: Mapping[str, float], met: Operating) -> Iterator[Found]:
+def power(ratings: Mapping[str, float], met: Operating) -> Iterator[Finding]:
     """Mean power of each resistor over its rating [W], by name."""
     for name, rating in ratings.items():
         peak = met.power.get(name)
         if peak is not None:
             more = f"{1e3 * peak.value:.3g} mW of {1e3 * rating:.3g} mW"
-            yield Found(peak.value / rating, _at(name, peak), more=more)
+            yield Finding(peak.value / rating, _at(name, peak), more=more)
 
 
 def capacitor_voltage(
@@ -113,7 +115,7 @@ def capacitor_voltage(
     ratings: Mapping[str, float],
     met: Operating,
     stuck: Operating,
-) -> Iterator[Found]:
+) -> Iterator[Finding]:
     """Voltage of each capacitor over its rating [V], by name; those of the supply too."""
     supply = {POSITIVE: circuit.supply, NEGATIVE: -circuit.supply, GROUND: 0.0}
     across = {name: met.across[name] for name in met.across if name in ratings}
@@ -126,10 +128,10 @@ def capacitor_voltage(
             across[part.name] = Peak(abs(volts[0] - volts[1]), "")
     for name, peak in across.items():
         more = f"{peak.value:.3g} V of {ratings[name]:.3g} V"
-        yield Found(peak.value / ratings[name], _at(name, peak), more=more)
+        yield Finding(peak.value / ratings[name], _at(name, peak), more=more)
 
 
-def common_mode(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Found]:
+def common_mode(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
     """Room of each input inside the range; its ends move with the rails."""
     shift = circuit.supply - opamp.rated_supply
     low = (opamp.common_mode.min or 0.0) - shift
@@ -137,26 +139,26 @@ def common_mode(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Foun
     for section in circuit.sections:
         for net in dict.fromkeys((section.inverting, section.noninverting)):
             top, bottom = met.high[net], met.low[net]
-            yield Found(high - top.value, _at(section.name, top))
-            yield Found(-bottom.value - low, _at(section.name, bottom))
+            yield Finding(high - top.value, _at(section.name, top))
+            yield Finding(-bottom.value - low, _at(section.name, bottom))
 
 
-def slew(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Found]:
+def slew(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
     """Fastest change of each output over what is guaranteed."""
     limit = guaranteed(opamp.slew)
     for section in circuit.sections:
         peak = met.slew[section.name]
         more = f"{peak.value / 1e6:.3g} V/µs of {limit / 1e6:.3g} V/µs"
-        yield Found(peak.value / limit, _at(section.name, peak), more=more)
+        yield Finding(peak.value / limit, _at(section.name, peak), more=more)
 
 
-def gain_bandwidth(circuit: Circuit, opamp: OpAmp, frequency: float) -> Iterator[Found]:
+def gain_bandwidth(circuit: Circuit, opamp: OpAmp, frequency: float) -> Iterator[Finding]:
     """Noise gain times the highest frequency that matters [Hz]."""
 
-    def found(stage: Stage) -> Found:
+    def found(stage: SectionStage) -> Finding:
         more = f"up to {frequency:.4g} Hz"
         name = stage.section.name
-        return Found(stage.bandwidth(frequency), name, bandwidth_limit(opamp), more)
+        return Finding(stage.bandwidth(frequency), name, bandwidth_limit(opamp), more)
 
     return (found(stage) for stage in stages(circuit))
 

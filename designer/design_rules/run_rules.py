@@ -7,12 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from designer.catalog.design_rule import Found, NotRun, Outcome, Override, Rule, judged, not_run
+from designer.catalog.design_rule import (
+    DesignRule,
+    Finding,
+    NotRun,
+    Override,
+    RuleOutcome,
+    judged,
+    not_run,
+)
 from designer.catalog.design_rules import BY_ID, RULES
 from designer.design_rules import on_nets, on_precision, on_ratings
-from designer.design_rules.subject import Subject
+from designer.design_rules.subject import RuleSubject
 
-Look = Callable[[Subject], Iterable[Found]]
+Look = Callable[[RuleSubject], Iterable[Finding]]
 
 LOOKS: dict[str, Look] = {
     "feedback": lambda s: on_nets.feedback(s.circuit),
@@ -48,19 +56,21 @@ LOOKS: dict[str, Look] = {
 """By id: yields what was found, one value for each place that the rule looks at."""
 
 
-def on_circuit(subject: Subject, overrides: Mapping[str, Override]) -> tuple[Outcome, ...]:
+def on_circuit(subject: RuleSubject, overrides: Mapping[str, Override]) -> tuple[RuleOutcome, ...]:
     """Every rule on the circuit, in the order of the list."""
     wanted = [rule for rule in RULES if rule.scope == "circuit"]
     return tuple(look(rule.id, subject, overrides.get(rule.id)) for rule in wanted)
 
 
-def look(id_: str, subject: Subject, override: Override | None = None) -> Outcome:
+def look(id_: str, subject: RuleSubject, override: Override | None = None) -> RuleOutcome:
     """One rule on the circuit; what cannot be looked at is not run, and says why."""
     rule = BY_ID[id_]
     return outcome(rule, lambda: LOOKS[id_](subject), override)
 
 
-def outcome(rule: Rule, find: Callable[[], Iterable[Found]], override: Override | None) -> Outcome:
+def outcome(
+    rule: DesignRule, find: Callable[[], Iterable[Finding]], override: Override | None
+) -> RuleOutcome:
     """What a rule says of what ``find`` finds."""
     try:
         return judged(rule, list(find()), override)

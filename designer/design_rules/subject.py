@@ -26,7 +26,7 @@ from designer.synthesis.output_loads import Run
 
 
 @dataclass(frozen=True)
-class Subject:
+class RuleSubject:
     """A design, the circuit with its fittings, and the components of its board.
 
     What takes time is computed when a rule first asks for it, and then kept.

@@ -19,7 +19,7 @@ from .attractors import (
     twin as twin,
 )
 from .continued_orbit import (
-    Followed as Followed,
+    ContinuedOrbit as ContinuedOrbit,
     Function as Function,
     follow as follow,
     functions as functions,
@@ -64,7 +64,7 @@ from .piecewise_linear import (
 )
 from .steady_state import (
     Course as Course,
-    Setting as Setting,
+    DrivenSystem as DrivenSystem,
     Steady as Steady,
 )
 from .step_budget import (

@@ -41,7 +41,7 @@ class Extreme:
 
 
 @dataclass(frozen=True)
-class Followed:
+class ContinuedOrbit:
     """An orbit of ``periods`` drive periods: its extremes and functions of its multipliers.
 
     start : (states,) at a strobe.
@@ -78,7 +78,7 @@ class Function:
             return f"parting inside a contact with the {stop}"
         return f"{self.kind} {self.place[0]} of {self.place[1]} at the {stop}"
 
-    def on(self, orbit: Followed | None) -> float | None:
+    def on(self, orbit: ContinuedOrbit | None) -> float | None:
         """Its value on another orbit; None where it is not found there."""
         if orbit is None:
             return None
@@ -89,14 +89,14 @@ class Function:
             return None
         return same.value if self.extreme.value > 0.0 else -same.value
 
-    def moved_to(self, orbit: Followed) -> Function:
+    def moved_to(self, orbit: ContinuedOrbit) -> Function:
         """The same function, to be looked for from this orbit on at its extreme's time there."""
         same = None if self.extreme is None else self._same(orbit)
         if self.extreme is None or same is None:
             return self
         return replace(self, extreme=replace(self.extreme, time=same.time))
 
-    def _same(self, orbit: Followed) -> Extreme | None:
+    def _same(self, orbit: ContinuedOrbit) -> Extreme | None:
         """Its extreme on another orbit."""
         own, half = self.extreme, 0.5 * orbit.periods
         assert own is not None
@@ -109,16 +109,16 @@ class Function:
         return None if away > SHIFT else same
 
 
-def follow(flow: Flow, start: Array, periods: int) -> Followed | None:
+def follow(flow: Flow, start: Array, periods: int) -> ContinuedOrbit | None:
     """The orbit of this period near a start (states,); None where shooting does not arrive."""
     found = shoot(flow, start, periods, peak=peaks_near(flow, start))
     if found is None:
         return None
     x, monodromy = found
-    return Followed(_extremes(flow, x, periods), _stability(monodromy), periods, x)
+    return ContinuedOrbit(_extremes(flow, x, periods), _stability(monodromy), periods, x)
 
 
-def functions(orbit: Followed, symmetric: bool) -> tuple[Function, ...]:
+def functions(orbit: ContinuedOrbit, symmetric: bool) -> tuple[Function, ...]:
     """Every way of losing the response that is positive on this orbit."""
     out = []
     for e in orbit.extremes:
@@ -138,7 +138,7 @@ def functions(orbit: Followed, symmetric: bool) -> tuple[Function, ...]:
     return tuple(out)
 
 
-def valleys(orbit: Followed) -> tuple[Function, ...]:
+def valleys(orbit: ContinuedOrbit) -> tuple[Function, ...]:
     """How far the displacement falls back between two contacts: where one of these becomes
     negative, the two contacts are one."""
     return tuple(

@@ -299,7 +299,7 @@ class Flow:
 
     def _run_working(
         self,
-        tables: working_modes.Tables,
+        tables: working_modes.DrivenTables,
         x: Array,
         stretches: int,
         points: int,
@@ -448,7 +448,7 @@ def _step_length(A: Array, omega: float) -> float:
 
 
 def _fill(
-    tables: kernel.Tables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
+    tables: kernel.ModeTables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
 ) -> None:
     """touched : for each clearance the row of the displacement past the stop in contact."""
     M = augmented(mode, drive)
@@ -475,9 +475,9 @@ def _fill(
         tables.clearance[i, g] = guard.clearance
 
 
-def _empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.Tables:
+def _empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.ModeTables:
     order = kernel.ORDER + 1
-    return kernel.Tables(
+    return kernel.ModeTables(
         step=np.zeros(modes),
         propagator=np.zeros((modes, width, width)),
         taylor=np.zeros((modes, order, width, width)),

@@ -101,7 +101,7 @@ class Modes(NamedTuple):
     side: Int
 
 
-class Trail(NamedTuple):
+class RunTrail(NamedTuple):
     """What a measured run writes: extremes (4, 2); graze (3,) smallest penetration, nearest miss,
     tangencies; when (k,), at (k, 4), stop (k,) of the impacts; met (1,) how many."""
 
@@ -698,7 +698,9 @@ def mode_at(data: Float, ints: Int, x: Float) -> int:
 
 
 @compiled
-def _note(table: Float, number: Int, end: float, work: Float, trail: Trail, found: Float) -> float:
+def _note(
+    table: Float, number: Int, end: float, work: Float, trail: RunTrail, found: Float
+) -> float:
     """Extremes, and the misses of a mode without contact, over [0, end]; the greatest depth."""
     deepest = 0.0
     for r in range(ROWS):
@@ -738,7 +740,7 @@ def advance(
     phi: Float,
     strobes: Float,
     impacts: Int,
-    trail: Trail,
+    trail: RunTrail,
 ) -> int:
     """Carry x (4,), at drive phase 0, over the stretches of ``strobes`` (stretches + 1, 4).
 
@@ -937,7 +939,7 @@ def _shoot(
     drive: Float,
     ways: Ways,
     T: Float,
-    trail: Trail,
+    trail: RunTrail,
 ) -> int:
     """``attractors.shoot``: x and T ← fixed point and monodromy matrix. 1 found, 0 none, -1
     left."""
@@ -988,7 +990,7 @@ def respond(
     j: int,
     e: int,
     answers: Answers,
-    trail: Trail,
+    trail: RunTrail,
 ) -> int:
     """``attractors.settle`` from x (4,) as long as the way is the usual one: FOUND or ASK.
 
@@ -1141,7 +1143,7 @@ def _describe(
     j: int,
     e: int,
     answers: Answers,
-    trail: Trail,
+    trail: RunTrail,
     dense: Float,
     hits: Int,
 ) -> bool:
@@ -1238,7 +1240,7 @@ def respond_all(
     """
     count = modes.A.shape[1]
     data, ints = np.zeros((count, WIDTH)), np.zeros((count, INTS), dtype=np.int64)
-    trail = Trail(
+    trail = RunTrail(
         np.zeros((4, 2)),
         np.zeros(3),
         np.zeros(IMPACTS),

@@ -37,7 +37,7 @@ TANGENCY = 1e-13
 """Of a guard's unit: below it a value is not told from zero."""
 
 
-class Tables(NamedTuple):
+class ModeTables(NamedTuple):
     """What ``advance`` knows of the modes; first axis: mode index.
 
     step : (m,) h; propagator : (m, N, N); taylor : (m, ORDER + 1, N, N) with (M h)^k/k!;
@@ -233,7 +233,7 @@ def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, wor
 
 @compiled
 def _measure(
-    tables: Tables, mode: int, z: Float, n: int, end: float, depth: Float, log: Log
+    tables: ModeTables, mode: int, z: Float, n: int, end: float, depth: Float, log: Log
 ) -> None:
     """Extremes of the states and of the distances to the stops within one step."""
     c = np.empty(tables.taylor.shape[1])
@@ -280,7 +280,7 @@ def _measure(
 
 @compiled
 def advance(
-    tables: Tables,
+    tables: ModeTables,
     z: Float,
     clock: Float,
     cursor: Int,

@@ -91,7 +91,7 @@ class Steady:
 
 
 @dataclass(frozen=True)
-class Setting:
+class DrivenSystem:
     """A system under a drive: how to make its flow, its drive's period, the fast path's tables
     (None: by the flow)."""
 

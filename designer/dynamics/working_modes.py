@@ -34,7 +34,7 @@ def of_system(system: PiecewiseLinearSystem) -> kernel.Modes | None:
     return out
 
 
-class Tables:
+class DrivenTables:
     """The tables of one system under one drive: data (K, WIDTH) and ints (K, INTS)."""
 
     def __init__(self, count: int) -> None:
@@ -42,12 +42,12 @@ class Tables:
         self.ints = np.zeros((count, kernel.INTS), dtype=np.int64)
 
 
-def tables(system: PiecewiseLinearSystem, drive: Drive) -> Tables | None:
+def tables(system: PiecewiseLinearSystem, drive: Drive) -> DrivenTables | None:
     """None where the fast path does not fit."""
     modes = of_system(system)
     if modes is None:
         return None
-    out = Tables(len(system.working))
+    out = DrivenTables(len(system.working))
     code = kernel.fill(out.data, out.ints, modes, 0, drive.omega, drive.amplitude, drive.offset)
     return out if code == kernel.DONE else None
 
@@ -61,9 +61,9 @@ def anchors(points: int) -> Array:
 WAYS = kernel.Ways(anchors(1), anchors(32), anchors(kernel.POINTS))
 
 
-def trail(room: int) -> kernel.Trail:
+def trail(room: int) -> kernel.RunTrail:
     """Room for what a measured run writes."""
-    return kernel.Trail(
+    return kernel.RunTrail(
         extremes=np.tile([np.inf, -np.inf], (STATES, 1)),
         graze=np.array([np.inf, np.inf, 0.0]),
         when=np.empty(room),

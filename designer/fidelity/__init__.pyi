@@ -12,12 +12,12 @@ from .cpu_clock import (
     rounds as rounds,
 )
 from .label import (
-    Label as Label,
+    ResponseLabel as ResponseLabel,
 )
 from .pieces import (
     CHUNK as CHUNK,
     PIECES as PIECES,
-    Pieces as Pieces,
+    TradePieces as TradePieces,
     read_pieces as read_pieces,
 )
 from .rung_errors import (
@@ -38,8 +38,8 @@ from .trade_files import (
 )
 from .trade_study import (
     SHARE as SHARE,
-    Response as Response,
     Trade as Trade,
+    TradedResponse as TradedResponse,
     trade as trade,
 )
 from .yields import (

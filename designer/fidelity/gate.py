@@ -18,7 +18,7 @@ import numpy as np
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 
@@ -31,7 +31,7 @@ def companions(settings: SolverSettings) -> tuple[SolverSettings, SolverSettings
     return half, replace(half, method="gear")
 
 
-def passed(subject: Subject, own: Run, beside: tuple[Run, Run]) -> bool:
+def passed(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
     """Whether the run of a setting, which has its trace, and those of its ``companions`` agree.
 
     subject : on its rung.

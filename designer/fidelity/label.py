@@ -9,7 +9,7 @@ from designer.model.find_responses import ModelResponse
 
 
 @dataclass(frozen=True)
-class Label:
+class ResponseLabel:
     """number : in the order of the model file, from 1. expected : n-p-q, None where nothing was."""
 
     number: int
@@ -18,7 +18,7 @@ class Label:
     expected: str | None
 
     @classmethod
-    def of(cls, number: int, response: ModelResponse) -> Label:
+    def of(cls, number: int, response: ModelResponse) -> ResponseLabel:
         """The label of response number ``number``."""
         return cls(number, response.omega, response.b, response.expected)
 

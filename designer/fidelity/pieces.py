@@ -16,8 +16,8 @@ from typing import Any
 
 from designer.base.keyed_store import Lines, Note, quiet
 from designer.base.plain_json import plain
-from designer.fidelity.label import Label
-from designer.fidelity.rung_errors import Compared, Truth
+from designer.fidelity.label import ResponseLabel
+from designer.fidelity.rung_errors import RungError, Truth
 from designer.fidelity.yields import Tally
 from designer.spice.deck import SolverSettings
 
@@ -26,7 +26,7 @@ CHUNK = 100
 """Boards of a piece."""
 
 
-class Pieces:
+class TradePieces:
     """Pieces by name, as they were found in ``known`` or are made now.
 
     key : of all that decides a piece. save : puts the text of the file where it belongs; by default
@@ -73,9 +73,9 @@ def _lines(key: str) -> Lines:
 
 
 def rungs_json(
-    rows: tuple[Compared, ...], truth: Truth, settings: SolverSettings | None, seconds: float
+    rows: tuple[RungError, ...], truth: Truth, settings: SolverSettings | None, seconds: float
 ) -> dict[str, Any]:
-    """A response on every rung; settings, seconds : as in ``rungs.Measured``."""
+    """A response on every rung; settings, seconds : as in ``rungs.RungAnswers``."""
     return {
         "rows": [asdict(row) for row in rows],
         "truth": asdict(truth),
@@ -86,7 +86,7 @@ def rungs_json(
 
 def rungs(
     said: Mapping[str, Any],
-) -> tuple[tuple[Compared, ...], Truth, SolverSettings | None, float]:
+) -> tuple[tuple[RungError, ...], Truth, SolverSettings | None, float]:
     """The inverse of ``rungs_json``; numbers that are not finite come back as nan."""
     settings = said["settings"]
     return (
@@ -102,11 +102,11 @@ def tally(said: Mapping[str, Any]) -> Tally:
     return Tally(**{f.name: said[f.name] for f in fields(Tally)})
 
 
-def _compared(said: Mapping[str, Any]) -> Compared:
-    return Compared(
+def _compared(said: Mapping[str, Any]) -> RungError:
+    return RungError(
         **{
             **said,
-            "label": Label(**said["label"]),
+            "label": ResponseLabel(**said["label"]),
             "seconds": _number(said["seconds"]),
             "error": {of: _number(v) for of, v in said["error"].items()},
             "velocity": {of: _number(v) for of, v in said["velocity"].items()},
@@ -119,7 +119,7 @@ def _truth(said: Mapping[str, Any]) -> Truth:
     return Truth(
         **{
             **said,
-            "label": Label(**said["label"]),
+            "label": ResponseLabel(**said["label"]),
             "error": _number(said["error"]),
             "velocity": _number(said["velocity"]),
         }

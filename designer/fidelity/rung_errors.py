@@ -15,15 +15,15 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.fidelity.label import Label
-from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, Answer
+from designer.fidelity.label import ResponseLabel
+from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, RungAnswer
 from designer.yields.exact_rung import images, waveform_error
 
 BOARD, EQUATIONS = "board", "equations"
 
 
 @dataclass(frozen=True)
-class Compared:
+class RungError:
     """One rung at one setting on one response.
 
     response : n-p-q or status. seconds : CPU time of a drive period. gate : whether ngspice's
@@ -34,7 +34,7 @@ class Compared:
     equations, or where there is none its own finest run; nan for what it is measured against.
     """
 
-    label: Label
+    label: ResponseLabel
     rung: str
     level: str
     settings: Mapping[str, Any]
@@ -54,7 +54,7 @@ class Truth:
     error, velocity : what they differ by. periodic : whether it has a period, impacts : and any
     impacts in it, by truth."""
 
-    label: Label
+    label: ResponseLabel
     response: str
     sure: bool
     error: float
@@ -63,7 +63,9 @@ class Truth:
     impacts: Mapping[str, bool]
 
 
-def compare(label: Label, some: Sequence[Answer]) -> tuple[tuple[Compared, ...], Truth]:
+def compare(
+    label: ResponseLabel, some: Sequence[RungAnswer]
+) -> tuple[tuple[RungError, ...], Truth]:
     """The answers to one response beside both truths, and the board's."""
     exact = next(a for a in some if a.rung == MODEL)
     top = [a for a in some if a.rung == TOP]
@@ -76,7 +78,7 @@ def compare(label: Label, some: Sequence[Answer]) -> tuple[tuple[Compared, ...],
         error, velocity = _waveform(top[-2].shown, drawn), difference(top[-2].orbit, last)
     against = {BOARD: (last, drawn), EQUATIONS: (exact.orbit, exact.shown)}
     rows = tuple(
-        Compared(
+        RungError(
             label,
             a.rung,
             a.level,
@@ -125,7 +127,7 @@ def alike(first: Orbit, second: Orbit) -> bool:
     return first.n == second.n and sorted((first.p, first.q)) == sorted((second.p, second.q))
 
 
-def _numerical(answer: Answer, some: Sequence[Answer]) -> float:
+def _numerical(answer: RungAnswer, some: Sequence[RungAnswer]) -> float:
     own = {RK4: MODEL, "ideal": CIRCUIT}.get(answer.rung, answer.rung)
     finest = [a for a in some if a.rung == own][-1]
     return math.nan if finest is answer else _waveform(answer.shown, finest.shown)

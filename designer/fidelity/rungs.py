@@ -34,7 +34,7 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model import Dimensionless
 from designer.spice import numerics_gate as gate
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import RUNGS as SPICE_RUNGS, Rung
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, Reading, read
@@ -58,7 +58,7 @@ BASELINE = 4
 
 
 @dataclass(frozen=True)
-class Answer:
+class RungAnswer:
     """What one rung at one setting says of a response.
 
     level : names the setting alike for all responses. settings : of the solver. orbit : in model
@@ -78,7 +78,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Measured:
+class RungAnswers:
     """A response on every rung.
 
     subject : its nominal circuit. settings : those of ngspice with ideal op-amps that pass the
@@ -86,8 +86,8 @@ class Measured:
     """
 
     response: ModelResponse
-    subject: Subject
-    answers: tuple[Answer, ...]
+    subject: GateSubject
+    answers: tuple[RungAnswer, ...]
     settings: SolverSettings | None
     seconds: float
 
@@ -99,15 +99,15 @@ class _Asked:
     response: ModelResponse
     model: Dimensionless
     volts: Array
-    subject: Subject
+    subject: GateSubject
 
 
-def subject(made: Synthesis, r: ModelResponse) -> Subject:
+def subject(made: Synthesis, r: ModelResponse) -> GateSubject:
     """The nominal circuit of a design, on the orbit that this response has there."""
     reduction = nominal.nominal_reduction(made.design)
     scales = made.design.errors.scales
     excitation = Excitation(scales.frequency(r.omega), made.design.amplitude(r.b))
-    return Subject(reduction, excitation, on_circuit(reduction.system(), made.design, r))
+    return GateSubject(reduction, excitation, on_circuit(reduction.system(), made.design, r))
 
 
 def measured(
@@ -118,7 +118,7 @@ def measured(
     *,
     levels: Sequence[tuple[float, float]] = LEVELS,
     rounds_: int = ROUNDS,
-) -> Measured:
+) -> RungAnswers:
     """What every rung says of a response of the design, and what it costs.
 
     pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
@@ -138,17 +138,17 @@ def measured(
         replace(answer, seconds=s)
         for (answer, _), s in zip(entries, seconds[: len(entries)], strict=True)
     )
-    return Measured(r, one, answers, settings, seconds[-1] if settings else float("nan"))
+    return RungAnswers(r, one, answers, settings, seconds[-1] if settings else float("nan"))
 
 
-def _exact(asked: _Asked) -> Iterator[tuple[Answer, Entrant]]:
+def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
     """Runge-Kutta at its steps, and both exact flows."""
     r, model, omega = asked.response, asked.model, asked.response.omega
     flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
     start = r.orbit.start
     for step in STEPS:
         steps = max(1, round(flow.drive.period / step / POINTS)) * POINTS
-        answer = Answer(
+        answer = RungAnswer(
             RK4,
             f"Δt = {step:g}",
             {"steps_a_period": steps},
@@ -159,14 +159,14 @@ def _exact(asked: _Asked) -> Iterator[tuple[Answer, Entrant]]:
             here(RK4, lambda n, s=steps: runge_kutta.run(model, omega, start, n, s), BASELINE),  # type: ignore[misc]
         )
     yield (
-        Answer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
+        RungAnswer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
         here(MODEL, lambda n: flow.run(start, n), BASELINE),
     )
     own, subject = asked.subject.orbit, asked.subject
     on = Flow(subject.system, subject.excitation.drive)
     begin = own.start if len(own.start) else np.zeros(on.system.size)
     yield (
-        Answer(
+        RungAnswer(
             CIRCUIT,
             "exact",
             {},
@@ -198,7 +198,7 @@ def _runge_kutta(model: Dimensionless, r: ModelResponse, steps: int) -> tuple[Or
 
 def _spice(
     asked: _Asked, pool: SpicePool, clock: SpiceClock, levels: Sequence[tuple[float, float]]
-) -> Iterator[tuple[Answer, Entrant]]:
+) -> Iterator[tuple[RungAnswer, Entrant]]:
     subject = asked.subject
     if not len(subject.orbit.start):
         return
@@ -207,7 +207,7 @@ def _spice(
     on = gate.warmed(pool, [replace(subject, rung=rung) for rung in SPICE_RUNGS])
     ladder = [(max(1, round(first / factor)), reltol) for factor, reltol in levels]
     names = [f"step ×{factor:g}, reltol {reltol:g}" for factor, reltol in levels]
-    asks: list[tuple[Subject, int, SolverSettings]] = []
+    asks: list[tuple[GateSubject, int, SolverSettings]] = []
     for one in on:
         for k, own in enumerate(ladder):
             settings = _own(one, own)
@@ -232,18 +232,20 @@ def _spice(
                 orbit = _in_model_units(found.orbit, asked.volts)
                 shown = _traced(found, float(asked.volts[0]))
             yield (
-                Answer(one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed),
+                RungAnswer(
+                    one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed
+                ),
                 entrant,
             )
 
 
-def _own(subject: Subject, ladder: tuple[int, float]) -> SolverSettings:
+def _own(subject: GateSubject, ladder: tuple[int, float]) -> SolverSettings:
     """Settings of so many steps a period and this tolerance."""
     steps, reltol = ladder
     return SolverSettings("trap", subject.period / steps, reltol)
 
 
-def _timed(subject: Subject, settings: SolverSettings, clock: SpiceClock) -> Entrant:
+def _timed(subject: GateSubject, settings: SolverSettings, clock: SpiceClock) -> Entrant:
     """A short run from the orbit, for its time."""
     least = TIMED - 4 * (subject.orbit.n or MAX_PERIOD)
     short = replace(subject, discard=max(least, 0))

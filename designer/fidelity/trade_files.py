@@ -20,7 +20,7 @@ from designer.base.figure_style import (
     styled,
 )
 from designer.base.plain_json import FORMAT, plain
-from designer.fidelity.rung_errors import BOARD, EQUATIONS, Compared, Truth
+from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
 from designer.fidelity.rungs import RUNGS
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BoardTrade, LeftOut
@@ -64,7 +64,7 @@ def trade_json(
     return dict(plain(document))
 
 
-def _row(row: Compared) -> dict[str, Any]:
+def _row(row: RungError) -> dict[str, Any]:
     return {
         **row.label.as_dict(),
         "rung": row.rung,

@@ -14,8 +14,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from designer.fidelity.label import Label
-from designer.fidelity.rung_errors import BOARD, EQUATIONS, Compared, Truth
+from designer.fidelity.label import ResponseLabel
+from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
 from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP
 from designer.fidelity.yields import BoardTrade, LeftOut
 
@@ -54,7 +54,7 @@ class Cheapest:
 
     question: str
     of: str
-    label: Label | None
+    label: ResponseLabel | None
     rung: str | None
     level: str | None
     bound: float
@@ -65,11 +65,11 @@ class Cheapest:
 
 
 @dataclass(frozen=True)
-class Response:
+class TradedResponse:
     """What was found of one response: its rows by rung and setting, the board's truth, and its
     boards, or why none were asked (None where none were wanted)."""
 
-    rows: tuple[Compared, ...]
+    rows: tuple[RungError, ...]
     truth: Truth
     boards: BoardTrade | LeftOut | None = None
 
@@ -78,11 +78,11 @@ class Response:
 class Trade:
     """responses : in the order of the model file."""
 
-    responses: tuple[Response, ...]
+    responses: tuple[TradedResponse, ...]
     cheapest: tuple[Cheapest, ...]
 
 
-def trade(responses: Sequence[Response]) -> Trade:
+def trade(responses: Sequence[TradedResponse]) -> Trade:
     """Judge what was found, response by response and for all together."""
     found = []
     for of in (BOARD, EQUATIONS):
@@ -93,7 +93,7 @@ def trade(responses: Sequence[Response]) -> Trade:
     return Trade(tuple(responses), (*(c for c in found if c is not None), *_of_boards(responses)))
 
 
-def cheapest(question: str, of: str, responses: Sequence[Response]) -> Cheapest | None:
+def cheapest(question: str, of: str, responses: Sequence[TradedResponse]) -> Cheapest | None:
     """The cheapest rung and setting that keeps the bound on all of these responses; the nearest
     where none does. None where nothing was asked."""
     bound = {RESPONSE: 0.0, IMPACT: VELOCITY, WAVE: WAVEFORM}[question]
@@ -144,14 +144,14 @@ def _rank(one: Cheapest) -> tuple[bool, float]:
     return (not one.shown, math.inf if math.isnan(measure) else measure)
 
 
-def _competes(rung: str, of: str, picked: Sequence[Compared]) -> bool:
+def _competes(rung: str, of: str, picked: Sequence[RungError]) -> bool:
     """Not where the gate was not passed; of the model's equations, only the ways to compute it."""
     if of == EQUATIONS:
         return rung in (RK4, MODEL)
     return all(row.gate is not False for row in picked)
 
 
-def _error(question: str, of: str, row: Compared, truth: Truth) -> float:
+def _error(question: str, of: str, row: RungError, truth: Truth) -> float:
     """With the uncertainty of a truth that is sure; infinite where it cannot be said."""
     if question == RESPONSE:
         return 0.0 if row.right[of] else 1.0
@@ -161,7 +161,7 @@ def _error(question: str, of: str, row: Compared, truth: Truth) -> float:
     return total if row.right[of] and total == total else math.inf
 
 
-def _of_boards(responses: Sequence[Response]) -> list[Cheapest]:
+def _of_boards(responses: Sequence[TradedResponse]) -> list[Cheapest]:
     """The exact circuit where its yield is near ngspice's; ngspice on every board where it is
     shown not to be."""
     asked = [r.boards for r in responses if isinstance(r.boards, BoardTrade)]

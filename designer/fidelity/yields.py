@@ -16,16 +16,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 
 from designer.base.proportion import wilson
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
 from designer.fidelity import rungs
-from designer.fidelity.label import Label
+from designer.fidelity.label import ResponseLabel
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.yields import exact_rung, study_plan
 from designer.yields.ngspice_runs import hear
-from designer.yields.ngspice_sampling import Ask, Kind, Why
+from designer.yields.ngspice_sampling import Ask, StartKind, Why
 from designer.yields.verdict import StudyPlan, Verdict
 
 REFINEMENTS = 3
@@ -37,7 +37,7 @@ is what is measured against, and what it leaves open widens the interval both wa
 class LeftOut:
     """A response of which no boards were asked, and why."""
 
-    label: Label
+    label: ResponseLabel
     reason: str
 
 
@@ -72,7 +72,7 @@ class BoardTrade:
     seconds : CPU time of a board, by rung.
     """
 
-    label: Label
+    label: ResponseLabel
     boards: int
     ok: int
     gained: int
@@ -82,7 +82,7 @@ class BoardTrade:
     seconds: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, label: Label, tally: Tally, spice: float) -> BoardTrade:
+    def of(cls, label: ResponseLabel, tally: Tally, spice: float) -> BoardTrade:
         """spice : CPU time of a drive period of ngspice at the gate's settings."""
         asked = tally.decided + tally.undecided
         periods = tally.periods / tally.runs if tally.runs else math.nan
@@ -144,7 +144,7 @@ def question(
         return f"the nominal circuit is {nominal.orbit.response}"
     if settings is None:
         return "the numerics gate did not pass"
-    checked = Checked(response, nominal.orbit, nominal.excitation, None)
+    checked = CheckedResponse(response, nominal.orbit, nominal.excitation, None)
     plan = study_plan.plan_study(
         made.modelfile, made.design, [checked], made.catalog, samples=samples, seed=seed
     )
@@ -164,7 +164,9 @@ def tally(
     began = time.process_time()
     answers = exact_rung.block(plan, samples, jobs)
     seconds = time.process_time() - began
-    asks = [Ask(a.sample, 0, Kind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED]
+    asks = [
+        Ask(a.sample, 0, StartKind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED
+    ]
     hearings = hear(plan, asks, pool, jobs, progress, refinements=REFINEMENTS)
     heard = {h.sample: h for h in hearings}
     asked = plan.questions[0]

@@ -43,5 +43,5 @@ from .study_job import (
     run as run,
 )
 from .synthesise_job import (
-    Outcome as Outcome,
+    JobOutcome as JobOutcome,
 )

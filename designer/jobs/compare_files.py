@@ -21,21 +21,23 @@ NAMES = (COMPARISON, *COMPARISON_PICTURES)
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparisonFiles:
     """file : the object of ``compare.json``."""
 
     file: dict[str, Any]
 
 
-def make(made: Synthesis, progress: Progress) -> Compared:
+def make(made: Synthesis, progress: Progress) -> ComparisonFiles:
     """Compare; writes nothing."""
     began = time.perf_counter()
     answer = comparison_json(compare(made, lambda name: _said(progress, name)))
     seconds = time.perf_counter() - began
-    return Compared(file_json(answer, made.modelfile.title, design_provenance(made), seconds))
+    return ComparisonFiles(
+        file_json(answer, made.modelfile.title, design_provenance(made), seconds)
+    )
 
 
-def write(folder: Folder, compared: Compared) -> None:
+def write(folder: Folder, compared: ComparisonFiles) -> None:
     """The stage's files; the folder lists them already."""
     from designer.base import figure_style  # matplotlib is not needed before this
     from designer.report import compare_plots

@@ -12,7 +12,7 @@ from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import load_catalog
 from designer.check.deck_notes import simulator_notes
-from designer.check.response_runs import response_runs
+from designer.check.deck_runs import response_runs
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import synthesise_job
 from designer.jobs.design_files import design_provenance, load

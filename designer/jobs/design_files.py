@@ -12,18 +12,18 @@ import numpy as np
 from designer.base.checks import cores
 from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
+from designer.base.guarded_reading import csv_rows, read_text, reading
 from designer.base.plain_json import dumps
-from designer.base.reading import csv_rows, read_text, reading
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.deck_notes import circuit_notes
 from designer.check.first_responses import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build, terms
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_kind import zone_of
-from designer.circuit.design import Certificate, Check, Design
+from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.netlist import nominal_board
 from designer.jobs import board_files
 from designer.jobs.bench_tables import scales_csv, setup_csv, start_recipes
@@ -138,7 +138,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             conditions={k: float(v) for k, v in kept.items() if k not in told},
             solver=dict(said["solver"]),
             seconds=float(said["cost"]["synthesis_seconds"]),
-            checks=tuple(Check(**check) for check in told["checked"]),
+            checks=tuple(ConditionCheck(**check) for check in told["checked"]),
             binding=dict(told["binding"]),
         )
     return Synthesis(modelfile, catalog, found, design)
@@ -162,7 +162,7 @@ def starts(folder: Folder) -> tuple[str, ...]:
     return tuple(row[at] if len(row) > at else "" for _, row in rows if row)
 
 
-def circuit_deck(made: Synthesis, checked: Checked | None = None) -> str:
+def circuit_deck(made: Synthesis, checked: CheckedResponse | None = None) -> str:
     """``circuit.cir``: the first response (ω = 1 where there is none), from its own orbit.
 
     checked : of the first response; its gate's settings are used.

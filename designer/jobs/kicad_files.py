@@ -17,7 +17,7 @@ from designer.board.board_parts import board_circuit
 from designer.board.component import components
 from designer.board.kicad_project import Project, files
 from designer.board.kicad_rules import board_rules, rules_text
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.first_responses import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.jobs.design_files import design_provenance
@@ -27,7 +27,7 @@ STAGE: StageName = "kicad"
 FOLDER = "kicad"
 
 
-def texts(made: Synthesis, checked: Checked | None = None) -> dict[str, str]:
+def texts(made: Synthesis, checked: CheckedResponse | None = None) -> dict[str, str]:
     """Every file of the project by its name inside the design folder.
 
     checked : of the first response; the sheet then runs at its gate's settings.
@@ -83,7 +83,7 @@ def write(
     folder.finish(STAGE)
 
 
-def settle(folder: Folder, made: Synthesis, checked: Checked) -> None:
+def settle(folder: Folder, made: Synthesis, checked: CheckedResponse) -> None:
     """Let the sheet run at the settings of the gate, if nobody has changed it."""
     listed = {} if folder.manifest is None else folder.manifest.files
     sheet = next((n for n in listed if n.startswith(FOLDER) and n.endswith(".kicad_sch")), None)

@@ -20,9 +20,9 @@ from designer.catalog.catalog import load_catalog
 from designer.jobs import design_files, rung_choice
 from designer.jobs.options import Options
 from designer.jobs.study_folder import layers_of, merged, study_files
-from designer.jobs.study_stage import Help, Place, Stage, checks, satisfied
-from designer.jobs.synthesise_job import Outcome, source, standing_inputs
-from designer.model.measured_values import MEASURED, Measured, read_measured
+from designer.jobs.study_stage import Help, Place, StudyStage, checks, satisfied
+from designer.jobs.synthesise_job import JobOutcome, source, standing_inputs
+from designer.model.measured_values import MEASURED, MeasuredBoards, read_measured
 from designer.model.model_file import naming, need_responses
 from designer.spread.part_rules import spread_of
 
@@ -39,7 +39,7 @@ def measured_into(
     progress: Progress,
     command: Callable[[Options], str],
     shown: Callable[[Mapping[str, Any]], None] = lambda _: None,
-) -> Outcome:
+) -> JobOutcome:
     """The verb ``tolerance`` on a design folder, with a list of measured boards.
 
     file : the list, as [spread] names one; its boards are the samples, once each. What it does not
@@ -79,7 +79,7 @@ def measured_into(
     }
     if not folder.decide(stage, overwrite=options.overwrite, resume=options.resume):
         answer = PLACE.answer(folder)
-        return Outcome(answer, satisfied(answer), path, True)
+        return JobOutcome(answer, satisfied(answer), path, True)
     began = time.perf_counter()
     with Help.of(options, progress) as help_:
         provenance = {} if folder.manifest is None else folder.manifest.provenance
@@ -87,13 +87,13 @@ def measured_into(
         folder.write(PLACE.prefix + MEASURED, boards.content)
         kept = PLACE.kept(folder, progress.note)
         checked = checks(folder, made, help_.pool, kept, progress)
-        work = Stage(folder, PLACE, made, options, command(options), progress, shown, 0.0)
+        work = StudyStage(folder, PLACE, made, options, command(options), progress, shown, 0.0)
         result = work.done(checked, kept, help_, time.perf_counter() - began)
     answer = PLACE.answer(folder)
-    return Outcome(answer, satisfied(answer), path, False, result, shown=work.early)
+    return JobOutcome(answer, satisfied(answer), path, False, result, shown=work.early)
 
 
-def listed(file: Path) -> Measured:
+def listed(file: Path) -> MeasuredBoards:
     """The list in a file, whose boards all have a name.
 
     Raises

@@ -24,11 +24,11 @@ from designer.board.component import components
 from designer.board.kicad_reader import BoardFile, check_belongs, read_board
 from designer.board.kicad_rules import board_rules
 from designer.catalog.catalog import load_catalog
-from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Outcome
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.check.synthesis_result import Synthesis
 from designer.design_rules import junit, on_board as rule_board, run_rules
 from designer.design_rules.kicad_drc import kicad_version
-from designer.design_rules.subject import Subject
+from designer.design_rules.subject import RuleSubject
 from designer.jobs.origin import provenance
 from designer.jobs.synthesise_job import read_design
 from designer.model.model_file import naming
@@ -38,10 +38,10 @@ NAME = "rules.json"
 
 
 @dataclass(frozen=True)
-class Checked:
+class RulesAnswer:
     """What the rules say of a design. kicad : version of the program that checked the board."""
 
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[RuleOutcome, ...]
     kicad: str | None
 
     @property
@@ -102,7 +102,7 @@ def into_folder(
     return answer, found.passed
 
 
-def checked(made: Synthesis, board: BoardFile | None = None) -> Checked:
+def checked(made: Synthesis, board: BoardFile | None = None) -> RulesAnswer:
     """Every rule on a design, and on its board if there is one.
 
     Raises
@@ -116,17 +116,17 @@ def checked(made: Synthesis, board: BoardFile | None = None) -> Checked:
         custom = board_rules(circuit, limits)
     if board is not None:
         check_belongs(board, listed)
-    on_circuit = run_rules.on_circuit(Subject(made, circuit, listed), limits)
+    on_circuit = run_rules.on_circuit(RuleSubject(made, circuit, listed), limits)
     if board is None:
-        return Checked((*on_circuit, *rule_board.without_board(custom, limits)), None)
+        return RulesAnswer((*on_circuit, *rule_board.without_board(custom, limits)), None)
     on_board = rule_board.checked(board, listed, custom, limits)
-    return Checked((*on_circuit, *on_board), kicad_version())
+    return RulesAnswer((*on_circuit, *on_board), kicad_version())
 
 
 def _json(
     made: Synthesis,
     board: BoardFile | None,
-    outcomes: Sequence[Outcome],
+    outcomes: Sequence[RuleOutcome],
     said: dict[str, Any],
     seconds: float,
 ) -> dict[str, Any]:

@@ -16,8 +16,8 @@ from functools import partial
 from typing import Any
 
 from designer.base.design_folder import Folder
+from designer.base.guarded_reading import reading
 from designer.base.progress import Progress
-from designer.base.reading import reading
 from designer.fidelity.rung_errors import BOARD
 from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
@@ -35,14 +35,14 @@ LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
 
 
 @dataclass(frozen=True)
-class Choice:
+class RungChoice:
     """rung : of a study. reason : one line for people; "" where nothing was measured."""
 
     rung: RungName
     reason: str
 
 
-def choose(folder: Folder) -> Choice:
+def choose(folder: Folder) -> RungChoice:
     """By the folder's ``trade.json``, if its stage is complete, else by what its search has kept of
     an earlier one; else ``auto``.
 
@@ -55,10 +55,10 @@ def choose(folder: Folder) -> Choice:
         return _read(folder, TRADE, "cheapest", _choice)
     if "search" in stages and stages["search"].complete and "design" in stages:
         return _read(folder, SEARCH, "trade", partial(_kept, stages["design"].inputs.get("model")))
-    return Choice("auto", "")
+    return RungChoice("auto", "")
 
 
-def before_search(folder: Folder, model: str) -> Choice | None:
+def before_search(folder: Folder, model: str) -> RungChoice | None:
     """What a trade says here, if it is of the model file with this hash; None without one.
 
     To be asked before a search touches the folder.
@@ -67,7 +67,7 @@ def before_search(folder: Folder, model: str) -> Choice | None:
     of = [stages[name].inputs.get("model") for name in ("design", "search") if name in stages]
     if "search" in stages and not stages["search"].complete:
         return None  # whose the design is cannot be told
-    choice = choose(folder) if model in of else Choice("auto", "")
+    choice = choose(folder) if model in of else RungChoice("auto", "")
     return choice if choice.reason else None
 
 
@@ -96,41 +96,41 @@ def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
 
 
 def _read(
-    folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], Choice]
-) -> Choice:
+    folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], RungChoice]
+) -> RungChoice:
     said = folder.json(name)
     with reading(folder / name, f"what {name.removesuffix('.json')} wrote", key):
         return choice(said)
 
 
-def _kept(model: object, said: Mapping[str, Any]) -> Choice:
+def _kept(model: object, said: Mapping[str, Any]) -> RungChoice:
     """model : hash of the design's model file, which is another where somebody replaced it."""
     kept = said.get("trade")
     if kept is None or kept["model"] != model:
-        return Choice("auto", "")
+        return RungChoice("auto", "")
     if kept["rung"] not in RUNGS:
         raise ValueError(kept["rung"])
     reason = str(kept["reason"]).removesuffix(EARLIER)
-    return Choice(kept["rung"], f"{reason}{EARLIER}")
+    return RungChoice(kept["rung"], f"{reason}{EARLIER}")
 
 
-def _choice(said: Mapping[str, Any]) -> Choice:
+def _choice(said: Mapping[str, Any]) -> RungChoice:
     found = [c for c in said["cheapest"] if c["question"] == SHARE]
     if not found:
         reasons = dict.fromkeys(f"{_place(r)}: {r['reason']}" for r in said["left_out"])
         why = f" ({'; '.join(reasons)})" if reasons else ""
         said_ = f"rung by trade.json: it asked no boards{why}, so as usual"
-        return Choice("auto", said_ + _warning(said, CIRCUIT))
+        return RungChoice("auto", said_ + _warning(said, CIRCUIT))
     overall = found[-1]  # of all responses, or of the only one
     if overall["rung"] == CIRCUIT:
         note = f"; {overall['note']}" if overall.get("note") else ""
         kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %{note})"
-        return Choice(
+        return RungChoice(
             "auto",
             f"rung by trade.json: the exact circuit decides, {kept}; ngspice is asked about "
             f"{LEAST} boards of each response at least{_warning(said, CIRCUIT)}",
         )
-    return Choice(
+    return RungChoice(
         "ngspice",
         "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
         f"than {100.0 * overall['bound']:g} %{_warning(said, 'ideal')}",

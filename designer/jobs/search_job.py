@@ -36,15 +36,21 @@ from designer.jobs.rung_choice import SEARCH
 from designer.jobs.study_folder import FolderStores
 from designer.jobs.study_job import run_into
 from designer.jobs.study_stage import SPICE_TIMEOUT
-from designer.jobs.synthesise_job import Outcome, design_inputs, grade_inputs, made_from, model_file
+from designer.jobs.synthesise_job import (
+    JobOutcome,
+    design_inputs,
+    grade_inputs,
+    made_from,
+    model_file,
+)
 from designer.model.model_file import ModelFile, naming
 from designer.spice import numerics_gate
 from designer.spice.batch_backend import program_version
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields import ngspice_runs
 from designer.yields.limiting_parts import limitings
-from designer.yields.ngspice_sampling import OWN_SAMPLES, Ask, Kind, Why
+from designer.yields.ngspice_sampling import OWN_SAMPLES, Ask, StartKind, Why
 from designer.yields.tolerance_study import check, tolerance
 from designer.yields.verdict import Answer, Verdict
 
@@ -144,7 +150,7 @@ def search_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
-) -> Outcome:
+) -> JobOutcome:
     """The verb ``search`` for a model file: design, study of fresh boards, confirmation.
 
     Raises
@@ -232,7 +238,10 @@ def _confirm(
         reduction = nominal.nominal_reduction(made.design)
         gates = numerics_gate.check(
             pool,
-            [Subject(reduction, q.excitation, q.start, rung=RUNG) for q in study.plan.questions],
+            [
+                GateSubject(reduction, q.excitation, q.start, rung=RUNG)
+                for q in study.plan.questions
+            ],
             LEVELS,
         )
         plan = replace(
@@ -264,12 +273,12 @@ def to_confirm(answers: Iterable[Answer]) -> list[Ask]:
     for a in sorted(answers, key=lambda a: (a.question, a.sample)):
         if a.verdict is not Verdict.FAILED and count[a.question] < OWN_SAMPLES:
             count[a.question] += 1
-            asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
+            asks.append(Ask(a.sample, a.question, StartKind.OWN, Why.RANDOM))
     return asks
 
 
 def _word(folder: Folder, modelfile: ModelFile, *, goes_on: bool) -> dict[str, Any] | None:
-    """What a trade says that stood here when the search began, as ``rung_choice.Choice``."""
+    """What a trade says that stood here when the search began, as ``rung_choice.RungChoice``."""
     if goes_on:
         assert folder.manifest is not None
         found: object = folder.manifest.stages["search"].kept.get("trade")

@@ -12,10 +12,10 @@ from designer.base.keyed_store import Vouch, nobody
 from designer.base.manifest import StageName
 from designer.model.tuning_bands import Bands
 from designer.yields.blame_analysis import Blame
-from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_pieces import StoredParts
 from designer.yields.layers import CHUNK, SEARCH
 from designer.yields.ngspice_sampling import Hearing
-from designer.yields.power_up_yield import Reached
+from designer.yields.power_up_yield import PowerUpAnswer
 from designer.yields.row_store import BlockStore
 from designer.yields.setting_search import MOST_TRIES
 from designer.yields.start_recipe import Recipe
@@ -146,9 +146,9 @@ class FolderStores(Stores):
     def trimmed(self, plan: StudyPlan, trim: DcTrim) -> BlockStore[Trimmed]:
         return self._store(plan, TRIMMED, Trimmed, "trimmed", BLOCK, trim.as_dict())
 
-    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached]:
+    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[PowerUpAnswer]:
         more = {"recipes": [r.as_dict() for r in recipes]}
-        return self._store(plan, REACHED, Reached, "reached", SEARCH, more)
+        return self._store(plan, REACHED, PowerUpAnswer, "reached", SEARCH, more)
 
     def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
         if self._kept is None:
@@ -163,15 +163,15 @@ class FolderStores(Stores):
             self._guard()
             self._kept.put("blame", blame_hash(plan), replace(found, seconds=0.0))
 
-    def blame_pieces(self, plan: StudyPlan) -> Pieces:
+    def blame_pieces(self, plan: StudyPlan) -> StoredParts:
         return self._pieces_of(blame_hash(plan))
 
-    def maps(self, plan: StudyPlan) -> Pieces:
+    def maps(self, plan: StudyPlan) -> StoredParts:
         return self._pieces_of(study_hash(plan, "maps"))
 
-    def _pieces_of(self, key: str) -> Pieces:
+    def _pieces_of(self, key: str) -> StoredParts:
         if self._pieces is None:
-            return Pieces()
+            return StoredParts()
         return _FolderPieces(self._pieces, key, self._guard)
 
     @property
@@ -204,7 +204,7 @@ class FolderStores(Stores):
         return self._stores[folder]
 
 
-class _FolderPieces(Pieces):
+class _FolderPieces(StoredParts):
     """Pieces of what ``key`` decides, in a file."""
 
     def __init__(self, file: Kept, key: str, guard: Callable[[], None]) -> None:

@@ -27,11 +27,16 @@ from designer.jobs.study_stage import (
     SPICE_TIMEOUT as SPICE_TIMEOUT,
     Help,
     Place,
-    Stage,
+    StudyStage,
     checks,
     satisfied,
 )
-from designer.jobs.synthesise_job import Outcome, bills_are_of_old, design_inputs, standing_inputs
+from designer.jobs.synthesise_job import (
+    JobOutcome,
+    bills_are_of_old,
+    design_inputs,
+    standing_inputs,
+)
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spice import equation_check
 from designer.spice.pool import SpicePool, require_ngspice
@@ -49,7 +54,7 @@ def run_into(
     progress: Progress,
     command: Callable[[Options], str],
     shown: Callable[[Mapping[str, Any]], None] = lambda _: None,
-) -> Outcome:
+) -> JobOutcome:
     """The verbs ``run`` and ``tolerance``: design, check, study, report.
 
     command : the command line as the report states it (``Options.command``). shown : is given the
@@ -69,7 +74,7 @@ def run_into(
     todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
     if not todo:
         answer = PLACE.answer(folder)
-        return Outcome(answer, satisfied(answer), out, True)
+        return JobOutcome(answer, satisfied(answer), out, True)
     if "design" in todo:
         design_files.check(modelfile, catalog)
     began = time.perf_counter()
@@ -102,12 +107,12 @@ def run_into(
             folder.rewrite("circuit.cir", design_files.circuit_deck(made, first))
             kicad_files.settle(folder, made, first)
         seconds = time.perf_counter() - ready
-        stage = Stage(
+        stage = StudyStage(
             folder, PLACE, made, options, command(options), progress, shown, design_seconds
         )
         result = stage.done(checked, kept, help_, seconds)
     answer = PLACE.answer(folder)
-    return Outcome(answer, satisfied(answer), out, False, result, shown=stage.early)
+    return JobOutcome(answer, satisfied(answer), out, False, result, shown=stage.early)
 
 
 def _study_wanted(

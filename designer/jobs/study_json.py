@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from designer.base.plain_json import FORMAT
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.jobs.json_answers import hertz_json
 from designer.model.model import Mechanical
 from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
-from designer.yields.ngspice_sampling import Hearing, Outcome
-from designer.yields.power_up_yield import Reached
+from designer.yields.ngspice_sampling import Hearing, NgspiceVerdict
+from designer.yields.power_up_yield import PowerUpAnswer
 from designer.yields.study import Study
 from designer.yields.study_plan import of_yield
 from designer.yields.trimmed_yield import Trimmed
@@ -63,7 +63,7 @@ def study_json(
     }
 
 
-def _response(checked: Checked, study: Study, index: int) -> dict[str, Any]:
+def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, Any]:
     model, ngspice = checked.model, checked.ngspice
     answers = study.answers_to(index)
     counted = study.yields[index]
@@ -183,7 +183,7 @@ def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str,
 
     def of(kind: str) -> dict[str, Any]:
         asked = [h.outcome(known[h.sample]) for h in heard if h.kind == kind and h.response]
-        counted = (Outcome.AGREED, Outcome.FAILED, Outcome.UNDECIDED)
+        counted = (NgspiceVerdict.AGREED, NgspiceVerdict.FAILED, NgspiceVerdict.UNDECIDED)
         return {"asked": len(asked), **{str(one): asked.count(one) for one in counted}}
 
     too_long = [h for h in heard if not h.response]
@@ -228,7 +228,7 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
     }
 
 
-def _reasons(answers: Sequence[Answer | Tuned | Trimmed | Reached]) -> dict[str, int]:
+def _reasons(answers: Sequence[Answer | Tuned | Trimmed | PowerUpAnswer]) -> dict[str, int]:
     """Why boards do not show the response, most frequent first."""
     return _counted_reasons((a.verdict, a.reason) for a in answers)
 

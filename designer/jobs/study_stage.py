@@ -18,7 +18,7 @@ from designer.base.keyed_store import Note
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import design_files
 from designer.jobs.json_answers import run_json
@@ -76,7 +76,7 @@ class Place:
 
 
 @dataclass
-class Stage:
+class StudyStage:
     """A study that is worked on. command : the command line that its report states. shown : is
     given the answer once the yields stand, where blame or maps take time after that."""
 
@@ -93,7 +93,7 @@ class Stage:
 
     def done(
         self,
-        checked: tuple[EquationCheck | None, tuple[Checked, ...]],
+        checked: tuple[EquationCheck | None, tuple[CheckedResponse, ...]],
         kept: Kept,
         help_: Help,
         check_seconds: float,
@@ -227,7 +227,7 @@ class Help:
 
 def checks(
     folder: Folder, made: Synthesis, pool: SpicePool | None, kept: Kept, progress: Progress
-) -> tuple[EquationCheck | None, tuple[Checked, ...]]:
+) -> tuple[EquationCheck | None, tuple[CheckedResponse, ...]]:
     """What ngspice says of the design's equations and of its nominal responses, or said before."""
     if pool is None:
         return None, check(made, None, progress)

@@ -44,7 +44,7 @@ from designer.yields.run_result import RunResult
 
 
 @dataclass(frozen=True)
-class Outcome:
+class JobOutcome:
     """What a verb answers: the JSON object, and whether the answer is yes.
 
     folder : None where nothing was to be written. reused : whether the folder held the answer
@@ -107,7 +107,7 @@ def source(path: Path, out: Path | None) -> tuple[ModelFile, Path]:
 
 def synthesise_into(
     modelfile: ModelFile, out: Path, options: Options, progress: Progress, *, compare: bool = False
-) -> Outcome:
+) -> JobOutcome:
     """The verb ``synthesise``; with ``compare`` the comparison is a stage of its own."""
     options.check()
     catalog = load_catalog()
@@ -140,17 +140,17 @@ def synthesise_into(
     answer = folder.json(DESIGN)
     if compare:
         answer = compare_files.beside(answer, folder.json(COMPARISON))
-    return Outcome(answer, _all_found(answer), out, not todo)
+    return JobOutcome(answer, _all_found(answer), out, not todo)
 
 
-def compare_in_memory(modelfile: ModelFile, options: Options, progress: Progress) -> Outcome:
+def compare_in_memory(modelfile: ModelFile, options: Options, progress: Progress) -> JobOutcome:
     """The verb ``synthesise`` with ``--compare`` and no folder: nothing is written."""
     options.check()
     progress.stage("responses of the model, parts")
     made = synthesis_result.synthesise(modelfile)
     compared = compare_files.make(made, progress)
     answer = compare_files.beside(plain(design_files.answer(made)), plain(compared.file))
-    return Outcome(answer, _all_found(answer), None, False)
+    return JobOutcome(answer, _all_found(answer), None, False)
 
 
 def simulate_answer(

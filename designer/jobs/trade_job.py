@@ -13,7 +13,7 @@ from typing import Any
 from designer.base.checks import cores
 from designer.base.default_counts import TRADE_BOARDS
 from designer.base.design_folder import Folder
-from designer.base.manifest import Stage
+from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
@@ -21,11 +21,11 @@ from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock
-from designer.fidelity.label import Label
-from designer.fidelity.pieces import CHUNK, PIECES, Pieces, read_pieces
+from designer.fidelity.label import ResponseLabel
+from designer.fidelity.pieces import CHUNK, PIECES, TradePieces, read_pieces
 from designer.fidelity.rung_errors import compare
 from designer.fidelity.rungs import LEVELS, ROUNDS
-from designer.fidelity.trade_study import Response, Trade, trade
+from designer.fidelity.trade_study import Trade, TradedResponse, trade
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
 from designer.jobs import design_files
 from designer.jobs.options import Options
@@ -47,7 +47,7 @@ RULES = 3
 
 
 @dataclass(frozen=True)
-class Extent:
+class TradeExtent:
     """How much is measured. boards : of each response, none where 0. levels : of ngspice's steps.
     rounds : of timing."""
 
@@ -57,7 +57,13 @@ class Extent:
 
 
 def measure(
-    made: Synthesis, extent: Extent, pieces: Pieces, *, seed: int, jobs: int, progress: Progress
+    made: Synthesis,
+    extent: TradeExtent,
+    pieces: TradePieces,
+    *,
+    seed: int,
+    jobs: int,
+    progress: Progress,
 ) -> Trade:
     """Every rung on every response of a design, and the boards.
 
@@ -79,7 +85,7 @@ def measure(
                 found = trade_rungs.measured(
                     made, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
                 )
-                rows, truth = compare(Label.of(number, r), found.answers)
+                rows, truth = compare(ResponseLabel.of(number, r), found.answers)
                 return trade_pieces.rungs_json(rows, truth, found.settings, found.seconds)
 
             rungs.append(trade_pieces.rungs(pieces.piece(f"rungs {number}", rung)))
@@ -94,15 +100,15 @@ def measure(
                 else:
                     tallied = _tally(plan, label, count, pieces, pool, jobs, progress)
                     boards = BoardTrade.of(label, tallied, seconds)
-            responses.append(Response(rows, truth, boards))
+            responses.append(TradedResponse(rows, truth, boards))
     return trade(responses)
 
 
 def _tally(
     plan: StudyPlan,
-    label: Label,
+    label: ResponseLabel,
     count: int,
-    pieces: Pieces,
+    pieces: TradePieces,
     pool: SpicePool,
     jobs: int,
     progress: Progress,
@@ -126,7 +132,7 @@ def answer(
     modelfile: ModelFile,
     out: Path | None,
     options: Options,
-    extent: Extent,
+    extent: TradeExtent,
     progress: Progress,
 ) -> tuple[dict[str, Any], bool]:
     """The JSON object, and whether the folder held it already; ``out`` None writes nothing."""
@@ -136,7 +142,7 @@ def answer(
     if out is None:
         progress.stage("responses of the model, parts")
         made = synthesis_result.synthesise(modelfile, catalog)
-        return _document(made, extent, Pieces(), options, progress), False
+        return _document(made, extent, TradePieces(), options, progress), False
     folder = Folder(out)
     wanted = standing_inputs(folder, modelfile, catalog, progress)
     levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
@@ -147,7 +153,7 @@ def answer(
     if not todo:
         return folder.json(TRADE), True
     goes_on = "design" not in todo and folder.state("trade", inputs) == "unfinished"
-    key = Stage(inputs).hash
+    key = ManifestStage(inputs).hash
     goes_on = goes_on and options.resume
     known = read_pieces(folder / PIECES, key, progress.note) if goes_on else {}
     if "design" in todo:
@@ -169,7 +175,7 @@ def answer(
         guard()
         folder.write(PIECES, text)
 
-    document = _document(made, extent, Pieces(known, save, key), options, progress)
+    document = _document(made, extent, TradePieces(known, save, key), options, progress)
     guard()
     _write(folder, document)
     (folder / PIECES).unlink(missing_ok=True)
@@ -178,7 +184,7 @@ def answer(
 
 
 def _document(
-    made: Synthesis, extent: Extent, pieces: Pieces, options: Options, progress: Progress
+    made: Synthesis, extent: TradeExtent, pieces: TradePieces, options: Options, progress: Progress
 ) -> dict[str, Any]:
     from designer.fidelity.trade_files import trade_json  # Matplotlib takes a while to import
 

@@ -3,6 +3,9 @@ from . import (
     find_responses as find_responses,
     swept_model as swept_model,
 )
+from .ascii_sketch import (
+    sketch as sketch,
+)
 from .board_table import (
     BoardChoice as BoardChoice,
     BoardSpec as BoardSpec,
@@ -34,7 +37,7 @@ from .find_responses import (
 )
 from .measured_values import (
     MEASURED as MEASURED,
-    Measured as Measured,
+    MeasuredBoards as MeasuredBoards,
     read_measured as read_measured,
 )
 from .mechanics import (
@@ -63,13 +66,10 @@ from .si_units import (
     Reader as Reader,
     units_of as units_of,
 )
-from .sketch import (
-    sketch as sketch,
-)
 from .spread_table import (
     DataSheet as DataSheet,
     PartRule as PartRule,
-    Shape as Shape,
+    SpreadShape as SpreadShape,
     check_binned as check_binned,
 )
 from .swept_model import (

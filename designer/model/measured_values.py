@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from designer.base.errors import InputError
-from designer.base.reading import csv_rows, decode, read_bytes
+from designer.base.guarded_reading import csv_rows, decode, read_bytes
 from designer.base.schema import one_of
 from designer.base.units import parse_quantity
 
@@ -39,7 +39,7 @@ _PARTS = "a part such as R203, C1, VR1, VCC, U1A.offset, U1A.high, U1A.low, U1A.
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredBoards:
     """Measured values of one board or several.
 
     boards : their names in the file's order; one without a name where there is no column for it.
@@ -69,7 +69,7 @@ class Measured:
         return {"sha256": self.sha256, "boards": list(self.boards), "parts": sorted(self.values)}
 
 
-def read_measured(path: Path) -> Measured:
+def read_measured(path: Path) -> MeasuredBoards:
     """Read a list of measured values.
 
     Raises
@@ -88,7 +88,7 @@ class _Reader:
     def refuse(self, found: object, expected: str) -> NoReturn:
         raise InputError(self.path, f"line {self.row}", found, expected) from None
 
-    def read(self, text: str) -> Measured:
+    def read(self, text: str) -> MeasuredBoards:
         entries: dict[tuple[str, str], tuple[float, float]] = {}
         lines: dict[str, int] = {}
         for cells in self.rows(text):
@@ -111,7 +111,7 @@ class _Reader:
         def column(which: int) -> dict[str, tuple[float, ...]]:
             return {n: tuple(entries.get((n, b), missing)[which] for b in boards) for n in lines}
 
-        return Measured(boards, column(0), column(1), self.content, self.path, lines)
+        return MeasuredBoards(boards, column(0), column(1), self.content, self.path, lines)
 
     def rows(self, text: str) -> Iterator[dict[str, str]]:
         """Cells by column; ``row`` is the line of each while it is looked at."""

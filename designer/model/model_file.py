@@ -25,8 +25,8 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from designer.base.errors import MISSING, InputError
+from designer.base.guarded_reading import read_text
 from designer.base.inside_folder import inside
-from designer.base.reading import read_text
 from designer.base.schema import (
     STRICT,
     Accepts,
@@ -44,7 +44,7 @@ from designer.catalog.entries import Kind
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec, BoardTable
 from designer.model.circuit_table import CircuitSpec, CircuitTable
-from designer.model.measured_values import Measured, read_measured
+from designer.model.measured_values import MeasuredBoards, read_measured
 from designer.model.model import Dimensionless, Mechanical, Sides
 from designer.model.response_table import (
     Response,
@@ -77,7 +77,7 @@ class ModelFile:
     text: str = field(repr=False)
     source: Path | None = None
     spread: SpreadSpec = BENCH_1
-    measured: Measured | None = None
+    measured: MeasuredBoards | None = None
     tuning: Bands = field(default_factory=Bands)
     board: BoardSpec = field(default_factory=BoardSpec)
     rules: Mapping[str, Override] = field(default_factory=dict, hash=False)

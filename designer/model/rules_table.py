@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from designer.base.errors import InputError
 from designer.base.schema import STRICT, Accepts, checked, line, one_of, shown
 from designer.base.units import format_quantity
-from designer.catalog.design_rule import Override, Rule
+from designer.catalog.design_rule import DesignRule, Override
 from designer.catalog.design_rules import RULES
 
 
@@ -45,7 +45,7 @@ class _Table(BaseModel):
     reason: Annotated[str, line("the reason for another limit, text of one line", 500)]
 
 
-def _override(rule: Rule, table: dict[str, Any], file: str | None) -> Override:
+def _override(rule: DesignRule, table: dict[str, Any], file: str | None) -> Override:
     place = f"rules.{rule.id}"
     given = checked(_Table, table, file, within=place)
     what = f"a number >= 0 in {rule.unit}" if rule.unit else "a number >= 0"

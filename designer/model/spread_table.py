@@ -25,7 +25,7 @@ ABSOLUTE_ZERO = -273.15
 
 
 @dataclass(frozen=True)
-class Shape:
+class SpreadShape:
     """How parts lie within their grade.
 
     ``uniform``; ``normal``: σ = grade/sigmas, cut at the grade; ``binned``: uniform, without those
@@ -64,7 +64,7 @@ class PartRule:
 
     names: tuple[str, ...]
     grade: float | None = None
-    law: Shape | None = None
+    law: SpreadShape | None = None
     tempco: tuple[float, float] | None = None
     ageing: tuple[float, float] | None = None
 
@@ -91,8 +91,8 @@ class SpreadSpec:
     reels : what parts of one value have in common. measured : file of a bench's list.
     """
 
-    resistors: Shape = Shape()
-    capacitors: Shape = Shape()
+    resistors: SpreadShape = SpreadShape()
+    capacitors: SpreadShape = SpreadShape()
     offset: Offset | None = None
     saturation: float = 0.05
     bias: DataSheet | tuple[float, float] = "typical"
@@ -127,7 +127,7 @@ def _shape() -> Accepts:
             raise ValueError(f"{key} is > 0")
         return float(value)
 
-    def check(value: object) -> Shape:
+    def check(value: object) -> SpreadShape:
         table = {"law": value} if isinstance(value, str) else value
         if not isinstance(table, dict) or not isinstance(table.get("law"), str):
             raise ValueError
@@ -139,7 +139,9 @@ def _shape() -> Accepts:
                 raise ValueError(f"{table['law']} has no {key}")
         if table["law"] == "binned" and "inner" not in table:
             raise ValueError("binned needs inner, the grade that was picked out")
-        return Shape(table["law"], **{key: positive(table, key) for key in own if key in table})
+        return SpreadShape(
+            table["law"], **{key: positive(table, key) for key in own if key in table}
+        )
 
     return Accepts(expected, check)
 
@@ -234,7 +236,7 @@ class _PartTable(BaseModel):
     model_config = STRICT
     names: Annotated[tuple[str, ...], _names()]
     grade: Annotated[float | None, _fraction("a fraction in [0, 1): 0.001 is 0.1 %")] = None
-    law: Annotated[Shape | None, _shape()] = None
+    law: Annotated[SpreadShape | None, _shape()] = None
     tempco: Annotated[tuple[float, float] | None, _tempco()] = None
     ageing: Annotated[tuple[float, float] | None, _ageing()] = None
 
@@ -250,8 +252,8 @@ class SpreadTable(BaseModel):
     """The keys of ``[spread]``, each with what it accepts."""
 
     model_config = STRICT
-    resistors: Annotated[Shape, _shape()] = SpreadSpec.resistors
-    capacitors: Annotated[Shape, _shape()] = SpreadSpec.capacitors
+    resistors: Annotated[SpreadShape, _shape()] = SpreadSpec.resistors
+    capacitors: Annotated[SpreadShape, _shape()] = SpreadSpec.capacitors
     offset: Annotated[Offset | None, _offset()] = None
     saturation: Annotated[float, _fraction("a fraction in [0, 1): 0.05 is ± 5 %")] = (
         SpreadSpec.saturation
@@ -300,7 +302,7 @@ class SpreadTable(BaseModel):
         )
 
 
-def check_binned(shape: Shape, grade: float, field: str, file: str | None) -> None:
+def check_binned(shape: SpreadShape, grade: float, field: str, file: str | None) -> None:
     """Refuse parts of which all were picked out.
 
     Raises

@@ -16,7 +16,7 @@ from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
-from designer.dynamics.steady_state import Setting
+from designer.dynamics.steady_state import DrivenSystem
 from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
 from designer.model.model import TRIED, Dimensionless, Mechanical
 from designer.model.si_units import units_of
@@ -60,7 +60,7 @@ class ModelSubject:
         except InputError as error:
             raise InputError(None, option, value, f"{name}: {error.expected}") from None
 
-    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[Setting]:
+    def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""
         models, omegas = [], []
         for change in changes:
@@ -70,7 +70,7 @@ class ModelSubject:
             omegas.append(float(omega))
         tables = self._batch.tables(models, omegas)
         return [
-            Setting(lambda m=m, w=w: _flow(m, w), 2.0 * np.pi / w, t)  # type: ignore[misc]
+            DrivenSystem(lambda m=m, w=w: _flow(m, w), 2.0 * np.pi / w, t)  # type: ignore[misc]
             for m, w, t in zip(models, omegas, tables, strict=True)
         ]
 

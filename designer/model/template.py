@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from designer.model.sketch import sketch
+from designer.model.ascii_sketch import sketch
 
 _SKETCH = "\n".join(f"# {line}" for line in sketch().splitlines())
 

@@ -21,7 +21,7 @@ from designer.paper.circuits import (
     CORRECTED,
     TITLES,
     Built,
-    Followed,
+    SettledResponse,
     build,
     dc_curve,
     error_of,
@@ -39,7 +39,7 @@ DC_REACH = 2.0
 
 
 @dataclass(frozen=True)
-class Extent:
+class CircuitExtent:
     """How much is done; the defaults are the report's.
 
     p : responses. circuits : of ``CIRCUITS``. patterns : of signs. clocked : p of the responses on
@@ -54,23 +54,25 @@ class Extent:
 
 
 @dataclass(frozen=True)
-class Bench:
+class PaperBench:
     """What every piece needs. jobs : threads and workers."""
 
     catalog: Catalog
     found: tuple[ModelResponse, ...]
-    extent: Extent
+    extent: CircuitExtent
     jobs: int
     progress: Progress
 
     @classmethod
-    def of(cls, catalog: Catalog, extent: Extent, jobs: int, progress: Progress) -> Bench:
+    def of(
+        cls, catalog: Catalog, extent: CircuitExtent, jobs: int, progress: Progress
+    ) -> PaperBench:
         made = model_with("saturation")
         wanted = [r for p, r in zip(OMEGA, made.responses, strict=True) if p in extent.p]
         return cls(catalog, find(made.model, wanted), extent, jobs, progress)
 
 
-def pieces(bench: Bench) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
+def pieces(bench: PaperBench) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
     """Name and maker of each piece, in the order in which they are made."""
     yield "model", lambda: _model(bench)
     for name in bench.extent.circuits:
@@ -81,7 +83,7 @@ def pieces(bench: Bench) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
     yield "clock", lambda: _clock(bench)
 
 
-def _model(bench: Bench) -> dict[str, Any]:
+def _model(bench: PaperBench) -> dict[str, Any]:
     """The orbits that every circuit is held against."""
     rows = []
     for r in bench.found:
@@ -90,7 +92,7 @@ def _model(bench: Bench) -> dict[str, Any]:
     return {"responses": rows}
 
 
-def _circuit(bench: Bench, name: str) -> dict[str, Any]:
+def _circuit(bench: PaperBench, name: str) -> dict[str, Any]:
     """Fig. 7 and Fig. 8 of one circuit."""
     bench.progress.stage(f"{TITLES[name]}: parts, exact circuit")
     one = build(name, bench.catalog)
@@ -146,7 +148,7 @@ def _lines(v1: Array, out: Array, threshold: float) -> dict[str, float]:
     }
 
 
-def _misprints(bench: Bench) -> dict[str, Any]:
+def _misprints(bench: PaperBench) -> dict[str, Any]:
     all_of_them = misprints.MISPRINTS
     step = bench.progress.stage("misprints", len(all_of_them))
     rows = []
@@ -171,7 +173,7 @@ def _misprints(bench: Bench) -> dict[str, Any]:
     return {"misprints": rows}
 
 
-def _offsets(bench: Bench, name: str) -> dict[str, Any]:
+def _offsets(bench: PaperBench, name: str) -> dict[str, Any]:
     one = build(name, bench.catalog)
     offset = bench.catalog.opamp(one.circuit.opamp).offset
     out: dict[str, Any] = {"circuit": name, "title": TITLES[name], "sizes": {}}
@@ -183,7 +185,7 @@ def _offsets(bench: Bench, name: str) -> dict[str, Any]:
     return out
 
 
-def _clock(bench: Bench) -> dict[str, Any]:
+def _clock(bench: PaperBench) -> dict[str, Any]:
     one = build(CORRECTED, bench.catalog)
     rows = []
     with SpicePool(1, timeout=900.0) as pool:
@@ -199,7 +201,7 @@ def _clock(bench: Bench) -> dict[str, Any]:
     return {"rounds": bench.extent.rounds, "responses": rows}
 
 
-def _said(f: Followed) -> dict[str, Any]:
+def _said(f: SettledResponse) -> dict[str, Any]:
     return {
         "omega": f.omega,
         "expected": f.expected,
@@ -209,7 +211,7 @@ def _said(f: Followed) -> dict[str, Any]:
     }
 
 
-def _trace(one: Built, followed: Followed) -> Array:
+def _trace(one: Built, followed: SettledResponse) -> Array:
     """(k, 4) the orbit in model units; empty where there is none."""
     orbit = followed.orbit
     if not orbit.n:

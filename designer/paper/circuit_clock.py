@@ -24,10 +24,10 @@ from designer.fidelity import runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.fidelity.runge_kutta import PAPERS_STEP
 from designer.model.find_responses import ModelResponse
-from designer.paper.circuits import Built, Followed, model_flow
+from designer.paper.circuits import Built, SettledResponse, model_flow
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
 from designer.yields.exact_rung import waveform_error
@@ -68,7 +68,7 @@ def measure(
     pool: SpicePool,
     one: Built,
     response: ModelResponse,
-    followed: Followed,
+    followed: SettledResponse,
     *,
     rounds_: int = ROUNDS,
     progress: Callable[[], None] = lambda: None,
@@ -134,10 +134,10 @@ def _scipy(omega: float, start: Array, end: float, times: Array) -> Array:
     return np.asarray(solve_ivp(rhs, (0.0, end), start, rtol=RTOL, atol=RTOL, t_eval=wanted).y)
 
 
-def _circuits(pool: SpicePool, one: Built, followed: Followed) -> list[_Entry]:
+def _circuits(pool: SpicePool, one: Built, followed: SettledResponse) -> list[_Entry]:
     reduction, orbit = one.reduction(), followed.orbit
     excitation = one.excitation(followed.omega)
-    subject = Subject(reduction, excitation, orbit)
+    subject = GateSubject(reduction, excitation, orbit)
     flow = Flow(subject.system, excitation.drive)
     wanted = displacement(flow, orbit)[None, :]
     (passed,) = numerics_gate.check(pool, [subject])

@@ -11,13 +11,13 @@ from designer.base.arrays import Array
 from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section, nominal_board
 from designer.dynamics.kernel_four_state import POINTS
-from designer.paper.circuits import Built, Followed
+from designer.paper.circuits import Built, SettledResponse
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
-from designer.spice.numerics_gate import GateResult, Subject
+from designer.spice.numerics_gate import GateResult, GateSubject
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed, Sweep
+from designer.spice.simulator import SimulationFailed, SpiceSweep
 
 FINE = 8 * POINTS
 """Points of a drive period of a portrait: a contact of p = 8 still is a curve."""
@@ -26,7 +26,7 @@ DISPLACEMENT = "v1"
 
 
 @dataclass(frozen=True)
-class Heard:
+class NgspiceResponse:
     """One response in ngspice, with the settings that passed the gate.
 
     trace : (n · FINE + 1, 4) states in model units from a strobe on; empty where there is none.
@@ -82,21 +82,27 @@ def stage_curve(pool: SpicePool, circuit: Circuit, reach: float, points: int) ->
     raise SimulationFailed("ngspice gave no answer")
 
 
-def listen(pool: SpicePool, one: Built, followed: Sequence[Followed]) -> tuple[Heard, ...]:
+def listen(
+    pool: SpicePool, one: Built, followed: Sequence[SettledResponse]
+) -> tuple[NgspiceResponse, ...]:
     """Every response that the exact circuit shows periodically, behind the numerics gate."""
     reduction = one.reduction()
-    subjects = [Subject(reduction, one.excitation(f.omega), f.orbit) for f in followed if f.orbit.n]
+    subjects = [
+        GateSubject(reduction, one.excitation(f.omega), f.orbit) for f in followed if f.orbit.n
+    ]
     results = iter(numerics_gate.check(pool, subjects))
     return tuple(
-        _heard(next(results), one, f) if f.orbit.n else Heard("", False, "", 0, np.zeros((0, 4)))
+        _heard(next(results), one, f)
+        if f.orbit.n
+        else NgspiceResponse("", False, "", 0, np.zeros((0, 4)))
         for f in followed
     )
 
 
-def _heard(result: GateResult, one: Built, followed: Followed) -> Heard:
+def _heard(result: GateResult, one: Built, followed: SettledResponse) -> NgspiceResponse:
     steps = result.tried[-1]
     if isinstance(result.read, SimulationFailed):
-        return Heard("failed", False, result.read.reason, steps, np.zeros((0, 4)))
+        return NgspiceResponse("failed", False, result.read.reason, steps, np.zeros((0, 4)))
     orbit = result.read.orbit
     trace = np.zeros((0, 4))
     if orbit.n and result.read.trace is not None:
@@ -104,7 +110,7 @@ def _heard(result: GateResult, one: Built, followed: Followed) -> Heard:
         grid = np.linspace(0.0, time[-1], orbit.n * FINE + 1)
         trace = np.stack([np.interp(grid, time, column) for column in states.T], axis=1) / one.volts
     reason = "" if result.passed else "the numerics gate did not pass"
-    return Heard(orbit.response, result.passed, reason, steps, trace)
+    return NgspiceResponse(orbit.response, result.passed, reason, steps, trace)
 
 
 def _stage(circuit: Circuit) -> set[str]:
@@ -126,5 +132,5 @@ def _stage(circuit: Circuit) -> set[str]:
         nets |= {net for p in met for net in p.nets} - ends
 
 
-def _whole(sweep: Sweep) -> Sweep:
+def _whole(sweep: SpiceSweep) -> SpiceSweep:
     return sweep

@@ -19,7 +19,7 @@ from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.ensemble import displacement
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
-from designer.circuit.paper_values import Candidate
+from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -49,7 +49,7 @@ class Built:
     are then those that were given instead.
     """
 
-    candidate: Candidate
+    candidate: ComparedCircuit
     errors: CoefficientErrors | None
     reason: str
     volts: Array
@@ -68,7 +68,7 @@ class Built:
 
 
 @dataclass(frozen=True)
-class Followed:
+class SettledResponse:
     """What a circuit settles on, from the model's orbit of one response.
 
     kept : whether that is the wanted n-p-q. error : RMS difference of x1 from the model's, over its
@@ -105,10 +105,10 @@ def build(name: str, catalog: Catalog) -> Built:
         _, design = checked_design.design_for(model_with(zone), catalog)
         circuit = design.circuit
         setting = design.errors.scales.frequency(1.0), design.amplitude()
-    return built(Candidate(TITLES[name], "", circuit, *setting))
+    return built(ComparedCircuit(TITLES[name], "", circuit, *setting))
 
 
-def built(candidate: Candidate, instead: Array | None = None) -> Built:
+def built(candidate: ComparedCircuit, instead: Array | None = None) -> Built:
     """With its scales. instead : (states,) volts per unit where the circuit has none of its own.
 
     Raises
@@ -129,7 +129,7 @@ def model_flow(omega: float) -> Flow:
     return Flow(paper_values.MODEL.second_order().piecewise_linear(), Drive(omega))
 
 
-def follow(one: Built, found: Sequence[ModelResponse]) -> tuple[Followed, ...]:
+def follow(one: Built, found: Sequence[ModelResponse]) -> tuple[SettledResponse, ...]:
     """Every response on the exact circuit."""
     system = one.reduction().system()
     out = []
@@ -144,7 +144,7 @@ def follow(one: Built, found: Sequence[ModelResponse]) -> tuple[Followed, ...]:
             shown = displacement(flow, orbit) / one.volts[0]
         kept = orbit.status is OrbitStatus.PERIODIC and r.spec.accepts(orbit.n, orbit.p, orbit.q)
         assert r.expected is not None
-        out.append(Followed(r.omega, r.expected, orbit, kept, error_of(r, shown)))
+        out.append(SettledResponse(r.omega, r.expected, orbit, kept, error_of(r, shown)))
     return tuple(out)
 
 

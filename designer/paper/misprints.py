@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from designer.catalog.catalog import Catalog
 from designer.circuit import paper_values
-from designer.circuit.paper_values import Candidate
+from designer.circuit.paper_values import ComparedCircuit
 from designer.model.model import Dimensionless
 from designer.paper.circuits import Built, built
 
@@ -31,11 +31,11 @@ class Misprint:
     printed: str
     right: str
     note: str = ""
-    build: Callable[[Catalog], Candidate] | None = None
+    build: Callable[[Catalog], ComparedCircuit] | None = None
     run: bool = True
 
 
-def corrected(catalog: Catalog) -> Candidate:
+def corrected(catalog: Catalog) -> ComparedCircuit:
     """The circuit that each misprint is applied to."""
     return _built({}, catalog)
 
@@ -53,12 +53,12 @@ def _built(
     model: Dimensionless = paper_values.MODEL,
     frequency: float | None = None,
     amplitude: float | None = None,
-) -> Candidate:
+) -> ComparedCircuit:
     """The corrected circuit with these values, generator as corrected unless it is given."""
     right = paper_values.corrected()
     own_frequency, own_amplitude = paper_values.generator(paper_values.MODEL, right)
     values = right | dict(changed)
-    return Candidate(
+    return ComparedCircuit(
         "",
         "",
         paper_values.circuit(model, values, catalog.opamp(paper_values.OPAMP)),
@@ -67,13 +67,13 @@ def _built(
     )
 
 
-def _parts(changed: Callable[[Values], Values]) -> Callable[[Catalog], Candidate]:
+def _parts(changed: Callable[[Values], Values]) -> Callable[[Catalog], ComparedCircuit]:
     return lambda catalog: _built(changed(paper_values.corrected()), catalog)
 
 
 def _second_mass(
     *, mass: bool = False, damping: bool = False, stiffness: bool = False
-) -> Callable[[Catalog], Candidate]:
+) -> Callable[[Catalog], ComparedCircuit]:
     """Eq. (4) as printed for M2: 1 - m, 2ζ, 1 - k in the place of m/(1 - m), 2ζ/(1 - c), 1/(1 - k),
     turned into parts by Eq. (14) as corrected."""
     m = paper_values.MODEL
@@ -103,11 +103,11 @@ def _in_phase(v: Values) -> Values:
     return {"R201": v["R201"] + v["R200"], "R203": v["R203"] + v["R202"]}
 
 
-def _other_mass(catalog: Catalog) -> Candidate:
+def _other_mass(catalog: Catalog) -> ComparedCircuit:
     return _built({}, catalog, model=replace(paper_values.MODEL, f20=1.0))
 
 
-def _twice(catalog: Catalog) -> Candidate:
+def _twice(catalog: Catalog) -> ComparedCircuit:
     return _built({}, catalog, frequency=2.0 * corrected(catalog).frequency)
 
 

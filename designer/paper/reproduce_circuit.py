@@ -23,7 +23,7 @@ from designer.base.report_pieces import CaseStore
 from designer.base.version import __version__
 from designer.catalog.catalog import load_catalog
 from designer.jobs.origin import provenance
-from designer.paper.circuit_cases import Bench, Extent, as_data, pieces
+from designer.paper.circuit_cases import CircuitExtent, PaperBench, as_data, pieces
 from designer.paper.circuits import model_with
 from designer.spice.pool import SpicePool, require_ngspice
 
@@ -33,7 +33,7 @@ DATA, README = "circuit.json", "README.md"
 PICTURES = ("fig7", "misprints", "offsets", "times")
 
 
-def names(extent: Extent) -> tuple[str, ...]:
+def names(extent: CircuitExtent) -> tuple[str, ...]:
     """The report's files beside its pieces."""
     pictures = (*PICTURES, *(f"fig8-{name}" for name in extent.circuits))
     return (DATA, README, *(f"{name}.png" for name in pictures))
@@ -45,7 +45,7 @@ def reproduce(
     jobs: int | None = None,
     progress: Progress | None = None,
     resume: bool = False,
-    extent: Extent | None = None,
+    extent: CircuitExtent | None = None,
 ) -> dict[str, dict[str, Any]]:
     """Make the report in the folder ``out``; returns its pieces by name.
 
@@ -61,7 +61,7 @@ def reproduce(
     said = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     at_least("--jobs", jobs, 1)
-    extent = Extent() if extent is None else extent
+    extent = CircuitExtent() if extent is None else extent
     with SpicePool(1) as pool:
         require_ngspice(pool)
     catalog = load_catalog()
@@ -71,7 +71,7 @@ def reproduce(
     store = CaseStore(out, names(extent), resume=resume, note=said.note)
     store.expect(key)
     said.stage("responses of the model")
-    bench = Bench.of(catalog, extent, jobs, said)
+    bench = PaperBench.of(catalog, extent, jobs, said)
     found: dict[str, dict[str, Any]] = {}
     seconds: dict[str, float] = {}
     for name, make in pieces(bench):

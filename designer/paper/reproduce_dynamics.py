@@ -78,7 +78,7 @@ CHATTER = (0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
 
 
 @dataclass(frozen=True)
-class Extent:
+class DynamicsExtent:
     """How much is done; the defaults are the report's."""
 
     low: float = LOW
@@ -107,7 +107,7 @@ def reproduce(
     *,
     jobs: int = 1,
     progress: Progress | None = None,
-    extent: Extent | None = None,
+    extent: DynamicsExtent | None = None,
 ) -> Dynamics:
     """Write the report into a folder, which is made; an earlier report in it is replaced.
 
@@ -118,7 +118,7 @@ def reproduce(
     InputError : the folder cannot be written, or holds files that are not an earlier report's.
         Nothing is written then.
     """
-    extent = Extent() if extent is None else extent
+    extent = DynamicsExtent() if extent is None else extent
     said = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -137,7 +137,7 @@ def reproduce(
     return dynamics
 
 
-def _provenance(extent: Extent) -> dict[str, Any]:
+def _provenance(extent: DynamicsExtent) -> dict[str, Any]:
     text = "format = 1\n[model]\n" + "".join(
         f"{name} = {json.dumps(value)}\n" for name, value in MODEL.__dict__.items()
     )
@@ -152,7 +152,7 @@ def _provenance(extent: Extent) -> dict[str, Any]:
     )
 
 
-def measure(extent: Extent, progress: Progress) -> Dynamics:
+def measure(extent: DynamicsExtent, progress: Progress) -> Dynamics:
     """Branches, windows, what coexists, and the judgement of each statement."""
     over = swept_model.of_model(MODEL, FIRST, "omega")
     first = settle(over.flow(FIRST), np.zeros(4))
@@ -194,7 +194,7 @@ def _named(orbit: Orbit) -> str:
 def _pictures(
     out: Path,
     dynamics: Dynamics,
-    extent: Extent,
+    extent: DynamicsExtent,
     jobs: int,
     source: Mapping[str, Any],
     progress: Progress,
@@ -260,7 +260,7 @@ def _portraits(dynamics: Dynamics) -> dict[int, list[Portrait]]:
     return panels
 
 
-def _plain(dynamics: Dynamics, extent: Extent, said: Mapping[str, Any]) -> dict[str, Any]:
+def _plain(dynamics: Dynamics, extent: DynamicsExtent, said: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "command": COMMAND,

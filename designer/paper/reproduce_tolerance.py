@@ -24,8 +24,8 @@ from designer.base.report_pieces import CaseStore
 from designer.catalog.catalog import load_catalog
 from designer.jobs.origin import provenance
 from designer.model.tuning_bands import Bands
-from designer.paper.tolerance_cases import OMEGA, TITLES, Case, cases, model_file
-from designer.paper.tolerance_rows import Row
+from designer.paper.tolerance_cases import OMEGA, TITLES, SpreadCase, cases, model_file
+from designer.paper.tolerance_rows import YieldRow
 from designer.yields import exact_rung
 from designer.yields.blame_analysis import blame
 from designer.yields.power_up_yield import reached_block
@@ -54,7 +54,7 @@ def reproduce(
     resume: bool = False,
     only: Sequence[str] | None = None,
     short: int = SHORT,
-) -> tuple[Row, ...]:
+) -> tuple[YieldRow, ...]:
     """Make the report in the folder ``out``.
 
     samples : boards of each case as built; of these the first ``short`` are tuned and powered up.
@@ -84,7 +84,7 @@ def reproduce(
         store.piece(name, partial(_case, case, min(short, samples), jobs, said))
         for name, case in asked.items()
     ]
-    rows = tuple(Row(**row) for known in found for row in known["rows"])
+    rows = tuple(YieldRow(**row) for known in found for row in known["rows"])
     settings = {"samples": samples, "short": min(short, samples), "bands": Bands().as_dict()}
     source = provenance(model_file(), catalog.hash, seed=seed, settings=settings)
     for name, content in _files(found, rows, source, samples, seed).items():
@@ -92,7 +92,7 @@ def reproduce(
     return rows
 
 
-def _case(case: Case, short: int, jobs: int, said: Progress) -> dict[str, Any]:
+def _case(case: SpreadCase, short: int, jobs: int, said: Progress) -> dict[str, Any]:
     """Everything about one case, as plain data."""
     began, plan = time.perf_counter(), case.plan
     number = len(plan.questions)
@@ -123,7 +123,7 @@ def _case(case: Case, short: int, jobs: int, said: Progress) -> dict[str, Any]:
     return {**out, "cost": {"seconds": time.perf_counter() - began}}
 
 
-def _row(case: Case, p: int, kind: str, judged: Iterable[tuple[int, Verdict]]) -> Row:
+def _row(case: SpreadCase, p: int, kind: str, judged: Iterable[tuple[int, Verdict]]) -> YieldRow:
     tally = dict.fromkeys(Verdict, 0)
     there = p in case.asked
     if there:
@@ -131,7 +131,7 @@ def _row(case: Case, p: int, kind: str, judged: Iterable[tuple[int, Verdict]]) -
         for question, verdict in judged:
             tally[verdict] += question == number
     counts = (tally[v] for v in (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED))
-    return Row(
+    return YieldRow(
         case.circuit, case.resistor, case.capacitor, case.offsets, f"1-{p}-{p}", OMEGA[p], kind,
         there, *counts,
     )  # fmt: skip
@@ -143,7 +143,7 @@ def _blame(plan: StudyPlan, answers: list[Answer], jobs: int, said: Progress) ->
 
 def _files(
     found: Sequence[Mapping[str, Any]],
-    rows: Sequence[Row],
+    rows: Sequence[YieldRow],
     source: Mapping[str, Any],
     samples: int,
     seed: int,
@@ -170,20 +170,20 @@ def _files(
     return dict(zip(FILES, contents, strict=True))
 
 
-def _with_interval(row: Row) -> dict[str, Any]:
+def _with_interval(row: YieldRow) -> dict[str, Any]:
     low, high = row.counted.interval if row.there else (0.0, 0.0)
     return {**row.__dict__, "title": TITLES[row.circuit], "low": low, "high": high}
 
 
-def _parquet(rows: Sequence[Row], stream: io.BytesIO) -> None:
+def _parquet(rows: Sequence[YieldRow], stream: io.BytesIO) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = {name: [getattr(r, name) for r in rows] for name in Row.__annotations__}
+    columns = {name: [getattr(r, name) for r in rows] for name in YieldRow.__annotations__}
     pq.write_table(pa.table(columns), stream)
 
 
-def _key(case: Case, short: int, catalog_hash: str) -> str:
+def _key(case: SpreadCase, short: int, catalog_hash: str) -> str:
     """Hash of what decides the case's result."""
     plan = case.plan
     layers = [study_hash(plan, layer) for layer in ("samples", "tuned", "reached")]

@@ -15,7 +15,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import Survey
 from designer.bifurcations.doubling_cascade import Cascade, cascade
-from designer.bifurcations.points import Bifurcation, Kind
+from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import BranchWindow
 from designer.dynamics.orbit import Orbit
 from designer.paper.response_order import Gap, equal, faults, strays
@@ -80,7 +80,7 @@ def statements(
 
 def _pitchfork(symmetric: BranchWindow) -> Statement:
     end = symmetric.low
-    same = end.why == Kind.PITCHFORK
+    same = end.why == PointKind.PITCHFORK
     close = abs(end.value - PITCHFORK) < 0.005
     return Statement(
         f"Sec. 4: as ω falls 1-1-1 loses its symmetry in a pitchfork at ω = {PITCHFORK}, where the "
@@ -106,7 +106,7 @@ def _first_end(found: Survey, windows: Sequence[BranchWindow], twins: BranchWind
         "Sec. 4: grazing turns 1-1-1AS into 1-1-2, whose period doublings lead to chaos",
         f"A {twins.low.why} at ω = {twins.low.value:.5f} ends 1-1-1AS. Going on down: "
         f"{way.describe()}{grazed}",
-        AGREES if twins.low.why == Kind.GRAZING else DISAGREES,
+        AGREES if twins.low.why == PointKind.GRAZING else DISAGREES,
         f"{SWEEP} --from 1.28 --to 1.4 --steps 601 --down --out out/first-cascade",
     )
 
@@ -122,7 +122,7 @@ def _grazing(found: Survey, twins: BranchWindow) -> Bifurcation | None:
     touches = [
         p
         for p in found.on(twins.branch)
-        if p.kind is Kind.GRAZING
+        if p.kind is PointKind.GRAZING
         and (p.position > end.position if before else p.position < end.position)
     ]
     return min(touches, key=lambda p: abs(p.position - end.position), default=None)
@@ -141,7 +141,7 @@ def _doublings(windows: Sequence[BranchWindow]) -> Statement:
         f"1-1-2 is stable from ω = {main.low.value:.5f} to {main.high.value:.5f}, and begins in a "
         f"{main.high.why}: it coexists with the other responses and does not come out of 1-1-1AS. "
         f"Down from there: {way.describe()}",
-        (AGREES if main.high.why == Kind.GRAZING else IN_PART) if fine else DISAGREES,
+        (AGREES if main.high.why == PointKind.GRAZING else IN_PART) if fine else DISAGREES,
         f"{SWEEP} --from 1.28 --to 1.4 --steps 601 --starts 8 --out out/second-attractor",
     )
 
@@ -231,9 +231,9 @@ def _each(windows: Sequence[BranchWindow]) -> Statement:
     tops = symmetric_mains(windows)
     for p, top in tops:
         twins = main_windows(windows, p)[1]
-        if top.low.why == Kind.PITCHFORK:
+        if top.low.why == PointKind.PITCHFORK:
             forks.append(p)
-        if twins is not None and twins.low.why == Kind.DOUBLING:
+        if twins is not None and twins.low.why == PointKind.DOUBLING:
             doubles.append(p)
         elif twins is not None:
             others.append(f"{p} by a {twins.low.why}")
@@ -254,7 +254,7 @@ def _touches(found: Survey) -> Statement:
     """Where 1-p-p becomes 1-(p+1)-p, by grazing, as an attractor."""
     seen = []
     for point in found.points:
-        if point.kind is not Kind.GRAZING or point.stable != (True, True):
+        if point.kind is not PointKind.GRAZING or point.stable != (True, True):
             continue
         ends = [point.before, point.after]
         above, below = ends if point.direction < 0 else ends[::-1]

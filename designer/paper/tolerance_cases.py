@@ -11,7 +11,7 @@ from designer.check import checked_design
 from designer.circuit import paper_values
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
-from designer.circuit.paper_values import Candidate
+from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -60,7 +60,7 @@ reference = "LM4040C50"
 
 
 @dataclass(frozen=True)
-class Case:
+class SpreadCase:
     """A circuit under a spread. plan : of the responses that the nominal circuit shows.
 
     asked : for each question its p. missing : by p, what the nominal circuit shows instead.
@@ -94,7 +94,7 @@ def model_file() -> ModelFile:
     return parse_model_file(_MODEL.format(responses=responses))
 
 
-def cases(catalog: Catalog, *, samples: int, seed: int) -> Iterator[Case]:
+def cases(catalog: Catalog, *, samples: int, seed: int) -> Iterator[SpreadCase]:
     """Every case, the reference case of each circuit first."""
     modelfile = model_file()
     found = find(modelfile.model, modelfile.responses)
@@ -108,7 +108,7 @@ def cases(catalog: Catalog, *, samples: int, seed: int) -> Iterator[Case]:
             spread = replace(spread, offset_sigma=0.0, offset_limit=0.0)
         for name, circuit, questions, missing in circuits:
             plan = StudyPlan(circuit, spread, seed, samples, tuple(questions.values()))
-            yield Case(name, resistor, capacitor, offsets, plan, tuple(questions), missing)
+            yield SpreadCase(name, resistor, capacitor, offsets, plan, tuple(questions), missing)
 
 
 def _circuits(
@@ -117,14 +117,14 @@ def _circuits(
     model, opamp = modelfile.model, catalog.opamp(paper_values.OPAMP)
     exact = paper_values.corrected()
     papers = {
-        PRINTED: Candidate(
+        PRINTED: ComparedCircuit(
             TITLES[PRINTED],
             "",
             paper_values.circuit(model, paper_values.PRINTED, opamp),
             paper_values.PRINTED_FREQUENCY,
             paper_values.PRINTED_AMPLITUDE,
         ),
-        CORRECTED: Candidate(
+        CORRECTED: ComparedCircuit(
             TITLES[CORRECTED],
             "",
             paper_values.circuit(model, exact, opamp),

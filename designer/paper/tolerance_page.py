@@ -15,14 +15,14 @@ from designer.paper.tolerance_cases import OMEGA, REFERENCE, TITLES
 from designer.yields.setting_search import MOST_TRIES
 
 if TYPE_CHECKING:
-    from designer.paper.tolerance_rows import Row
+    from designer.paper.tolerance_rows import YieldRow
 
 _KINDS = ("as built", "tuned", "reached")
 GROUPS_SHOWN = 3
 
 
 @styled
-def yield_sheet(rows: Sequence[Row]) -> Figure:
+def yield_sheet(rows: Sequence[YieldRow]) -> Figure:
     """Yield in per cent: a column of panels for each circuit, a row for each kind of yield."""
     circuits = [c for c in TITLES if any(r.circuit == c for r in rows)]
     cases = _cases(rows)
@@ -49,7 +49,7 @@ def yield_sheet(rows: Sequence[Row]) -> Figure:
 
 
 def _panel(
-    axes: Axes, chosen: Mapping[tuple[tuple[float, float, bool], str], Row],
+    axes: Axes, chosen: Mapping[tuple[tuple[float, float, bool], str], YieldRow],
     cases: Sequence[tuple[float, float, bool]],
 ) -> Any:  # fmt: skip
     values = np.full((len(cases), len(OMEGA)), np.nan)
@@ -72,7 +72,9 @@ def _panel(
     return image
 
 
-def readme(rows: Sequence[Row], document: Mapping[str, Any], *, samples: int, seed: int) -> str:
+def readme(
+    rows: Sequence[YieldRow], document: Mapping[str, Any], *, samples: int, seed: int
+) -> str:
     """``README.md`` of the report."""
     short = document["provenance"]["settings"]["short"]
     out = [
@@ -108,7 +110,7 @@ def readme(rows: Sequence[Row], document: Mapping[str, Any], *, samples: int, se
     return "\n".join(out).rstrip() + "\n"
 
 
-def _table(rows: Sequence[Row]) -> list[str]:
+def _table(rows: Sequence[YieldRow]) -> list[str]:
     columns = ["R", "C", "offsets", "yield", *(f"1-{p}-{p}" for p in OMEGA)]
     out = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
     kinds = list(dict.fromkeys(r.kind for r in rows))
@@ -122,14 +124,14 @@ def _table(rows: Sequence[Row]) -> list[str]:
     return out
 
 
-def _cell(row: Row | None) -> str:
+def _cell(row: YieldRow | None) -> str:
     if row is None or not row.there:
         return "×"
     said = f"{100 * row.counted.rate:.0f}" if np.isfinite(row.counted.rate) else "–"
     return said + (f" ({row.failed} failed)" if row.failed else "")
 
 
-def _blame_lines(found: Mapping[str, Any] | None, rows: Sequence[Row]) -> list[str]:
+def _blame_lines(found: Mapping[str, Any] | None, rows: Sequence[YieldRow]) -> list[str]:
     if found is None:
         return []
     asked = [f"1-{p}-{p}" for p in OMEGA if any(r.expect == f"1-{p}-{p}" and r.there for r in rows)]
@@ -156,11 +158,11 @@ def _widest(samples: int) -> float:
     return high - low
 
 
-def _cases(rows: Sequence[Row]) -> list[tuple[float, float, bool]]:
+def _cases(rows: Sequence[YieldRow]) -> list[tuple[float, float, bool]]:
     return sorted({_case_of(r) for r in rows}, key=lambda c: (not c[2], -c[0], -c[1]))
 
 
-def _case_of(row: Row) -> tuple[float, float, bool]:
+def _case_of(row: YieldRow) -> tuple[float, float, bool]:
     return (row.resistor, row.capacitor, row.offsets)
 
 

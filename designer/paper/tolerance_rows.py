@@ -8,7 +8,7 @@ from designer.yields.verdict import Yield
 
 
 @dataclass(frozen=True)
-class Row:
+class YieldRow:
     """The yield of one response in one case. kind : one of ``KINDS``. expect : "1-3-3". there :
     whether the nominal circuit shows it; where it does not every count is 0."""
 

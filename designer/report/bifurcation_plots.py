@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, style
 from designer.bifurcations.basins import SAME, Basins
-from designer.bifurcations.parameter_map import Cell, ParameterMap
+from designer.bifurcations.parameter_map import MapCell, ParameterMap
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
@@ -325,7 +325,7 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
     return handles
 
 
-def _palette(cells: Sequence[Cell], counts: Mapping[str, int]) -> dict[str, str]:
+def _palette(cells: Sequence[MapCell], counts: Mapping[str, int]) -> dict[str, str]:
     """Colour by response: the most frequent ones, then one for all others."""
     periodic = {c.response for c in cells if c.status is OrbitStatus.PERIODIC}
     named = [r for r in counts if r in periodic][:NAMED]
@@ -340,7 +340,7 @@ def _palette(cells: Sequence[Cell], counts: Mapping[str, int]) -> dict[str, str]
 
 
 def _grid(
-    axes: Axes, cells: Sequence[Cell], xs: Array, ys: Array, looks: Mapping[str, str]
+    axes: Axes, cells: Sequence[MapCell], xs: Array, ys: Array, looks: Mapping[str, str]
 ) -> None:
     colours = list(dict.fromkeys(looks.values()))
     numbers = np.array([colours.index(looks[c.response]) for c in cells])

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, ON_LIGHT, new_figure, say, styled
 from designer.yields.blame_analysis import ResponseBlame
-from designer.yields.blame_replay import Subject
+from designer.yields.blame_replay import BlamedPart
 
 PARTS_SHOWN = 16
 INDICES_SHOWN = 8
@@ -109,7 +109,7 @@ def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
 def _rows(blames: Sequence[ResponseBlame]) -> tuple[list[str], list[str]]:
     """Names of the groups, and of the parts that avoid most losses over all responses."""
 
-    def worth(subjects: Sequence[Subject], group: bool) -> list[str]:
+    def worth(subjects: Sequence[BlamedPart], group: bool) -> list[str]:
         best: dict[str, float] = {}
         for s in subjects:
             if (s.kind == "group") == group and np.isfinite(s.share):

@@ -9,10 +9,10 @@ from typing import Any
 from designer.base.plain_json import FORMAT, plain
 from designer.circuit import paper_values
 from designer.circuit.packing import QUAD
-from designer.report.comparison import Column
+from designer.report.comparison import DesignColumn
 
 
-def comparison_json(columns: Sequence[Column]) -> dict[str, Any]:
+def comparison_json(columns: Sequence[DesignColumn]) -> dict[str, Any]:
     """``columns`` in order, and the sources of the printed values where they are one of them."""
     known = {s.output: s.name for s in columns[0].candidate.circuit.sections} if columns else {}
     answer: dict[str, Any] = {"columns": [_column(c) | _paper_names(c, known) for c in columns]}
@@ -36,7 +36,7 @@ def in_answer(file: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in file.items() if k in ("columns", "printed_in")}
 
 
-def _paper_names(column: Column, known: Mapping[str, str]) -> dict[str, dict[str, str]]:
+def _paper_names(column: DesignColumn, known: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """``paper_names``: what the paper calls each section, where its op-amps are no quads.
 
     known : names by the net of the output, of a circuit with the paper's op-amps.
@@ -48,7 +48,7 @@ def _paper_names(column: Column, known: Mapping[str, str]) -> dict[str, dict[str
     return {"paper_names": names} if any(new != old for old, new in names.items()) else {}
 
 
-def _column(column: Column) -> dict[str, Any]:
+def _column(column: DesignColumn) -> dict[str, Any]:
     candidate, errors, bill = column.candidate, column.errors, column.bill
     circuit, current, offset = candidate.circuit, column.current, column.offset
     return {

@@ -22,7 +22,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit import paper_values
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.netlist import Board, Capacitor, Circuit, Resistor, Section, nominal_board
-from designer.circuit.paper_values import Candidate
+from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -85,7 +85,7 @@ class Bill:
 
 
 @dataclass(frozen=True)
-class Column:
+class DesignColumn:
     """Everything about one design.
 
     errors : None where a coefficient has the wrong sign; ``reason`` says so. k0, f20, b : as
@@ -93,7 +93,7 @@ class Column:
     do not apply. frequency_error : ln(stated/right) of the generator's frequency.
     """
 
-    candidate: Candidate
+    candidate: ComparedCircuit
     errors: CoefficientErrors | None
     reason: str
     k0: float
@@ -113,10 +113,10 @@ class Column:
 
 def compare(
     made: Synthesis, progress: Callable[[str], None] = lambda _: None
-) -> tuple[Column, ...]:
+) -> tuple[DesignColumn, ...]:
     """The paper's circuits for this model, as far as they can follow it, and the design."""
     model, spec = made.design.model, made.modelfile.circuit
-    ours = Candidate(
+    ours = ComparedCircuit(
         OURS,
         f"chosen for the model file: {spec.opamp}, resistors {' and '.join(spec.resistors)}, "
         f"capacitors {' and '.join(spec.capacitors)}",
@@ -132,12 +132,12 @@ def compare(
 
 
 def column(
-    candidate: Candidate,
+    candidate: ComparedCircuit,
     model: Dimensionless,
     found: Sequence[ModelResponse],
     spec: CircuitSpec,
     catalog: Catalog,
-) -> Column:
+) -> DesignColumn:
     """One design's figures. Coefficients of the wrong sign and responses without an answer are
     part of them.
 
@@ -156,7 +156,7 @@ def column(
     drives = [_drive(candidate, model, r) for r in found]
     shown = tuple(_show(reduction, model, errors, r, d) for r, d in zip(found, drives, strict=True))
     opamp = catalog.opamp(circuit.opamp)
-    return Column(
+    return DesignColumn(
         candidate=candidate,
         errors=errors,
         reason=reason,
@@ -175,7 +175,7 @@ def column(
     )
 
 
-def _drive(candidate: Candidate, model: Dimensionless, response: ModelResponse) -> Drive:
+def _drive(candidate: ComparedCircuit, model: Dimensionless, response: ModelResponse) -> Drive:
     """The generator for this response; a clearance of its own is set by the amplitude."""
     return Drive(
         2.0 * np.pi * candidate.frequency * response.omega,
@@ -224,7 +224,7 @@ def _k0(model: Dimensionless, errors: CoefficientErrors | None) -> float:
     return float(mu / (1.0 + mu))
 
 
-def _b(candidate: Candidate, model: Dimensionless, errors: CoefficientErrors | None) -> float:
+def _b(candidate: ComparedCircuit, model: Dimensionless, errors: CoefficientErrors | None) -> float:
     """B K1/(P1 + P2) of the parts and the amplitude, from the driven mass M1 (M2 if f20 = 1)."""
     if errors is None or not candidate.circuit.stops:
         return float("nan")
@@ -235,7 +235,7 @@ def _b(candidate: Candidate, model: Dimensionless, errors: CoefficientErrors | N
     return float(model.b * np.exp(errors.errors["x1'' x1"]) / force)
 
 
-def _frequency_error(candidate: Candidate, errors: CoefficientErrors | None) -> float:
+def _frequency_error(candidate: ComparedCircuit, errors: CoefficientErrors | None) -> float:
     """Against ω = 2π f √(M1/K1), with M1 and K1 of the parts: free of scales too."""
     if errors is None:
         return float("nan")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
 from designer.board.component import Numbers, components, pin_numbers, to_buy
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import OrbitStatus
@@ -42,7 +42,7 @@ class ReportData:
 
     modelfile: ModelFile
     design: Design
-    checked: tuple[Checked, ...]
+    checked: tuple[CheckedResponse, ...]
     yields: tuple[Yield | None, ...] | None
     answers: tuple[Answer, ...]
     plan: StudyPlan | None

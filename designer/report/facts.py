@@ -7,7 +7,7 @@ from typing import Any
 
 from designer.base.figure_style import EXACT
 from designer.circuit.design import Design
-from designer.model.sketch import sketch
+from designer.model.ascii_sketch import sketch
 from designer.report import (
     boards as report_boards,
     design_tables,

@@ -12,7 +12,7 @@ from designer.yields.verdict import Verdict
 from designer.yields.yield_maps import YieldMap
 
 
-class Judged(Protocol):
+class LayerRow(Protocol):
     """A row of a layer: one board of one question."""
 
     @property
@@ -23,7 +23,7 @@ class Judged(Protocol):
     def verdict(self) -> Verdict: ...
 
 
-class Benched(Judged, Protocol):
+class Benched(LayerRow, Protocol):
     """A row of the tuned layer."""
 
     @property
@@ -93,8 +93,8 @@ class Layers:
     """
 
     tuned: Sequence[Benched] | None = None
-    trimmed: Sequence[Judged] | None = None
-    reached: Sequence[Judged] | None = None
+    trimmed: Sequence[LayerRow] | None = None
+    reached: Sequence[LayerRow] | None = None
     combined: Sequence[Both | None] = ()
     recipes: Sequence[Start] = ()
     blame: Blame | None = None

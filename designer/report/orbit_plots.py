@@ -25,7 +25,7 @@ from designer.base.figure_style import (
     say,
     styled,
 )
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus
 
@@ -47,7 +47,7 @@ WIDEST_TITLE = 48
 
 @styled
 def phase_portrait(
-    checked: Checked,
+    checked: CheckedResponse,
     traces: Mapping[str, Trace],
     *,
     sides: Sequence[int] = BOTH,
@@ -68,7 +68,7 @@ def phase_portrait(
 
 @styled
 def portrait_sheet(
-    shown: Sequence[tuple[Checked, Mapping[str, Trace]]], *, sides: Sequence[int] = BOTH
+    shown: Sequence[tuple[CheckedResponse, Mapping[str, Trace]]], *, sides: Sequence[int] = BOTH
 ) -> Figure:
     """Phase portraits of all responses as small multiples, each with limits of its own."""
     columns = max(1, min(3, len(shown)))
@@ -90,7 +90,7 @@ def portrait_sheet(
 
 @styled
 def time_traces(
-    checked: Checked,
+    checked: CheckedResponse,
     traces: Mapping[str, Trace],
     *,
     sides: Sequence[int] = BOTH,
@@ -144,7 +144,7 @@ def legend(*, ngspice: bool = True, sides: Sequence[int] = BOTH) -> Figure:
     return figure
 
 
-def _orbits(checked: Checked) -> dict[str, Orbit]:
+def _orbits(checked: CheckedResponse) -> dict[str, Orbit]:
     found = {"model": checked.model.orbit, "circuit": checked.circuit}
     if checked.ngspice is not None:
         found["ngspice"] = checked.ngspice
@@ -160,13 +160,13 @@ def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str
     }
 
 
-def _gaps(checked: Checked, sides: Sequence[int]) -> tuple[float, ...]:
+def _gaps(checked: CheckedResponse, sides: Sequence[int]) -> tuple[float, ...]:
     """Where the stops stand, in model units."""
     return tuple(side * checked.model.b for side in sides)
 
 
 def _portrait(
-    axes: Axes, checked: Checked, traces: Mapping[str, Trace], sides: Sequence[int]
+    axes: Axes, checked: CheckedResponse, traces: Mapping[str, Trace], sides: Sequence[int]
 ) -> None:
     orbits, gaps = _orbits(checked), _gaps(checked, sides)
     drawn = {
@@ -237,7 +237,7 @@ def _look(name: str, orbit: Orbit) -> dict[str, Any]:
 def _engine_legend(
     figure: Figure,
     traces: Sequence[Mapping[str, Trace]],
-    checked: Sequence[Checked],
+    checked: Sequence[CheckedResponse],
     sides: Sequence[int],
     columns: int,
 ) -> None:

@@ -20,7 +20,7 @@ from designer.report.tolerance import blame_of
 
 
 @dataclass(frozen=True)
-class Picture:
+class ReportPicture:
     """A figure as an ``<svg>`` element, which says what it shows, and a caption."""
 
     svg: Markup
@@ -31,8 +31,8 @@ class Picture:
 class Card:
     """The pictures of one response; ``warning`` : what is wrong with it, or ""."""
 
-    portrait: Picture
-    trace: Picture
+    portrait: ReportPicture
+    trace: ReportPicture
     caption: str
     warning: str
 
@@ -94,7 +94,7 @@ def _cards(data: ReportData, page: InlineSvg) -> list[Card]:
     return cards
 
 
-def _legend(data: ReportData, page: InlineSvg) -> Picture | None:
+def _legend(data: ReportData, page: InlineSvg) -> ReportPicture | None:
     if not data.checked:
         return None
     ngspice = any(c.gate is not None for c in data.checked)
@@ -107,7 +107,7 @@ def _legend(data: ReportData, page: InlineSvg) -> Picture | None:
     )
 
 
-def _yield_picture(data: ReportData, page: InlineSvg) -> Picture | None:
+def _yield_picture(data: ReportData, page: InlineSvg) -> ReportPicture | None:
     if data.yields is None or not data.checked:
         return None
     yields = [data.yield_of(i) for i in range(len(data.checked))]
@@ -122,7 +122,7 @@ def _yield_picture(data: ReportData, page: InlineSvg) -> Picture | None:
     )
 
 
-def _margin_picture(data: ReportData, page: InlineSvg) -> Picture | None:
+def _margin_picture(data: ReportData, page: InlineSvg) -> ReportPicture | None:
     rows = [data.answers_to(i) for i in range(len(data.checked))]
     if not any(rows):
         return None
@@ -136,7 +136,7 @@ def _margin_picture(data: ReportData, page: InlineSvg) -> Picture | None:
     )
 
 
-def _avoided_picture(data: ReportData, page: InlineSvg) -> Picture | None:
+def _avoided_picture(data: ReportData, page: InlineSvg) -> ReportPicture | None:
     blames = [blame_of(data, i) for i in range(len(data.checked))]
     if not any(b is not None and b.subjects for b in blames):
         return None
@@ -149,7 +149,7 @@ def _avoided_picture(data: ReportData, page: InlineSvg) -> Picture | None:
     )
 
 
-def _index_picture(data: ReportData, page: InlineSvg) -> Picture | None:
+def _index_picture(data: ReportData, page: InlineSvg) -> ReportPicture | None:
     blames = [blame_of(data, i) for i in range(len(data.checked))]
     if not any(b is not None and b.indices for b in blames):
         return None
@@ -161,7 +161,7 @@ def _index_picture(data: ReportData, page: InlineSvg) -> Picture | None:
     )
 
 
-def _map_pictures(data: ReportData, page: InlineSvg) -> list[Picture]:
+def _map_pictures(data: ReportData, page: InlineSvg) -> list[ReportPicture]:
     labels = dict(zip(data.question_of, _labels(data), strict=True))
     return [
         _picture(
@@ -174,7 +174,7 @@ def _map_pictures(data: ReportData, page: InlineSvg) -> list[Picture]:
     ]
 
 
-def _error_picture(design: Design, page: InlineSvg) -> Picture | None:
+def _error_picture(design: Design, page: InlineSvg) -> ReportPicture | None:
     if design.errors.max_error < EXACT:
         return None  # a row of "exact" says nothing that the sentence above it does not
     errors = {words.coefficient(k): v for k, v in design.errors.errors.items()}
@@ -185,10 +185,10 @@ def _error_picture(design: Design, page: InlineSvg) -> Picture | None:
     )
 
 
-def _schematic(data: ReportData, page: InlineSvg) -> Picture | None:
+def _schematic(data: ReportData, page: InlineSvg) -> ReportPicture | None:
     if data.board is None:
         return None
-    return Picture(
+    return ReportPicture(
         page.element(
             schematic_drawing.svg(data.board, numbers=data.pins),
             "Schematic: one stage a cell, nets joined by their names.",
@@ -210,5 +210,5 @@ def _sides(design: Design) -> tuple[int, ...]:
     return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[design.model.sides]
 
 
-def _picture(page: InlineSvg, figure: Figure, shows: str, caption: str = "") -> Picture:
-    return Picture(page.element(to_svg(figure), shows), caption)
+def _picture(page: InlineSvg, figure: Figure, shows: str, caption: str = "") -> ReportPicture:
+    return ReportPicture(page.element(to_svg(figure), shows), caption)

@@ -12,7 +12,7 @@ from typing import Any
 
 from designer.base.default_counts import DRAWN_STARTS
 from designer.base.design_folder import TOLERANCE
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.coexistence import beside
 from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.orbit import OrbitStatus
@@ -20,7 +20,7 @@ from designer.report import words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
 from designer.spice.numerics_gate import shortest_contact
-from designer.yields.ngspice_sampling import Kind, Outcome
+from designer.yields.ngspice_sampling import NgspiceVerdict, StartKind
 from designer.yields.verdict import Answer, Verdict, Yield
 
 REASONS_SHOWN = 5
@@ -75,7 +75,7 @@ def response_table(data: ReportData) -> Table:
     )  # fmt: skip
 
 
-def _coexisting(data: ReportData, checked: Checked) -> str:
+def _coexisting(data: ReportData, checked: CheckedResponse) -> str:
     """The other attractors of the model with their shares of the starts."""
     model = replace(data.modelfile.model, b=checked.model.b)
     others = [
@@ -153,19 +153,24 @@ def ngspice_table(data: ReportData) -> Table | None:
     rows = []
     for i, c in enumerate(data.checked):
         known = {a.sample: a for a in data.answers_to(i)}
-        for start, kind in (("its own orbit", Kind.OWN), ("the nominal orbit", Kind.NOMINAL)):
+        for start, kind in (
+            ("its own orbit", StartKind.OWN),
+            ("the nominal orbit", StartKind.NOMINAL),
+        ):
             asked = [h for h in data.heard_of(i) if h.kind is kind and h.response]
             if not asked:
                 continue
-            notes: dict[Outcome, Counter[str]] = {one: Counter() for one in Outcome}
+            notes: dict[NgspiceVerdict, Counter[str]] = {one: Counter() for one in NgspiceVerdict}
             for h in asked:
                 answer = known[h.sample]
                 outcome = h.outcome(answer)
                 differs = f"{answer.response} but {h.either or h.response}"
-                note = differs if outcome is Outcome.DIFFERED else h.reason or "no reason given"
+                note = (
+                    differs if outcome is NgspiceVerdict.DIFFERED else h.reason or "no reason given"
+                )
                 notes[outcome][note] += 1
-            counts = [notes[one].total() for one in Outcome]
-            del notes[Outcome.AGREED]
+            counts = [notes[one].total() for one in NgspiceVerdict]
+            del notes[NgspiceVerdict.AGREED]
             told = sorted((t, n) for counted in notes.values() for t, n in counted.items())
             said_ = ", ".join(f"{t} ({n})" for t, n in told[:REASONS_SHOWN])
             rows.append((words.name(c), start, *map(str, (len(asked), *counts)), said_))
@@ -216,12 +221,12 @@ def _mechanism_columns(data: ReportData) -> tuple[int, ...]:
     return () if data.modelfile.mechanical is None else (1,)
 
 
-def _mechanism(data: ReportData, c: Checked) -> tuple[str, ...]:
+def _mechanism(data: ReportData, c: CheckedResponse) -> tuple[str, ...]:
     mechanical = data.modelfile.mechanical
     return () if mechanical is None else (words.quantity(mechanical.hertz(c.model.omega), "Hz"),)
 
 
-def _expected(c: Checked) -> str:
+def _expected(c: CheckedResponse) -> str:
     kind = {True: "symmetric", False: "asymmetric", None: ""}[c.model.spec.symmetric]
     return ", ".join(t for t in (c.model.expected, kind) if t) or "any"
 

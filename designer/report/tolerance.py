@@ -12,18 +12,18 @@ from typing import Any
 
 from designer.report import words
 from designer.report.data import ReportData
-from designer.report.layers import Benched, Both, Judged
+from designer.report.layers import Benched, Both, LayerRow
 from designer.report.tables import Table
 from designer.yields.blame_analysis import Blame, ResponseBlame
-from designer.yields.blame_replay import Subject
+from designer.yields.blame_replay import BlamedPart
 from designer.yields.joint_yield import all_on_one
-from designer.yields.ngspice_sampling import Kind
+from designer.yields.ngspice_sampling import StartKind
 from designer.yields.verdict import Verdict, Yield, count
 
 PARTS_SHOWN = 4
 DIFFERENCES_SHOWN = 20
 NO_LOSS = "no board was lost"
-STARTED: dict[str, str] = {Kind.OWN: "its own orbit", Kind.NOMINAL: "the nominal orbit"}
+STARTED: dict[str, str] = {StartKind.OWN: "its own orbit", StartKind.NOMINAL: "the nominal orbit"}
 
 
 def facts(data: ReportData) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def _whole(data: ReportData) -> dict[str, str]:
         return {}
     out = {"as built": _share(data.all_on_one_board)}
 
-    def whole(rows: Iterable[Judged]) -> str:
+    def whole(rows: Iterable[LayerRow]) -> str:
         return _share(all_on_one(rows, data.census))
 
     if data.layers.tuned is not None:
@@ -122,7 +122,7 @@ def _whole(data: ReportData) -> dict[str, str]:
     return out
 
 
-def _count(data: ReportData, rows: Iterable[Judged], response: int) -> Yield | None:
+def _count(data: ReportData, rows: Iterable[LayerRow], response: int) -> Yield | None:
     question = data.question_of[response]
     if question is None:
         return None
@@ -240,7 +240,7 @@ def _avoided(data: ReportData) -> Table | None:
     )
 
 
-def _saved(subject: Subject) -> str:
+def _saved(subject: BlamedPart) -> str:
     low, high = (100 * v for v in subject.interval)
     said = f"{subject.name}: {subject.avoided} of {subject.replayed}"
     if subject.avoided:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from designer.base.figure_style import EXACT
 from designer.base.units import format_quantity
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.trust import WORDS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.yields.verdict import Yield
@@ -23,7 +23,7 @@ TERM = re.compile(r"x(\d)('{1,2}) x(\d)('?)")
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
-def name(c: Checked) -> str:
+def name(c: CheckedResponse) -> str:
     return f"ω = {number(c.model.omega)} ({c.model.expected or c.model.orbit.response})"
 
 
@@ -31,7 +31,7 @@ def orbit(met: Orbit) -> str:
     return f"{met.response} ({met.reason})" if met.reason else met.response
 
 
-def problem(c: Checked) -> str:
+def problem(c: CheckedResponse) -> str:
     """What is wrong with a response, in words; "" where it was found, all engines agree, and the
     exact ones can be trusted."""
     said = []

@@ -18,18 +18,18 @@ from .deck import (
 )
 from .equation_check import (
     EquationCheck as EquationCheck,
-    Finding as Finding,
+    EquationFinding as EquationFinding,
 )
 from .job import (
     SpiceJob as SpiceJob,
 )
 from .numerics_gate import (
     GateResult as GateResult,
-    Subject as Subject,
+    GateSubject as GateSubject,
     shortest_contact as shortest_contact,
 )
 from .opamp_check import (
-    Check as Check,
+    FigureCheck as FigureCheck,
     checks as checks,
 )
 from .opamp_model import (
@@ -48,7 +48,7 @@ from .read_orbit import (
 )
 from .simulator import (
     SimulationFailed as SimulationFailed,
-    Sweep as Sweep,
+    SpiceSweep as SpiceSweep,
     Waveforms as Waveforms,
 )
 from .simulator_decks import (

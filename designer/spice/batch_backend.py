@@ -24,7 +24,7 @@ from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Analysis,
     SimulationFailed,
-    Sweep,
+    SpiceSweep,
     Waveforms,
     accept,
     accept_sweep,
@@ -56,7 +56,9 @@ class BatchNgspice:
         _check_status(status, log)
         return waveforms
 
-    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+    def sweep(
+        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis
+    ) -> SpiceSweep:
         """See `designer.spice.simulator.Simulator.sweep`."""
         vectors, log, seconds, status = self._vectors_of(netlist, analysis)
         found = accept_sweep(vectors, signals, stop, analysis, log, seconds)

@@ -51,7 +51,7 @@ class Task(Generic[T]):
 
 
 @dataclass(frozen=True)
-class Outcome(Generic[T]):
+class AidedRun(Generic[T]):
     """result : of the last attempt. settings : its. tried : remedies in order, none where the
     first attempt converged; if ``result`` is no failure, the last of them helped."""
 
@@ -67,7 +67,7 @@ def did_not_converge(failure: SimulationFailed) -> bool:
 
 def run(
     pool: SpicePool, tasks: Sequence[Task[T]], allowed: Sequence[Remedy] = REMEDIES
-) -> Iterator[tuple[int, Outcome[T]]]:
+) -> Iterator[tuple[int, AidedRun[T]]]:
     """Run tasks and yield ``(index, outcome)`` as they finish, in no certain order.
 
     All tasks are run first; those that did not converge go on to the next remedy together, so
@@ -92,7 +92,7 @@ def run(
             if curable and len(tried) < len(allowed):
                 again.append(left[k])
             else:
-                yield left[k], Outcome(result, changed[k][0], tried)
+                yield left[k], AidedRun(result, changed[k][0], tried)
         left = sorted(again)
         if not left:
             return

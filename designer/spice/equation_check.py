@@ -36,7 +36,7 @@ from designer.spice.convergence_aids import did_not_converge
 from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed, Sweep
+from designer.spice.simulator import SimulationFailed, SpiceSweep
 
 Complex = NDArray[np.complex128]
 
@@ -57,7 +57,7 @@ STAGE = "fv"
 
 
 @dataclass(frozen=True)
-class Finding:
+class EquationFinding:
     """One comparison. deviation, bound : dimensionless, see `name`. reason : where ngspice gave
     no answer; the deviation is then nan and the finding is no."""
 
@@ -81,7 +81,7 @@ class EquationCheck:
     v1 in contact; "threshold …" |realised/wanted - 1|; "leftover slope" that of the dead zone in
     units of K1."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[EquationFinding, ...]
     low: float = field(default=float("nan"))
     high: float = field(default=float("nan"))
 
@@ -95,7 +95,7 @@ class EquationCheck:
         return not self.passed and all(f.passed or f.reason for f in self.findings)
 
     @property
-    def worst(self) -> Finding:
+    def worst(self) -> EquationFinding:
         """The finding nearest to its bound, or past it; one without an answer first."""
         return max(self.findings, key=lambda f: np.inf if f.reason else f.deviation / f.bound)
 
@@ -118,7 +118,7 @@ class EquationCheck:
 
         return cls(
             tuple(
-                Finding(f["name"], number(f["deviation"]), number(f["bound"]), f["reason"])
+                EquationFinding(f["name"], number(f["deviation"]), number(f["bound"]), f["reason"])
                 for f in said["findings"]
             )
         )
@@ -332,14 +332,16 @@ def _volts(design: Design, force: float) -> float:
     return -force * design.amplitude()
 
 
-def _ac(design: Design, resting: _Rest, low: float, high: float, *, told: bool) -> SpiceJob[Sweep]:
+def _ac(
+    design: Design, resting: _Rest, low: float, high: float, *, told: bool
+) -> SpiceJob[SpiceSweep]:
     held = 0.0 if resting.contact == 0 else _volts(design, 0.5 * (resting.near + resting.far))
     source, card = f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
     text = _deck(design, source, card, held, resting.contact, told=told)
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _as_it_is, "ac")
 
 
-def _dc(design: Design, resting: _Rest, *, told: bool) -> SpiceJob[Sweep]:
+def _dc(design: Design, resting: _Rest, *, told: bool) -> SpiceJob[SpiceSweep]:
     """From the near end, where the stage carries least; upwards, as every sweep goes."""
     near, far = _volts(design, resting.near), _volts(design, resting.far)
     turned = far < near
@@ -352,11 +354,11 @@ def _dc(design: Design, resting: _Rest, *, told: bool) -> SpiceJob[Sweep]:
     return SpiceJob(text, nets, last - 0.01 * step, _as_it_is, "dc")
 
 
-def _unconverged(heard: Sweep | SimulationFailed) -> bool:
+def _unconverged(heard: SpiceSweep | SimulationFailed) -> bool:
     return isinstance(heard, SimulationFailed) and did_not_converge(heard)
 
 
-def _as_it_is(sweep: Sweep) -> Sweep:
+def _as_it_is(sweep: SpiceSweep) -> SpiceSweep:
     return sweep
 
 
@@ -365,12 +367,12 @@ def _as_it_is(sweep: Sweep) -> Sweep:
 
 
 def _transfer(
-    design: Design, model: SecondOrderSystem, resting: _Rest, heard: Sweep | SimulationFailed
-) -> Finding:
+    design: Design, model: SecondOrderSystem, resting: _Rest, heard: SpiceSweep | SimulationFailed
+) -> EquationFinding:
     name = f"transfer, {_place(resting.contact)}"
     bound = FLOOR
     if isinstance(heard, SimulationFailed):
-        return Finding(name, float("nan"), bound, heard.reason)
+        return EquationFinding(name, float("nan"), bound, heard.reason)
     scales = design.errors.scales
     omega = 2.0 * np.pi * heard.axis * scales.seconds
     unit = -scales.volts[0] / design.amplitude()
@@ -379,19 +381,21 @@ def _transfer(
     known = design.errors.max_error * explained(model, omega, resting.contact)
     bounds = np.expm1(known + _misdriven(design, model, omega, resting.contact)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
-    return Finding(name, float(deviation[worst]), float(bounds[worst]))
+    return EquationFinding(name, float(deviation[worst]), float(bounds[worst]))
 
 
 def _curve(
-    design: Design, model: SecondOrderSystem, heard: dict[int, Sweep | SimulationFailed]
-) -> list[Finding]:
+    design: Design, model: SecondOrderSystem, heard: dict[int, SpiceSweep | SimulationFailed]
+) -> list[EquationFinding]:
     """Slope, threshold, leftover slope from straight lines through the stretches."""
     bound = design.errors.max_error + FLOOR
     lines: dict[int, Array] = {}
     findings = []
     for contact, sweep in heard.items():
         if isinstance(sweep, SimulationFailed):
-            findings.append(Finding(f"curve, {_place(contact)}", float("nan"), bound, sweep.reason))
+            findings.append(
+                EquationFinding(f"curve, {_place(contact)}", float("nan"), bound, sweep.reason)
+            )
             continue
         v1, fv = (sweep.signals[n].real for n in (design.circuit.state_nets[0], STAGE))
         lines[contact] = np.polyfit(v1, fv, 1)
@@ -402,15 +406,17 @@ def _curve(
     for contact, (slope, offset) in lines.items():
         place = _place(contact)
         error = abs(np.log(slope / wanted)) if slope > 0.0 else np.inf
-        findings.append(Finding(f"slope, {place}", float(error), bound))
+        findings.append(EquationFinding(f"slope, {place}", float(error), bound))
         threshold = contact * (level - offset) / (slope - leftover)
         # Both stops need not lie at the same distance: an offset of the generator centres them.
         stated = design.errors.scales.threshold_lower if contact < 0 else float("nan")
         gap = model.clearances[0].gap * design.errors.scales.volts[0]
         gap = stated if np.isfinite(stated) else gap
-        findings.append(Finding(f"threshold, {place}", float(abs(threshold / gap - 1.0)), bound))
+        findings.append(
+            EquationFinding(f"threshold, {place}", float(abs(threshold / gap - 1.0)), bound)
+        )
     share = float(abs(leftover / wanted) * design.model.mu)
-    return [*findings, Finding("leftover slope", share, bound)]
+    return [*findings, EquationFinding("leftover slope", share, bound)]
 
 
 def _wanted_slope(design: Design, model: SecondOrderSystem) -> float:

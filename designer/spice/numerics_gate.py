@@ -28,7 +28,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
-from designer.spice.convergence_aids import Outcome, Remedy, Task
+from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
 from designer.spice.opamp_model import Rung, limit_into
@@ -122,7 +122,7 @@ class GateResult:
 
 
 @dataclass(frozen=True)
-class Subject:
+class GateSubject:
     """One response of one board (a reduction): what a run of ngspice needs.
 
     orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
@@ -162,7 +162,7 @@ class Subject:
 
 
 def job(
-    subject: Subject,
+    subject: GateSubject,
     settings: SolverSettings,
     nudge: float = 0.0,
     *,
@@ -206,20 +206,20 @@ def job(
     return SpiceJob(text, signals, stop, partial(read, reading=reading))
 
 
-def length(subject: Subject) -> int:
+def length(subject: GateSubject) -> int:
     """Drive periods that the run of a subject takes."""
     judged = max(4 * (subject.orbit.n or MAX_PERIOD), subject.judged)
     return max(subject.discard + judged, SHORTEST)
 
 
 def task(
-    subject: Subject, settings: SolverSettings, *, keep: bool = False, whole: bool = False
+    subject: GateSubject, settings: SolverSettings, *, keep: bool = False, whole: bool = False
 ) -> Task[Read]:
     """The run as one that remedies may change."""
     return Task(partial(job, subject, keep=keep, whole=whole), settings)
 
 
-def _as_the_rung_has_it(subject: Subject) -> Reduction:
+def _as_the_rung_has_it(subject: GateSubject) -> Reduction:
     """The reduction whose thresholds the rung's are: an impact is counted by those of the board at
     hand. On ``full`` the output limits follow the loads, and with them a saturating stage's
     clearance. A vendor's model has limits that nobody has told: the board's stand for them."""
@@ -279,13 +279,15 @@ def contact_lengths(touching: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.flatnonzero(change < 0) - np.flatnonzero(change > 0)
 
 
-def first_steps(subject: Subject, contact: float) -> int:
+def first_steps(subject: GateSubject, contact: float) -> int:
     """Steps of a period that the first level takes; contact : length of the shortest [s]."""
     wanted = int(np.ceil(STEPS_PER_CONTACT * subject.period / contact))
     return min(max(STEPS_PER_PERIOD, wanted), MOST_STEPS)
 
 
-def check(pool: SpicePool, subjects: Sequence[Subject], levels: int = LEVELS) -> list[GateResult]:
+def check(
+    pool: SpicePool, subjects: Sequence[GateSubject], levels: int = LEVELS
+) -> list[GateResult]:
     """Find the coarsest settings that pass, for the nominal board of each response.
 
     All subjects move through the levels together, so that the workers stay busy. On a rung above
@@ -314,7 +316,7 @@ def check(pool: SpicePool, subjects: Sequence[Subject], levels: int = LEVELS) ->
     return [r for r in results if r is not None]
 
 
-def warmed(pool: SpicePool, subjects: Sequence[Subject]) -> list[Subject]:
+def warmed(pool: SpicePool, subjects: Sequence[GateSubject]) -> list[GateSubject]:
     """The subjects with the periods that each has to discard on its rung, from a short run."""
     out = list(subjects)
     asked = [i for i, s in enumerate(subjects) if s.rung != "ideal" and s.orbit.n]
@@ -341,7 +343,7 @@ def wave_bound(orbit: Orbit) -> float:
     return WAVE_BOUND * min(1.0, 5.0 * (1.0 - orbit.radius)) if orbit.radius < 1.0 else WAVE_BOUND
 
 
-def wave_error(subject: Subject, read: Read) -> float:
+def wave_error(subject: GateSubject, read: Read) -> float:
     """RMS over the last n periods of ngspice less exact circuit, of the peak of each state, worst.
 
     ``read`` has its trace; the exact wave starts at the orbit's strobe that is nearest to
@@ -373,7 +375,7 @@ def _trio(step: float) -> tuple[SolverSettings, SolverSettings, SolverSettings]:
 
 
 def _judge(
-    subject: Subject, runs: Sequence[Outcome[Read]], tried: tuple[int, ...], contact: float
+    subject: GateSubject, runs: Sequence[AidedRun[Read]], tried: tuple[int, ...], contact: float
 ) -> GateResult:
     settings, read = runs[0].settings, runs[0].result
     needed = {r for run in runs for r in run.tried}

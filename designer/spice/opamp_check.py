@@ -32,7 +32,7 @@ HARD = 0.25
 
 
 @dataclass(frozen=True)
-class Bench:
+class OpAmpBench:
     """One op-amp on a bench: its model's rung, rails of ± supply [V], offset [V], bias [A],
     output limits [V], a vendor's model if there is one."""
 
@@ -45,7 +45,7 @@ class Bench:
     vendor: VendorModel | None = None
 
     @classmethod
-    def of(cls, opamp: OpAmp, rung: Rung) -> Bench:
+    def of(cls, opamp: OpAmp, rung: Rung) -> OpAmpBench:
         """The op-amp as the catalogue has it, at its rated supply, every figure typical."""
         limit = opamp.saturation.nominal
         return cls(
@@ -202,7 +202,7 @@ _POINT = ".op"
 
 
 @dataclass(frozen=True)
-class Check:
+class FigureCheck:
     """One figure: expected by the catalogue, measured in ngspice, whether they agree, and whether
     the catalogue's figure is assumed."""
 
@@ -218,7 +218,7 @@ class Check:
         return abs(self.measured - self.expected) <= self.tolerance * abs(self.expected)
 
 
-def checks(opamp: OpAmp, rung: Rung = "full") -> list[Check]:
+def checks(opamp: OpAmp, rung: Rung = "full") -> list[FigureCheck]:
     """Every figure that this rung's model has, measured; a vendor's model on ``full`` if named.
 
     Raises
@@ -226,12 +226,12 @@ def checks(opamp: OpAmp, rung: Rung = "full") -> list[Check]:
     SimulationFailed : ngspice has no answer for one of them.
     EnvironmentMissing : ngspice is missing.
     """
-    bench, found = Bench.of(opamp, rung), []
+    bench, found = OpAmpBench.of(opamp, rung), []
 
     def add(name: str, unit: str, figure: Figure | None, measured: float, tolerance: float) -> None:
         if figure is not None:
             expected = figure.nominal
-            found.append(Check(name, unit, expected, measured, tolerance, figure.assumed))
+            found.append(FigureCheck(name, unit, expected, measured, tolerance, figure.assumed))
 
     add("gain", "V/V", opamp.gain, bench.open_loop_gain(), 0.01)
     add("offset", "V", opamp.offset, bench.offset(), 0.01)

@@ -56,7 +56,7 @@ class Read:
 
 
 def read(waveforms: Waveforms, reading: Reading) -> Read:
-    """Classify the run after ``reading.discard`` periods."""
+    """Classify the run after ``guarded_reading.discard`` periods."""
     time = waveforms.time
     x = np.stack([waveforms.signals[net] for net in reading.nets], axis=1) - reading.shift
     last = int(np.floor(time[-1] / reading.period * (1.0 + 1e-9)))

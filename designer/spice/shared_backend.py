@@ -30,7 +30,7 @@ from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Analysis,
     SimulationFailed,
-    Sweep,
+    SpiceSweep,
     Waveforms,
     accept,
     accept_sweep,
@@ -83,7 +83,9 @@ class SharedNgspice:
         real = {name: values.real for name, values in vectors.items()}
         return accept(real, signals, stop_time, log, seconds)
 
-    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+    def sweep(
+        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis
+    ) -> SpiceSweep:
         """See `designer.spice.simulator.Simulator.sweep`."""
         vectors, log, seconds = self._vectors_of(netlist, analysis)
         return accept_sweep(vectors, signals, stop, analysis, log, seconds)

@@ -54,7 +54,7 @@ class Waveforms:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class SpiceSweep:
     """What an ``.ac`` or ``.dc`` analysis that counts has produced."""
 
     axis: NDArray[np.float64]
@@ -107,7 +107,9 @@ class Simulator(Protocol):
         SimulationFailed : the run does not count.
         """
 
-    def sweep(self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis) -> Sweep:
+    def sweep(
+        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis
+    ) -> SpiceSweep:
         """Run a deck with one ``.ac`` or ``.dc`` and return the wanted signals.
 
         Parameters
@@ -210,7 +212,7 @@ def accept_sweep(
     analysis: Analysis,
     log: str,
     seconds: float,
-) -> Sweep:
+) -> SpiceSweep:
     """The sweep of an ``.ac`` or ``.dc`` analysis, if it counts: as `accept`.
 
     Raises
@@ -219,7 +221,7 @@ def accept_sweep(
     """
     axis, found = _accepted(vectors, AXES[analysis], signals, stop, log)
     complex_ = {name: values.astype(np.complex128) for name, values in found.items()}
-    return Sweep(axis=axis, signals=complex_, log=log, seconds=seconds)
+    return SpiceSweep(axis=axis, signals=complex_, log=log, seconds=seconds)
 
 
 _WORDS = {

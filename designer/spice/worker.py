@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from designer.base.environment import clean_environment, set_environment
 from designer.base.errors import EnvironmentMissing
 from designer.spice.backends import open_simulator
-from designer.spice.simulator import Backend, SimulationFailed, Simulator, Sweep, Waveforms
+from designer.spice.simulator import Backend, SimulationFailed, Simulator, SpiceSweep, Waveforms
 
 if TYPE_CHECKING:
     from designer.spice.job import SpiceJob
@@ -79,7 +79,7 @@ def _outcome(simulator: Simulator, job: bytes) -> bytes:
         except Exception as error:
             raise SimulationFailed(f"analysis failed: it cannot be read: {told(error)}") from error
         try:
-            waveforms: Waveforms | Sweep
+            waveforms: Waveforms | SpiceSweep
             if todo.analysis == "tran":
                 waveforms = simulator.run(todo.netlist, todo.signals, todo.stop_time)
             else:

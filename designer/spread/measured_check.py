@@ -9,13 +9,13 @@ from designer.base.errors import InputError
 from designer.base.schema import did_you_mean
 from designer.base.units import format_quantity
 from designer.circuit.netlist import Circuit
-from designer.model.measured_values import Measured
+from designer.model.measured_values import MeasuredBoards
 
 _FACTOR = 2.0
 """A part is no further from the value it is sold for: a slip of a prefix is a factor of 1000."""
 
 
-def check_measured(measured: Measured, circuit: Circuit) -> None:
+def check_measured(measured: MeasuredBoards, circuit: Circuit) -> None:
     """Refuse what cannot be of this circuit.
 
     Raises
@@ -34,7 +34,9 @@ def check_measured(measured: Measured, circuit: Circuit) -> None:
                 raise InputError(measured.source, where, found, f"a value within {ends}")
 
 
-def check_measured_names(measured: Measured, circuit: Circuit, more: Collection[str] = ()) -> None:
+def check_measured_names(
+    measured: MeasuredBoards, circuit: Circuit, more: Collection[str] = ()
+) -> None:
     """Refuse parts that are neither of this circuit nor among ``more``.
 
     Raises

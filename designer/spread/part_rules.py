@@ -14,7 +14,7 @@ from designer.catalog.entries import Figure, Kind, PartFamily
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.circuit.resistors import composites_of
 from designer.model.distributions import Law, Split, Uniform
-from designer.model.spread_table import DataSheet, PartRule, Shape, check_binned
+from designer.model.spread_table import DataSheet, PartRule, SpreadShape, check_binned
 from designer.spread.measured_check import check_measured, check_measured_names
 from designer.spread.spread import Group, Spread
 
@@ -193,12 +193,12 @@ class _Rules:
         resistor = isinstance(part, Resistor)
         return self.choice.resistor_grade if resistor else self.choice.capacitor_grade
 
-    def shape(self, part: Part, rule: PartRule | None) -> Shape:
+    def shape(self, part: Part, rule: PartRule | None) -> SpreadShape:
         if rule is not None and rule.law is not None:
             return rule.law
         exact = rule is not None and rule.grade == 0.0  # whatever the others are
         if exact or isinstance(part, Reference):
-            return Shape()
+            return SpreadShape()
         return self.rules.resistors if isinstance(part, Resistor) else self.rules.capacitors
 
     def _drawn(self, part: Part) -> float:
@@ -240,7 +240,7 @@ class _Rules:
             shape = self.shape(part, rule)
             stated = rule is not None and (rule.law is not None or rule.grade is not None)
             if name in self.asked and shape.law == "binned":
-                found[name] = (Shape() if shape.inner >= grade else shape).over(grade)
+                found[name] = (SpreadShape() if shape.inner >= grade else shape).over(grade)
             elif stated:
                 found[name] = shape.over(grade)
         return found

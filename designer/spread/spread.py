@@ -20,7 +20,7 @@ from designer.catalog.entries import OpAmp
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resistor
 from designer.model.distributions import Law, Normal, Uniform
-from designer.model.measured_values import Measured
+from designer.model.measured_values import MeasuredBoards
 from designer.spread import random_streams
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Spread:
     tempco: Mapping[str, Law] = field(default_factory=dict)
     ageing: Mapping[str, Law] = field(default_factory=dict)
     groups: tuple[Group, ...] = ()
-    measured: Measured | None = None
+    measured: MeasuredBoards | None = None
     asked: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod

@@ -25,10 +25,10 @@ from designer.model.find_responses import Peaks
 from designer.model.model import Dimensionless
 from designer.synthesis import linear_search, nonlinear_block, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZone
-from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, Limits
+from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLimits
 from designer.synthesis.linear_block import Targets
 from designer.synthesis.linear_search import LinearBlock
-from designer.synthesis.nonlinear_block import Room
+from designer.synthesis.nonlinear_block import StageRoom
 from designer.synthesis.part_names import levels, parts_of, terms_of
 from designer.synthesis.preferences import Wishes
 from designer.synthesis.tie_break import Shortfall
@@ -164,7 +164,7 @@ def zone_of_spec(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> Z
 
 def linear_block(
     order: Order,
-    limits: Limits,
+    limits: ConditionLimits,
     wishes: Wishes,
     *,
     between: tuple[float, float] = (0.0, np.inf),
@@ -188,7 +188,12 @@ def linear_block(
 
 
 def attempt(
-    order: Order, limits: Limits, wishes: Wishes, linear: LinearBlock, *, thrifty: bool = False
+    order: Order,
+    limits: ConditionLimits,
+    wishes: Wishes,
+    linear: LinearBlock,
+    *,
+    thrifty: bool = False,
 ) -> Attempt | Shortfall:
     """A circuit with this linear block within these limits, or what leaves none.
 
@@ -218,7 +223,7 @@ def attempt(
 
 def _driven(
     order: Order,
-    limits: Limits,
+    limits: ConditionLimits,
     values: dict[str, float],
     linear: LinearBlock,
     zone: DeadZone | None,
@@ -241,7 +246,7 @@ def _driven(
 
 
 def _dead_zone(
-    order: Order, limits: Limits, wishes: Wishes, values: Mapping[str, float]
+    order: Order, limits: ConditionLimits, wishes: Wishes, values: Mapping[str, float]
 ) -> DeadZone | str:
     """The stage beside this linear block, or the name of what leaves none."""
     target = nonlinear_block.target_of(order.model, values, _room(order, limits))
@@ -263,9 +268,9 @@ def _dead_zone(
     )
 
 
-def _room(order: Order, limits: Limits) -> Room:
+def _room(order: Order, limits: ConditionLimits) -> StageRoom:
     """What the responses, the op-amps and the conditions leave to the dead zone."""
-    room = Room(
+    room = StageRoom(
         saturation=order.saturation,
         swing=limits.swing,
         supply=order.spec.supply,
@@ -290,7 +295,7 @@ def _room(order: Order, limits: Limits) -> Room:
 
 
 def _levels(
-    order: Order, limits: Limits, values: Mapping[str, float], thrifty: bool
+    order: Order, limits: ConditionLimits, values: Mapping[str, float], thrifty: bool
 ) -> dict[str, float] | Shortfall:
     """The inverters' resistors: one value for all, but where a matched group says otherwise."""
     own = levels(order.parts)

@@ -55,7 +55,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Program:
+class PairProgram:
     """errors (m,) = h + D scales + the sum over resistors of what their pairs change.
 
     tables : pairs that each resistor may become, by name; changes : (m, pairs) what each does to
@@ -98,7 +98,7 @@ def swing_of(order: Order, made: Attempt) -> float:
     return float((made.errors.scales.volts * order.peaks.states).max())
 
 
-def program_of(order: Order, made: Attempt, names: Sequence[str]) -> Program:
+def program_of(order: Order, made: Attempt, names: Sequence[str]) -> PairProgram:
     """The errors near this attempt as functions of these resistors."""
     h, D = _free(made.errors)
     half = REACH * made.errors.max_error
@@ -121,7 +121,7 @@ def program_of(order: Order, made: Attempt, names: Sequence[str]) -> Program:
             curved.add(name)
             effect = np.stack([change(name, float(by)) for by in logs], axis=1)
         tables[name], changes[name] = table, effect
-    return Program(h, D, tables, changes, frozenset(curved))
+    return PairProgram(h, D, tables, changes, frozenset(curved))
 
 
 def pairs_near(resistors: Array, wanted: float, half: float) -> tuple[Pair, ...]:
@@ -169,7 +169,7 @@ def _free(errors: CoefficientErrors) -> tuple[Array, Array]:
     return h, D[:, [0, *range(2, len(logs))]]
 
 
-def best(program: Program, used: frozenset[float]) -> dict[str, Pair]:
+def best(program: PairProgram, used: frozenset[float]) -> dict[str, Pair]:
     """The composites of least error, of those the fewest, of those with the fewest new values.
 
     used : values that cost nothing in the last stage.
@@ -196,7 +196,7 @@ def best(program: Program, used: frozenset[float]) -> dict[str, Pair]:
 class _Model:
     """The program in cvxpy; each stage adds its own limits to the same variables."""
 
-    def __init__(self, program: Program, used: frozenset[float]) -> None:
+    def __init__(self, program: PairProgram, used: frozenset[float]) -> None:
         self.program = program
         tables = program.tables
         self.z = {n: cp.Variable(len(table), boolean=True) for n, table in tables.items()}

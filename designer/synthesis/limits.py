@@ -9,7 +9,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.entries import Figure, OpAmp
-from designer.circuit.design import Check, Design
+from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
 from designer.model.circuit_table import CircuitSpec
@@ -61,7 +61,7 @@ NO_AIMS = Aims()
 
 
 @dataclass(frozen=True)
-class Limits:
+class ConditionLimits:
     """kept : names of the conditions that hold; the limits of the others are infinite or zero.
 
     seconds : range of the time scale [s per unit of model time]. swing : what the peaks of the
@@ -91,7 +91,9 @@ class Limits:
             signal=self.signal,
         )
 
-    def tightened(self, broken: Sequence[Check], design: Design, *, slower: bool) -> Limits:
+    def tightened(
+        self, broken: Sequence[ConditionCheck], design: Design, *, slower: bool
+    ) -> ConditionLimits:
         """Limits that should bring these checks of a finished design inside theirs.
 
         slower : whether bandwidth is sought in a slower time scale; otherwise in a smaller gain of
@@ -118,7 +120,7 @@ class Limits:
                 out = replace(out, noise_gain=min(out.noise_gain, gain / by))
         return out
 
-    def _lighter(self, design: Design, section: str) -> Limits:
+    def _lighter(self, design: Design, section: str) -> ConditionLimits:
         """Without the resistor that loads this section's output most, and any as small."""
         output = next(s.output for s in design.circuit.sections if s.name == section)
         values = effective(design.circuit.values, design.composites)
@@ -136,7 +138,7 @@ def limits(
     saturation: float,
     fastest: float,
     aims: Aims = NO_AIMS,
-) -> Limits:
+) -> ConditionLimits:
     """The limits of these conditions for an op-amp with this output limit [V].
 
     fastest : angular frequency, in model units, of the highest harmonic that matters.
@@ -147,7 +149,7 @@ def limits(
         least = INVERTER_GAIN * fastest / (2.0 * np.pi * bandwidth_limit(opamp))
         seconds = max(seconds[0], least), seconds[1]
     inf = float("inf")
-    return Limits(
+    return ConditionLimits(
         kept=kept,
         seconds=seconds,
         swing=min(SWING_SHARE, aims.swing) * saturation,

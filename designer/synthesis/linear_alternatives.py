@@ -12,7 +12,7 @@ from collections import deque
 from designer.base.progress import part
 from designer.circuit.coefficients import EXACT
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
-from designer.synthesis.limits import Limits
+from designer.synthesis.limits import ConditionLimits
 from designer.synthesis.linear_search import FIRST_LEVEL, LinearBlock
 from designer.synthesis.preferences import Wishes
 from designer.synthesis.tie_break import Shortfall
@@ -24,7 +24,11 @@ ASIDE = 1e-6
 
 
 def best_beside(
-    order: Order, within: Limits, wishes: Wishes, linear: LinearBlock, first: Attempt | Shortfall
+    order: Order,
+    within: ConditionLimits,
+    wishes: Wishes,
+    linear: LinearBlock,
+    first: Attempt | Shortfall,
 ) -> Attempt | Shortfall:
     """The attempt of least error among linear blocks as good as ``linear``.
 

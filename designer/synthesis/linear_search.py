@@ -63,7 +63,7 @@ class LinearBlock:
 
 
 @dataclass(frozen=True)
-class Found:
+class LevelSearch:
     """Where a search of levels ended.
 
     error : infinite if nothing was found. parts : (14,) indices. empty : highest level at which
@@ -151,9 +151,9 @@ def lower_bound(targets: Targets, resistors: Array, capacitors: Array) -> float:
     return found.error if found.whole else found.empty
 
 
-def _levels(values: Values, rules: Rules, patience: int, level: float = FIRST_LEVEL) -> Found:
+def _levels(values: Values, rules: Rules, patience: int, level: float = FIRST_LEVEL) -> LevelSearch:
     """Search level by level until something is found, the levels or the steps end."""
-    found = Found(np.inf, np.full(len(PARTS), -1), 0.0, False, -1, 0, 0)
+    found = LevelSearch(np.inf, np.full(len(PARTS), -1), 0.0, False, -1, 0, 0)
     while True:
         level = min(level, LAST_LEVEL)
         at = _level(values, rules, level, patience - found.steps)
@@ -169,7 +169,7 @@ def _levels(values: Values, rules: Rules, patience: int, level: float = FIRST_LE
         level *= 1e3 if level < 1e-6 else GROWTH
 
 
-def _level(values: Values, rules: Rules, level: float, patience: int) -> Found:
+def _level(values: Values, rules: Rules, level: float, patience: int) -> LevelSearch:
     """The least error at most ``level``; each slice is searched below the best so far."""
     best, parts = np.inf, np.full(len(PARTS), -1)
     start, whole, reached, rows, steps = 0, True, -1, 0, 0
@@ -191,12 +191,17 @@ def _level(values: Values, rules: Rules, level: float, patience: int) -> Found:
         if steps >= patience:
             whole = whole and start == slices
             break
-    return Found(best, parts, 0.0, whole, reached, rows, steps)
+    return LevelSearch(best, parts, 0.0, whole, reached, rows, steps)
 
 
 def _thinned(
-    found: Found, targets: Targets, signal: Array, capacitors: Array, bounds: Bounds, wishes: Wishes
-) -> Found:
+    found: LevelSearch,
+    targets: Targets,
+    signal: Array,
+    capacitors: Array,
+    bounds: Bounds,
+    wishes: Wishes,
+) -> LevelSearch:
     """Something to offer where the work ran out: the best of a part of the resistors.
 
     Its bound stays that of the whole catalogue.
@@ -223,7 +228,7 @@ def _thinned(
 
 
 def _why(
-    found: Found,
+    found: LevelSearch,
     targets: Targets,
     signal: Array,
     resistors: Array,
@@ -254,7 +259,7 @@ def _why(
     return Shortfall(last, found.whole)
 
 
-def _proof(found: Found, resistors: int, capacitors: int) -> str:
+def _proof(found: LevelSearch, resistors: int, capacitors: int) -> str:
     """How the bound is known, in words."""
     scope = f"all {resistors} resistor and {capacitors} capacitor values"
     empty = (

@@ -26,7 +26,7 @@ LEAST_PENETRATION = 0.02
 
 
 @dataclass(frozen=True)
-class Room:
+class StageRoom:
     """What the responses, the op-amps and the conditions leave to the stage.
 
     saturation : of U3C [V]; swing : largest voltage of an output that stays linear [V]; supply [V].
@@ -51,7 +51,7 @@ class Room:
     reference_current: tuple[float, float] = (0.0, float("inf"))
 
 
-def target_of(model: Dimensionless, values: Mapping[str, float], room: Room) -> DeadZoneTarget:
+def target_of(model: Dimensionless, values: Mapping[str, float], room: StageRoom) -> DeadZoneTarget:
     """What the stage has to do beside this linear block."""
     targets = Targets.from_state_matrix(model.second_order().state_matrix())
     h, D = _residuals(values, targets)

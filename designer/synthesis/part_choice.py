@@ -14,7 +14,7 @@ import numpy as np
 from designer.base.errors import InputError, Unreachable
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
-from designer.catalog.entries import Diode, OpAmp, Reference
+from designer.catalog.entries import DiodeEntry, OpAmp, ReferenceEntry
 from designer.model.circuit_table import CircuitSpec
 
 _SECTION = re.compile("[A-OQ-Z]")
@@ -42,7 +42,7 @@ def opamp_of(
     return catalog.opamp(spec.opamp)
 
 
-def diode_of(name: str, catalog: Catalog) -> Diode:
+def diode_of(name: str, catalog: Catalog) -> DiodeEntry:
     """The diode of this name, with the figures of a diode, in a case that the board takes.
 
     Raises
@@ -57,7 +57,7 @@ def diode_of(name: str, catalog: Catalog) -> Diode:
     return catalog.diode(name)
 
 
-def reference_of(spec: CircuitSpec, catalog: Catalog) -> Reference:
+def reference_of(spec: CircuitSpec, catalog: Catalog) -> ReferenceEntry:
     """The reference that a model file names: one that its rails can feed.
 
     Raises

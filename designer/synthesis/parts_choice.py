@@ -17,7 +17,7 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.progress import doing, part
 from designer.catalog.catalog import Catalog
 from designer.circuit.coefficients import EXACT
-from designer.circuit.design import Certificate, Check, Design
+from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
@@ -34,7 +34,7 @@ from designer.synthesis.attempt import (
     to_choose_from,
     zone_of_spec,
 )
-from designer.synthesis.limits import NO_AIMS, Aims, Limits, limits
+from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
 from designer.synthesis.linear_alternatives import best_beside
 from designer.synthesis.linear_search import LinearBlock
 from designer.synthesis.part_choice import diode_of, opamp_of, reference_of
@@ -46,12 +46,12 @@ ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Reached:
+class UncertifiedDesign:
     """A design that keeps the conditions, without its certificate's last word."""
 
     made: Attempt
     design: Design
-    limits: Limits
+    limits: ConditionLimits
 
 
 @dataclass(frozen=True)
@@ -129,13 +129,13 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
 
 def _reach(
     order: Order, kept: frozenset[str], found: Sequence[ModelResponse]
-) -> Reached | Shortfall:
+) -> UncertifiedDesign | Shortfall:
     """The best design that keeps these conditions, verified on its circuit.
 
     Bandwidth that is missing is sought in smaller gains first, in a slower time scale then.
     """
     answer = _rounds(order, kept, found, slower=False)
-    if isinstance(answer, Reached) or "bandwidth" not in kept or not answer.tightened:
+    if isinstance(answer, UncertifiedDesign) or "bandwidth" not in kept or not answer.tightened:
         return answer.short if isinstance(answer, Missed) else answer
     answer = _rounds(order, kept, found, slower=True)
     return answer.short if isinstance(answer, Missed) else answer
@@ -143,12 +143,12 @@ def _reach(
 
 def _rounds(
     order: Order, kept: frozenset[str], found: Sequence[ModelResponse], *, slower: bool
-) -> Reached | Missed:
+) -> UncertifiedDesign | Missed:
     """Search, verify, tighten what is not kept, and again."""
     within = limits(
         order.spec, kept, order.opamp, order.saturation, order.peaks.fastest, order.aims
     )
-    broken: list[Check] = []
+    broken: list[ConditionCheck] = []
     # Under the conditions as they are stated: later rounds search less than they allow.
     widest = linear_block(order, within, wishes_of(order.spec))
     if isinstance(widest, Shortfall):
@@ -163,7 +163,7 @@ def _rounds(
         )
         broken = [check for check in design.checks if not check.holds]
         if not broken:
-            return Reached(made, design, within)
+            return UncertifiedDesign(made, design, within)
         tighter = within.tightened(broken, design, slower=slower)
         if tighter == within:
             break
@@ -171,7 +171,9 @@ def _rounds(
     return Missed(Shortfall(broken[0].name, False), True)
 
 
-def _counted(order: Order, within: Limits, first: LinearBlock | None) -> Attempt | Shortfall:
+def _counted(
+    order: Order, within: ConditionLimits, first: LinearBlock | None
+) -> Attempt | Shortfall:
     """An attempt that keeps the limit on distinct values, where there is one.
 
     first : the linear block within these limits, where it is known. What is over the limit is
@@ -254,7 +256,7 @@ def _certificate(made: Attempt, widest: LinearBlock) -> Certificate:
 
 
 def _with_composites(
-    order: Order, reached: Reached, design: Design, found: Sequence[ModelResponse]
+    order: Order, reached: UncertifiedDesign, design: Design, found: Sequence[ModelResponse]
 ) -> Design:
     """The design with resistors of two parts where that lowers its error; or as it was."""
     better = composites.improve(order, reached.made)
@@ -277,7 +279,9 @@ def _with_composites(
     return replace(improved, certificate=certificate, binding=binding)
 
 
-def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> dict[str, float]:
+def _binding(
+    order: Order, reached: UncertifiedDesign, found: Sequence[ModelResponse]
+) -> dict[str, float]:
     """max_error without each condition that costs some; nothing where the error is none."""
     error, kept = reached.design.errors.max_error, order.spec.kept
     if error <= EXACT:
@@ -301,7 +305,7 @@ def _binding(order: Order, reached: Reached, found: Sequence[ModelResponse]) -> 
     return {name: cost for name, cost in costs.items() if cost < least}
 
 
-def _acts(order: Order, reached: Reached, name: str) -> bool:
+def _acts(order: Order, reached: UncertifiedDesign, name: str) -> bool:
     """Whether the search could notice that this condition is left out."""
     kept = order.spec.kept
     first, without = (
@@ -318,11 +322,11 @@ def _refuse(order: Order, short: Shortfall, found: Sequence[ModelResponse]) -> N
     kept, what = order.spec.kept, short.what
     guilty: list[str] = []
     doing("what leaves no choice")
-    if kept and isinstance(_reach(order, frozenset(), found), Reached):
+    if kept and isinstance(_reach(order, frozenset(), found), UncertifiedDesign):
         guilty = [
             name
             for name in SIDE_CONDITIONS
-            if name in kept and isinstance(_reach(order, kept - {name}, found), Reached)
+            if name in kept and isinstance(_reach(order, kept - {name}, found), UncertifiedDesign)
         ]
         names = ", ".join(guilty) or "several together"
         what += f"; side condition: {names}" if names != what else ""

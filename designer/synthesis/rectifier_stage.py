@@ -17,7 +17,7 @@ from designer.base.arrays import Array, Mask
 from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, outside
-from designer.synthesis.value_program import Ranking, Rows, choose, fewest
+from designer.synthesis.value_program import Ranking, TableRows, choose, fewest
 from designer.synthesis.value_tables import (
     ValueTable,
     between,
@@ -61,7 +61,7 @@ class Lists:
 
 
 @dataclass(frozen=True)
-class Limits:
+class ThresholdRange:
     """Ranges (low, high) of the threshold [V] and of the fv slope."""
 
     threshold: tuple[float, float]
@@ -84,7 +84,7 @@ def size(
         if name in every:
             every[name] = every[name][np.isclose(every[name], given, rtol=1e-9)]
     lists = Lists(names, every, tie)
-    best: tuple[float, Limits] | None = None
+    best: tuple[float, ThresholdRange] | None = None
     binding, looked_at, bound = "", 0, 0.0
     for number, (limits, last) in enumerate(_limits(target), start=1):
         doing(f"dead zone, range {number}")
@@ -114,23 +114,23 @@ def size(
     return "distinct values" if ranking.most is not None else "matched parts"
 
 
-def _limits(target: DeadZoneTarget) -> list[tuple[Limits, bool]]:
+def _limits(target: DeadZoneTarget) -> list[tuple[ThresholdRange, bool]]:
     """Ranges to try in turn; whether an answer inside them ends the search."""
     out = []
     for threshold, gain in ROOMS:
-        limits = Limits(
+        limits = ThresholdRange(
             (target.threshold / threshold, target.threshold),
             (target.output_gain / gain, target.output_gain),
         )
         out.append((limits, target.strict and threshold == ROOMS[-1][0]))
     if target.strict:
-        out.append((Limits((0.0, target.threshold), (0.0, target.output_gain)), True))
+        out.append((ThresholdRange((0.0, target.threshold), (0.0, target.output_gain)), True))
     else:
-        out.append((Limits((0.0, np.inf), (0.0, np.inf)), True))
+        out.append((ThresholdRange((0.0, np.inf), (0.0, np.inf)), True))
     return out
 
 
-def _pairs(target: DeadZoneTarget, lists: Lists, limits: Limits) -> tuple[ValueTable, str]:
+def _pairs(target: DeadZoneTarget, lists: Lists, limits: ThresholdRange) -> tuple[ValueTable, str]:
     """Every pair of input and feedback for which the other parts exist, and what binds if none."""
     source, _, feedback, _ = lists.names
     pairs = combinations((source, feedback), lists.of, lists.tie)
@@ -151,7 +151,7 @@ def _pairs(target: DeadZoneTarget, lists: Lists, limits: Limits) -> tuple[ValueT
 
 
 def _largest_reference(
-    target: DeadZoneTarget, lists: Lists, limits: Limits, inputs: Array
+    target: DeadZoneTarget, lists: Lists, limits: ThresholdRange, inputs: Array
 ) -> tuple[Array, str]:
     """For each R200 the largest R201 that will do, 0 where none will; and what binds."""
     low, high = _reference_range(target, limits, inputs)
@@ -165,7 +165,9 @@ def _largest_reference(
     return out, "reference current"
 
 
-def _reference_range(target: DeadZoneTarget, limits: Limits, inputs: Array) -> tuple[Array, Array]:
+def _reference_range(
+    target: DeadZoneTarget, limits: ThresholdRange, inputs: Array
+) -> tuple[Array, Array]:
     """Range of R201 = Vref R200/threshold for each R200."""
     volts = target.reference * inputs
     low = volts / limits.threshold[1] * (1.0 - 1e-9)
@@ -199,7 +201,7 @@ def _least(target: DeadZoneTarget, lists: Lists, pairs: ValueTable) -> float:
 
 
 def _choose(
-    target: DeadZoneTarget, lists: Lists, limits: Limits, level: float, ranking: Ranking
+    target: DeadZoneTarget, lists: Lists, limits: ThresholdRange, level: float, ranking: Ranking
 ) -> tuple[dict[str, float], str] | None:
     """The values with an error up to ``level`` that cvxpy prefers, and the solver's word."""
     main = _main_rows(target, lists, limits, level, ranking.free)
@@ -218,8 +220,12 @@ def _choose(
 
 
 def _main_rows(
-    target: DeadZoneTarget, lists: Lists, limits: Limits, level: float, free: frozenset[float]
-) -> Rows:
+    target: DeadZoneTarget,
+    lists: Lists,
+    limits: ThresholdRange,
+    level: float,
+    free: frozenset[float],
+) -> TableRows:
     """Rows of R200, R202, R50, R201 (and R206 where it equals one of them), at most ``ROWS``; the
     key is R201's place on its list."""
     source, reference, feedback, feed = lists.names
@@ -231,14 +237,14 @@ def _main_rows(
     table = pairs.take(row).beside(_column("R50", lists.of["R50"][hit]))
     total = gain[row] - stop[hit]
     error = np.maximum(np.maximum(low - total, total - high), 0.0)
-    rows = _equal(Rows(table, error, np.zeros(len(table), dtype=np.intp)), lists, "R50")
+    rows = _equal(TableRows(table, error, np.zeros(len(table), dtype=np.intp)), lists, "R50")
     rows = rows.take(fewest(rows, free, EXPANDED))
     allowed = lists.of[reference]
     row, hit = between(allowed, *_reference_range(target, limits, rows.table[source]))
     table = rows.table.take(row).beside(_column(reference, allowed[hit]))
     noise = 1.0 + table[feedback] * (1.0 / table[source] + 1.0 / table[reference])
     fine = noise <= target.noise_gain
-    rows = _equal(Rows(table, rows.error[row], hit), lists, reference, fine)
+    rows = _equal(TableRows(table, rows.error[row], hit), lists, reference, fine)
     if not lists.feed_is_tied:
         fed = _can_be_fed(target, lists.of[feed], rows.table[reference])
         rows = rows.take(np.flatnonzero(fed))
@@ -248,11 +254,13 @@ def _main_rows(
     current = _current(target, table[feed], table[reference])
     fine = inside(current, target.reference_current)
     fine &= np.isin(table[feed], lists.of[feed])
-    rows = Rows(table, rows.error, rows.key).take(np.flatnonzero(fine))
+    rows = TableRows(table, rows.error, rows.key).take(np.flatnonzero(fine))
     return rows.take(fewest(rows, free, ROWS))
 
 
-def _feed_rows(target: DeadZoneTarget, lists: Lists, main: Rows, free: frozenset[float]) -> Rows:
+def _feed_rows(
+    target: DeadZoneTarget, lists: Lists, main: TableRows, free: frozenset[float]
+) -> TableRows:
     """For each R201 of the rows the feeds that will do: known values first, then the largest."""
     reference, feed = lists.names[1], lists.names[3]
     known = np.array(sorted({*free, *np.unique(main.table.values).tolist()}))
@@ -265,10 +273,10 @@ def _feed_rows(target: DeadZoneTarget, lists: Lists, main: Rows, free: frozenset
         found.append((fine[order[:FEEDS]], int(key)))
     values = np.concatenate([v for v, _ in found])
     keys = np.concatenate([np.full(len(v), key) for v, key in found])
-    return Rows(_column(feed, values), np.zeros(len(values)), keys)
+    return TableRows(_column(feed, values), np.zeros(len(values)), keys)
 
 
-def _equal(rows: Rows, lists: Lists, name: str, fine: Mask | None = None) -> Rows:
+def _equal(rows: TableRows, lists: Lists, name: str, fine: Mask | None = None) -> TableRows:
     """The rows where a new column equals the columns that it is tied to."""
     keep: Mask = np.ones(len(rows), dtype=bool) if fine is None else fine
     for other in rows.table.names:

@@ -6,8 +6,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.synthesis.saturating_stage import bias, quiet, steep
-from designer.synthesis.saturating_tables import Tables
-from designer.synthesis.value_program import Ranking, Rows, Rule, choose, fewest
+from designer.synthesis.saturating_tables import SaturatingTables
+from designer.synthesis.value_program import Ranking, TableRows, ValueRule, choose, fewest
 from designer.synthesis.value_tables import (
     DIGITS,
     ValueTable,
@@ -26,7 +26,9 @@ GROWTH = 3.0
 """Of the level, where no row keeps the rules that tie two tables."""
 
 
-def rows_within(t: Tables, level: float, sure: float, free: frozenset[float]) -> tuple[Rows, Rows]:
+def rows_within(
+    t: SaturatingTables, level: float, sure: float, free: frozenset[float]
+) -> tuple[TableRows, TableRows]:
     """Rows of (R206, R207, R209, R210, R50) and of the rest, with a common u and errors inside
     ``level``; where there are more than the program can hold, those with the fewest new values.
 
@@ -38,7 +40,7 @@ def rows_within(t: Tables, level: float, sure: float, free: frozenset[float]) ->
     known = int(np.argmin(np.abs(t.u - sure)))
     if known in keys:
         keys = [known, *(k for k in keys if k != known)]
-    found: list[Rows] = []
+    found: list[TableRows] = []
     for key in keys[:TRIES]:
         rows = _null_rows(t, key, level, free)
         if len(rows):
@@ -48,8 +50,8 @@ def rows_within(t: Tables, level: float, sure: float, free: frozenset[float]) ->
     names = _null_names(t)
     if not found:
         none = ValueTable(names, np.zeros((0, len(names))))
-        return slopes, Rows(none, np.zeros(0), np.zeros(0, dtype=np.intp))
-    nulls = Rows(
+        return slopes, TableRows(none, np.zeros(0), np.zeros(0, dtype=np.intp))
+    nulls = TableRows(
         ValueTable(names, np.concatenate([r.table.values for r in found])),
         np.concatenate([r.error for r in found]),
         np.concatenate([r.key for r in found]),
@@ -62,12 +64,14 @@ def rows_within(t: Tables, level: float, sure: float, free: frozenset[float]) ->
     return slopes.take(np.concatenate(kept)), nulls
 
 
-def _null_names(t: Tables) -> tuple[str, ...]:
+def _null_names(t: SaturatingTables) -> tuple[str, ...]:
     extra = () if t.shift is None else ("R211", "R212")
     return ("R200", "R201", "R202", "R203", "R204", "R205", "R208", *extra)
 
 
-def _slope_rows(t: Tables, level: float, sure: float, free: frozenset[float]) -> Rows:
+def _slope_rows(
+    t: SaturatingTables, level: float, sure: float, free: frozenset[float]
+) -> TableRows:
     low, high = np.log(t.target.slope)
     u = np.round(t.left_logs, DIGITS)
     q = t.right_logs  # ascending, as the rows of the table are
@@ -81,10 +85,10 @@ def _slope_rows(t: Tables, level: float, sure: float, free: frozenset[float]) ->
     total = u[i] + t.right_logs[j]
     error = np.maximum(np.maximum(low - total, total - high), 0.0)
     table = t.left.take(i).beside(t.right.take(j))
-    return Rows(table, error, np.searchsorted(t.u, u[i] - 1e-12))
+    return TableRows(table, error, np.searchsorted(t.u, u[i] - 1e-12))
 
 
-def _null_rows(t: Tables, key: int, level: float, free: frozenset[float]) -> Rows:
+def _null_rows(t: SaturatingTables, key: int, level: float, free: frozenset[float]) -> TableRows:
     """The rows for one u, at most ``ROWS`` and the one of least error."""
     rows, _ = null_rows(t, key, level, free, NULLS)
     if len(rows) == 0:
@@ -93,8 +97,12 @@ def _null_rows(t: Tables, key: int, level: float, free: frozenset[float]) -> Row
 
 
 def null_rows(
-    t: Tables, key: int, level: float, free: frozenset[float] = frozenset(), most: int = EXPANDED
-) -> tuple[Rows, bool]:
+    t: SaturatingTables,
+    key: int,
+    level: float,
+    free: frozenset[float] = frozenset(),
+    most: int = EXPANDED,
+) -> tuple[TableRows, bool]:
     """Every row of R200 … R205, R208 (and R211, R212) for one u with errors inside ``level``, and
     whether some with many new values had to be left out."""
     steep, i, j = t.steep_logs
@@ -119,11 +127,11 @@ def null_rows(
     error = t.target.mu * np.abs(wanted[a] - d[hit])
     if t.shift is not None:
         table, error = _with_shift(t, near, table, error, u, level)
-    return Rows(table, error, np.full(len(table), key)), cut
+    return TableRows(table, error, np.full(len(table), key)), cut
 
 
 def _with_shift(
-    t: Tables, near: ValueTable, table: ValueTable, error: Array, u: float, level: float
+    t: SaturatingTables, near: ValueTable, table: ValueTable, error: Array, u: float, level: float
 ) -> tuple[ValueTable, Array]:
     """The rows completed by R211 and R212 with the same R200, their bias error counted."""
     order = np.argsort(near["R200"], kind="stable")
@@ -140,7 +148,7 @@ def _with_shift(
     return both.take(good), worst[good]
 
 
-def noise_rules(t: Tables, slopes: Rows, nulls: Rows) -> list[Rule]:
+def noise_rules(t: SaturatingTables, slopes: TableRows, nulls: TableRows) -> list[ValueRule]:
     """U3D's noise gain 1 + R210/R209 + R210/(R208 + R204 || R205), as one rule in logarithms."""
     if not np.isfinite(t.box.noise_gain):
         return []
@@ -149,11 +157,11 @@ def noise_rules(t: Tables, slopes: Rows, nulls: Rows) -> list[Rule]:
     # Where R209 alone takes all of it, no row of the other table will do.
     need = np.where(rest > 0.0, np.log(s["R210"] / np.where(rest > 0.0, rest, 1.0)), 1e3)
     have = np.log(quiet(n.columns))
-    return [Rule((-need, have), -1e-9, np.inf)]
+    return [ValueRule((-need, have), -1e-9, np.inf)]
 
 
 def pick(
-    t: Tables, least: float, u: float, ranking: Ranking, last: float
+    t: SaturatingTables, least: float, u: float, ranking: Ranking, last: float
 ) -> tuple[dict[str, float], str] | None:
     """Values that keep every rule, with the error as small as the program finds; and its word."""
     level = max(least, ranking.tolerance) + ranking.slack

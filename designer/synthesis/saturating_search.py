@@ -19,8 +19,8 @@ from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_
 from designer.synthesis.equal_parts import Ties, tied_lists
 from designer.synthesis.saturating_tables import (
     MOST_SHIFT,
-    Box,
-    Tables,
+    SaturatingTables,
+    SearchBox,
     box,
     free_box,
     relaxed_errors,
@@ -56,7 +56,7 @@ ATOMS = (
 
 
 @dataclass(frozen=True)
-class Stage:
+class SearchStage:
     """One stage of the search: the values of each part and the ranges.
 
     slope, whole : whether the slope's tables, or all, hold every value that the conditions leave.
@@ -64,7 +64,7 @@ class Stage:
     """
 
     lists: Mapping[str, Array]
-    box: Box
+    box: SearchBox
     slope: bool = False
     whole: bool = False
     rescue: bool = False
@@ -75,7 +75,7 @@ class Search:
     """What the stages found: the tables with the least error, a bound that holds for the whole
     catalogue, rows looked at, and where there is nothing, the condition that binds."""
 
-    best: tuple[Tables, Least] | None
+    best: tuple[SaturatingTables, Least] | None
     bound: float
     looked_at: int
     binding: str
@@ -117,7 +117,7 @@ def size(
 
 
 def _search(
-    target: DeadZoneTarget, stage: Stage, ties: Ties, free: frozenset[float], so_far: Search
+    target: DeadZoneTarget, stage: SearchStage, ties: Ties, free: frozenset[float], so_far: Search
 ) -> Search:
     """One stage, for every value of the parts that are tied across tables."""
     best, looked_at, binding = so_far.best, so_far.looked_at, so_far.binding
@@ -187,7 +187,7 @@ def _answer(
 
 def _stages(
     target: DeadZoneTarget, resistors: Array, base: float, free: frozenset[float], ties: Ties
-) -> Iterator[Stage]:
+) -> Iterator[SearchStage]:
     near, far = (box(target, *room) for room in ROOMS)
     names = parts_of(target.kind, target.sides)
     heavy = resistors[resistors >= target.load]
@@ -199,19 +199,19 @@ def _stages(
     given = {name: every[name] for name in ties.value}
     slopes = every | some | given | {name: every[name] for name in ("R206", "R209")}
     fits = len(resistors) ** 3 <= LARGEST
-    yield Stage(every | few | given, near)
-    yield Stage(every | few | given, far)
-    yield Stage(every | some | given, far)
-    yield Stage(slopes, far, slope=target.strict)
+    yield SearchStage(every | few | given, near)
+    yield SearchStage(every | few | given, far)
+    yield SearchStage(every | some | given, far)
+    yield SearchStage(slopes, far, slope=target.strict)
     if target.strict:
         if fits:
-            yield Stage(every, far, whole=True)
+            yield SearchStage(every, far, whole=True)
         last = box(target, *OPEN)
     else:
         last = free_box(target)
-        yield Stage(slopes, replace(last, steep=far.steep), slope=True)
+        yield SearchStage(slopes, replace(last, steep=far.steep), slope=True)
     lists = every if fits else slopes
-    yield Stage(lists, last, slope=True, whole=fits, rescue=target.strict)
+    yield SearchStage(lists, last, slope=True, whole=fits, rescue=target.strict)
 
 
 def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
@@ -237,7 +237,7 @@ class Least:
     looked_at: int
 
 
-def least_error(t: Tables, tolerance: float, most: float) -> Least:
+def least_error(t: SaturatingTables, tolerance: float, most: float) -> Least:
     """The minimum over every row of the tables, sought below ``most``."""
     error = relaxed_errors(t)
     steep = distinct(t.steep_logs[0])
@@ -266,7 +266,7 @@ def least_error(t: Tables, tolerance: float, most: float) -> Least:
     return Least(best, where, min(best, floor), looked_at)
 
 
-def _joint_error(t: Tables, key: int, start: float, most: float) -> tuple[float, bool]:
+def _joint_error(t: SaturatingTables, key: int, start: float, most: float) -> tuple[float, bool]:
     """Least of the larger of null and bias error for one u, infinite above ``most``; and whether
     rows were left out on the way."""
     level, cut = max(start, EXACT), False

@@ -43,7 +43,7 @@ LEAST_SECOND = 1.15
 
 
 @dataclass(frozen=True)
-class Box:
+class SearchBox:
     """Ranges (low, high) of A+, A-, R50 [ohm] and, one-sided, c/Esat; least gain of U3B; limit of
     the noise gain."""
 
@@ -55,12 +55,12 @@ class Box:
     noise_gain: float
 
 
-def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) -> Box:
+def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) -> SearchBox:
     """The ranges where threshold, A- and fv slope are within these factors of their largest."""
     kappa = target.shift[0], min(target.shift[1], MOST_SHIFT)
     top = target.saturation * (1.0 - kappa[0]) / target.threshold
     wanted = target.slope[1]
-    return Box(
+    return SearchBox(
         steep=(max(top, LEAST_STEEP), max(top, LEAST_STEEP) * threshold),
         linear=(target.linear_gain / linear, target.linear_gain),
         stop=(target.output_gain / wanted / output, target.output_gain / wanted),
@@ -70,9 +70,9 @@ def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) 
     )
 
 
-def free_box(target: DeadZoneTarget) -> Box:
+def free_box(target: DeadZoneTarget) -> SearchBox:
     """No limits but those without which the stage is no dead zone."""
-    return Box(
+    return SearchBox(
         (LEAST_STEEP, np.inf),
         (0.0, np.inf),
         (0.0, np.inf),
@@ -83,11 +83,11 @@ def free_box(target: DeadZoneTarget) -> Box:
 
 
 @dataclass(frozen=True)
-class Tables:
+class SaturatingTables:
     """The tables of one search; every row keeps its own conditions of the box."""
 
     target: DeadZoneTarget
-    box: Box
+    box: SearchBox
     left: ValueTable
     right: ValueTable
     first: ValueTable
@@ -168,10 +168,10 @@ def tables(
     target: DeadZoneTarget,
     lists: Mapping[str, Array],
     tie: Mapping[str, str],
-    limits: Box,
+    limits: SearchBox,
     free: frozenset[float],
     level: float = np.inf,
-) -> Tables:
+) -> SaturatingTables:
     """The tables of these lists. Of rows with the same logarithm, that with the fewest values that
     are not ``free`` stays; of R206, R207, R209 only rows with a slope error up to ``level``."""
     gain = limits.noise_gain
@@ -197,7 +197,7 @@ def tables(
             (ratio * limits.steep[1] >= limits.shift[0])
             & (ratio * limits.steep[0] <= limits.shift[1])
         )
-    out = Tables(target, limits, left, right, first, second, divider, shift)
+    out = SaturatingTables(target, limits, left, right, first, second, divider, shift)
     if shift is None:  # otherwise R200 stands in the bias too: equal ratios are not the same
         first = _fewest_of_each(first, np.log(first["R201"] / first["R200"]), free)
     return replace(
@@ -215,7 +215,7 @@ def _left(
     target: DeadZoneTarget,
     lists: Mapping[str, Array],
     tie: Mapping[str, str],
-    limits: Box,
+    limits: SearchBox,
     free: frozenset[float],
     right: ValueTable,
     level: float,
@@ -263,13 +263,13 @@ def _fewest_of_each(
     return table.take(both[np.argsort(np.round(logs[both], DIGITS), kind="stable")])
 
 
-def slope_errors(t: Tables) -> Array:
+def slope_errors(t: SaturatingTables) -> Array:
     """(k,) for each u the least slope error."""
     low, high = np.log(t.target.slope)
     return distance(t.right_logs, low - t.u, high - t.u)
 
 
-def relaxed_errors(t: Tables) -> Array:
+def relaxed_errors(t: SaturatingTables) -> Array:
     """(k,) for each u a lower bound of the largest of slope and bias error."""
     error = slope_errors(t)
     if t.shift is None:

@@ -24,7 +24,7 @@ ERROR_WEIGHT = 1e-4
 
 
 @dataclass(frozen=True)
-class Rows:
+class TableRows:
     """One table of the program: its values, the error of each row, and a key that the rows chosen
     from all tables must share."""
 
@@ -35,13 +35,13 @@ class Rows:
     def __len__(self) -> int:
         return len(self.table)
 
-    def take(self, which: Index) -> Rows:
+    def take(self, which: Index) -> TableRows:
         """The rows of an index array."""
-        return Rows(self.table.take(which), self.error[which], self.key[which])
+        return TableRows(self.table.take(which), self.error[which], self.key[which])
 
 
 @dataclass(frozen=True)
-class Rule:
+class ValueRule:
     """low <= sum over the tables of the chosen row's weight <= high."""
 
     weights: tuple[Array, ...]
@@ -73,7 +73,9 @@ class Pick:
     solver: str
 
 
-def choose(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> Pick | None:
+def choose(
+    tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking
+) -> Pick | None:
     """Rows with the same key that keep every rule; None where there are none."""
     tables, kept = _shared_keys(tables)
     if any(len(t) == 0 for t in tables):
@@ -106,13 +108,15 @@ def choose(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> P
     return Pick(found, reached, f"HiGHS: {word}")
 
 
-def _of_rows(rule: Rule, kept: Sequence[Index]) -> Rule:
+def _of_rows(rule: ValueRule, kept: Sequence[Index]) -> ValueRule:
     """The rule for the rows that are kept of each table."""
-    return Rule(tuple(w[k] for w, k in zip(rule.weights, kept, strict=True)), rule.low, rule.high)
+    return ValueRule(
+        tuple(w[k] for w, k in zip(rule.weights, kept, strict=True)), rule.low, rule.high
+    )
 
 
 def _promising(
-    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, limit: float
+    tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking, limit: float
 ) -> list[Index]:
     """Places of the rows that stand in some choice inside the limit with the fewest new values.
 
@@ -131,7 +135,9 @@ def _promising(
     return _joined(kept, inside)
 
 
-def _few_enough(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking) -> list[Index]:
+def _few_enough(
+    tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking
+) -> list[Index]:
     """Places of the rows that stand in a choice of least error among those with at most
     ``ranking.most`` new values; none where there is no such choice."""
     every = [np.arange(len(t)) for t in tables]
@@ -149,7 +155,10 @@ def _few_enough(tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking)
 
 
 def _counted(
-    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, places: Sequence[Index]
+    tables: Sequence[TableRows],
+    rules: Sequence[ValueRule],
+    ranking: Ranking,
+    places: Sequence[Index],
 ) -> Iterator[tuple[list[Index], Index]]:
     """For each key the choices that keep the rules, and how many new values each has."""
     for key in np.unique(tables[0].key):
@@ -171,7 +180,7 @@ def _joined(kept: Sequence[Sequence[Index]], without: list[Index]) -> list[Index
     return [np.unique(np.concatenate(places)) for places in zip(*kept, strict=True)]
 
 
-def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:
+def _shared_keys(tables: Sequence[TableRows]) -> tuple[list[TableRows], list[Index]]:
     """The rows whose key every table has, and their places."""
     common = tables[0].key
     for t in tables[1:]:
@@ -181,7 +190,7 @@ def _shared_keys(tables: Sequence[Rows]) -> tuple[list[Rows], list[Index]]:
 
 
 def _kinds(
-    tables: Sequence[Rows], picks: Sequence[cp.Variable], ranking: Ranking
+    tables: Sequence[TableRows], picks: Sequence[cp.Variable], ranking: Ranking
 ) -> tuple[cp.Variable, Any, list[object]]:
     """One variable per value that is not free, at least as large as the use made of it."""
     every = np.unique(np.concatenate([t.table.values.ravel() for t in tables]))
@@ -202,7 +211,7 @@ def _kinds(
 
 
 def _solve(
-    tables: Sequence[Rows], rules: Sequence[Rule], ranking: Ranking, limit: float | None
+    tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking, limit: float | None
 ) -> tuple[tuple[int, ...], str] | None:
     """Rows of least error; with a ``limit`` of the error, of fewest values and least price."""
     picks = [cp.Variable(len(t), boolean=True) for t in tables]
@@ -236,7 +245,7 @@ def _solve(
     return tuple(int(np.argmax(z.value)) for z in picks), str(problem.status)
 
 
-def fewest(rows: Rows, free: frozenset[float], most: int) -> Index:
+def fewest(rows: TableRows, free: frozenset[float], most: int) -> Index:
     """Places of the ``most`` rows with the fewest new values, then the smallest error."""
     count = new_values(rows.table.values, free)
     return np.lexsort((rows.error, count))[:most]

@@ -14,10 +14,10 @@ from .blame_extent import (
     BUDGET as BUDGET,
 )
 from .blame_pieces import (
-    Pieces as Pieces,
+    StoredParts as StoredParts,
 )
 from .blame_replay import (
-    Subject as Subject,
+    BlamedPart as BlamedPart,
 )
 from .blame_status import (
     BlameStage as BlameStage,
@@ -59,13 +59,13 @@ from .ngspice_sampling import (
     OWN_SAMPLES as OWN_SAMPLES,
     Ask as Ask,
     Hearing as Hearing,
-    Kind as Kind,
-    Outcome as Outcome,
+    NgspiceVerdict as NgspiceVerdict,
+    StartKind as StartKind,
     Why as Why,
     survives as survives,
 )
 from .power_up_yield import (
-    Reached as Reached,
+    PowerUpAnswer as PowerUpAnswer,
     reached_block as reached_block,
 )
 from .row_store import (

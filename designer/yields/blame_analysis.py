@@ -23,8 +23,8 @@ from typing import Any
 from designer.base.plain_json import plain
 from designer.yields import margins as smooth
 from designer.yields.blame_extent import extent_of
-from designer.yields.blame_pieces import Pieces
-from designer.yields.blame_replay import KEPT, LOST, Subject as Subject, replay
+from designer.yields.blame_pieces import StoredParts
+from designer.yields.blame_replay import KEPT, LOST, BlamedPart as BlamedPart, replay
 from designer.yields.corners import Corner, worst_corners
 from designer.yields.margins import Margin, Prediction
 from designer.yields.sobol import Index, sobol
@@ -54,7 +54,7 @@ class ResponseBlame:
 
     question: int
     lost: int
-    subjects: tuple[Subject, ...]
+    subjects: tuple[BlamedPart, ...]
     indices: tuple[Index, ...]
     limits: tuple[NearLimit, ...]
     prediction: Prediction
@@ -104,7 +104,7 @@ def blame(
     budget: int | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-    pieces: Pieces | None = None,
+    pieces: StoredParts | None = None,
 ) -> Blame:
     """Blame the parts for the losses among these answers (as built, exact rung).
 
@@ -124,7 +124,7 @@ def blame(
 
         return step
 
-    pieces = Pieces() if pieces is None else pieces
+    pieces = StoredParts() if pieces is None else pieces
     extent = extent_of(plan, answers, budget, lost=lost, kept=kept)
     boards, rows = extent.boards, extent.rows
     subjects, cut = replay(
@@ -182,7 +182,7 @@ def blame(
     )
 
 
-def _skipped(row: Sequence[Answer], subjects: Sequence[Subject], cut: bool) -> str:
+def _skipped(row: Sequence[Answer], subjects: Sequence[BlamedPart], cut: bool) -> str:
     """Why the boards of one question were not replayed, or not all of them."""
     lost = [a for a in row if a.verdict is Verdict.LOST]
     if not lost:
@@ -199,7 +199,7 @@ def _skipped(row: Sequence[Answer], subjects: Sequence[Subject], cut: bool) -> s
 
 
 def _sentence(
-    row: Sequence[Answer], subjects: Sequence[Subject], indices: Sequence[Index], margin: Margin
+    row: Sequence[Answer], subjects: Sequence[BlamedPart], indices: Sequence[Index], margin: Margin
 ) -> str:
     """What limits the response, in one line."""
     nearest = margin.limits[0] if margin.limits else None

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from designer.circuit.board_arrays import Boards
 from designer.spread.board_quantities import quantities
 from designer.spread.spread import draw_many
-from designer.yields.blame_replay import KEPT, LOST, Change, Replay, changes, replays
+from designer.yields.blame_replay import KEPT, LOST, ExactChange, Replay, changes, replays
 from designer.yields.corners import CORNER
 from designer.yields.crossings import ROUNDS
 from designer.yields.margins import lost_boards
@@ -37,7 +37,7 @@ class Extent:
 
     boards: Boards
     rows: tuple[tuple[Answer, ...], ...]
-    made: tuple[Change, ...]
+    made: tuple[ExactChange, ...]
     replays: tuple[Replay, ...]
     crossings: tuple[tuple[int, int], ...]
     steps: int

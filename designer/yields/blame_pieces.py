@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 Value = TypeVar("Value")
 
 
-class Pieces:
+class StoredParts:
     """Finished parts by name; this one forgets everything that is put into it."""
 
     def get(self, name: str) -> Any | None:
@@ -20,7 +20,7 @@ class Pieces:
 
 
 def counted(
-    pieces: Pieces,
+    pieces: StoredParts,
     name: str,
     progress: Callable[[], None],
     make: Callable[[Callable[[], None]], Value],

@@ -21,7 +21,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor, Section
 from designer.spread.board_quantities import exact_in, quantities
-from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_pieces import StoredParts
 from designer.yields.verdict import Answer, StudyPlan, Verdict, judge
 
 LOST, KEPT = 50, 20
@@ -37,7 +37,7 @@ _VERDICTS = {str(verdict)[0]: verdict for verdict in Verdict}
 
 
 @dataclass(frozen=True)
-class Subject:
+class BlamedPart:
     """A part or a group that was made exact, and what became of the boards.
 
     kind : "resistor", "capacitor", "op-amp", "reference", "supply" or "group". avoided of replayed
@@ -64,7 +64,7 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Change:
+class ExactChange:
     """A part or a group that is made exact on boards that are replayed.
 
     parts : that get their nominal values. fields : of ``Boards`` that are nominal on every part.
@@ -117,23 +117,23 @@ def replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[Rep
     return sorted(found, key=lambda r: (r.turn, r.question, r.sample))
 
 
-def changes(circuit: Circuit, boards: Boards) -> list[Change]:
+def changes(circuit: Circuit, boards: Boards) -> list[ExactChange]:
     """Every part that differs between these boards, and the groups of them."""
     differing = {q.part for q in quantities(circuit, boards)}
     differing |= {s.name for s in circuit.sections if s.name in boards.low}
     kinds = {p.name: _KINDS[type(p)] for p in circuit.parts if type(p) in _KINDS}
     kinds |= {rail.name: "supply" for rail in circuit.rails}
-    out = [Change(n, k, (n,)) for n, k in kinds.items() if n in differing]
+    out = [ExactChange(n, k, (n,)) for n, k in kinds.items() if n in differing]
 
     def group(name: str, parts: Iterable[str]) -> None:
         parts = tuple(p for p in parts if p in differing)
         if len(parts) > 1:
-            out.append(Change(name, "group", parts))
+            out.append(ExactChange(name, "group", parts))
 
     if len({q.part for q in quantities(circuit, boards) if q.group == "offset"}) > 1:
-        out.append(Change("all offsets", "group", fields=("offset",)))
+        out.append(ExactChange("all offsets", "group", fields=("offset",)))
     if boards.low:
-        out.append(Change("all output limits", "group", fields=("low", "high")))
+        out.append(ExactChange("all output limits", "group", fields=("low", "high")))
     resistors = [r.name for r in circuit.resistors]
     dead_zone = [n for n in resistors if _DEAD_ZONE.fullmatch(n)]
     group("resistors of the dead zone", dead_zone)
@@ -156,12 +156,12 @@ def replay(
     plan: StudyPlan,
     boards: Boards,
     todo: Sequence[Replay],
-    made: Sequence[Change],
+    made: Sequence[ExactChange],
     hopeless: Sequence[bool],
-    pieces: Pieces,
+    pieces: StoredParts,
     jobs: int,
     progress: Callable[[], None],
-) -> tuple[list[tuple[Subject, ...]], list[bool]]:
+) -> tuple[list[tuple[BlamedPart, ...]], list[bool]]:
     """The subjects of each question, most losses avoided first; and whether its replays were cut
     short.
 
@@ -183,8 +183,8 @@ def _all(
     plan: StudyPlan,
     boards: Boards,
     todo: Sequence[Replay],
-    made: Sequence[Change],
-    pieces: Pieces,
+    made: Sequence[ExactChange],
+    pieces: StoredParts,
     jobs: int,
     progress: Callable[[], None],
 ) -> dict[Replay, list[Verdict]]:
@@ -209,7 +209,7 @@ def _some(
     plan: StudyPlan,
     boards: Boards,
     some: Sequence[Replay],
-    made: Sequence[Change],
+    made: Sequence[ExactChange],
     jobs: int,
     progress: Callable[[], None],
 ) -> list[list[Verdict]]:
@@ -220,7 +220,7 @@ def _some(
     questions = [plan.questions[r.question] for r in some]
     starts = np.array([q.start.start for q in questions])
 
-    def one(change: Change) -> list[Verdict]:
+    def one(change: ExactChange) -> list[Verdict]:
         orbits = Ensemble(change.of(drawn)).settle(
             [place[r.sample] for r in some],
             [q.excitation.drive for q in questions],
@@ -234,8 +234,8 @@ def _some(
 
 
 def _subjects(
-    question: int, made: Sequence[Change], seen: dict[Replay, list[Verdict]]
-) -> tuple[Subject, ...]:
+    question: int, made: Sequence[ExactChange], seen: dict[Replay, list[Verdict]]
+) -> tuple[BlamedPart, ...]:
     own = {r: verdicts for r, verdicts in seen.items() if r.question == question}
     if not own:
         return ()
@@ -247,5 +247,5 @@ def _subjects(
             for before in (Verdict.LOST, Verdict.OK)
         )
         avoided, caused = tally[Verdict.LOST, Verdict.OK], tally[Verdict.OK, Verdict.LOST]
-        out.append(Subject(change.name, change.kind, avoided, replayed, caused, kept))
+        out.append(BlamedPart(change.name, change.kind, avoided, replayed, caused, kept))
     return tuple(sorted(out, key=lambda s: (-s.avoided, s.caused, s.name)))

@@ -18,7 +18,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.board_quantities import column
 from designer.spread.spread import BOARD
-from designer.yields.blame_pieces import Pieces, counted
+from designer.yields.blame_pieces import StoredParts, counted
 from designer.yields.margins import Margin
 from designer.yields.sobol import Index
 from designer.yields.verdict import StudyPlan, Verdict, judge
@@ -53,13 +53,13 @@ def worst_corners(
     indices: Sequence[Sequence[Index]],
     jobs: int,
     progress: Callable[[], None],
-    pieces: Pieces | None = None,
+    pieces: StoredParts | None = None,
 ) -> list[Corner | None]:
     """For each question the corners of its ``CORNER`` largest indices, on the exact rung; None
     where nothing limits. progress : called once an attractor. pieces : what is known already, and
     where the rest goes.
     """
-    pieces = Pieces() if pieces is None else pieces
+    pieces = StoredParts() if pieces is None else pieces
     out: list[Corner | None] = []
     for number, (margin, ranked) in enumerate(zip(margins, indices, strict=True)):
 

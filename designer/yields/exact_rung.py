@@ -14,7 +14,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_four_state import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spread.spread import draw_many
 from designer.yields.verdict import Answer, StudyPlan, judge, kept
 
@@ -41,12 +41,12 @@ def of_boards(
     return [answer for answer, _, _ in _asked(plan, boards, indices, jobs, progress)]
 
 
-def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, Subject | None]]:
+def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, GateSubject | None]]:
     """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
     return [
         (
             answer,
-            Subject(boards.reduction(answer.sample - indices.start), excitation, orbit)
+            GateSubject(boards.reduction(answer.sample - indices.start), excitation, orbit)
             if len(orbit.start)
             else None,
         )

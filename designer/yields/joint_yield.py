@@ -9,7 +9,7 @@ from typing import Protocol
 from designer.yields.verdict import Verdict, Yield
 
 
-class Row(Protocol):
+class JudgedSample(Protocol):
     """A verdict on one response of one sample: as built, tuned or reached."""
 
     @property
@@ -23,7 +23,7 @@ WORST_FIRST = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
 """What decides for a board: one response lost is one too many, whatever the others are."""
 
 
-def all_on_one(rows: Iterable[Row], census: bool = False) -> Yield:
+def all_on_one(rows: Iterable[JudgedSample], census: bool = False) -> Yield:
     """Boards by the worst verdict among their rows, which hold every wanted response once.
 
     census : see ``Yield``.

@@ -15,7 +15,7 @@ from designer.model.tuning_bands import Bands
 from designer.spice.pool import SpicePool
 from designer.yields import exact_rung, ngspice_runs
 from designer.yields.ngspice_sampling import Ask, Hearing
-from designer.yields.power_up_yield import Reached, reached_block
+from designer.yields.power_up_yield import PowerUpAnswer, reached_block
 from designer.yields.row_store import BlockStore, Row
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import DcTrim, Trimmed, trimmed_block
@@ -89,7 +89,7 @@ class PowerUps:
     def __init__(self, plan: StudyPlan, recipes: Sequence[Recipe], indices: range) -> None:
         self.plan, self.recipes, self.indices = plan, tuple(recipes), indices
 
-    def __call__(self, jobs: int, progress: Step) -> list[Reached]:
+    def __call__(self, jobs: int, progress: Step) -> list[PowerUpAnswer]:
         return reached_block(self.plan, self.indices, self.recipes, jobs, progress)
 
 

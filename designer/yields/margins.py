@@ -28,12 +28,12 @@ from designer.base.threads import parallel
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Circuit, nominal_board
-from designer.dynamics.continued_orbit import Followed, Function, follow, functions
+from designer.dynamics.continued_orbit import ContinuedOrbit, Function, follow, functions
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
-from designer.yields.blame_pieces import Pieces, counted
+from designer.yields.blame_pieces import StoredParts, counted
 from designer.yields.crossings import ROUNDS, Crossing, crossings
 from designer.yields.verdict import Answer, Question, Verdict
 
@@ -129,7 +129,7 @@ def margins(
     only: Collection[tuple[int, int]] | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-    pieces: Pieces | None = None,
+    pieces: StoredParts | None = None,
 ) -> tuple[Margin, ...]:
     """The margin of each question.
 
@@ -139,7 +139,7 @@ def margins(
     orbit. pieces : what is known already, and where the rest goes.
     """
     differing = quantities(circuit, boards)
-    pieces = Pieces() if pieces is None else pieces
+    pieces = StoredParts() if pieces is None else pieces
     wanted = [pair for pair in lost_boards(answers, count) if only is None or pair in only]
     met = _met(boards, wanted, questions, pieces, jobs, progress)
     nominal = Boards.of(circuit, [nominal_board(circuit)])
@@ -188,7 +188,7 @@ def _met(
     boards: Boards,
     wanted: Sequence[tuple[int, int]],
     questions: Sequence[Question],
-    pieces: Pieces,
+    pieces: StoredParts,
     jobs: int,
     progress: Callable[[], None],
 ) -> list[Crossing]:
@@ -242,10 +242,10 @@ def _probes(board: Boards, differing: Sequence[Quantity]) -> Ensemble:
     return Ensemble(rows)
 
 
-def _follow(base: _Base, ensemble: Ensemble, jobs: int) -> list[Followed | None]:
+def _follow(base: _Base, ensemble: Ensemble, jobs: int) -> list[ContinuedOrbit | None]:
     """The base's orbit on each of these boards."""
 
-    def one(index: int) -> Followed | None:
+    def one(index: int) -> ContinuedOrbit | None:
         try:
             flow = Flow(ensemble.reduction(index).system(), base.drive)
             return follow(flow, base.orbit.start, base.orbit.n)

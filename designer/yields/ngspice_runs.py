@@ -19,13 +19,13 @@ from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.spice import convergence_aids as remedies, numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.yields import exact_rung
-from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, Kind, is_answer
+from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, StartKind, is_answer
 from designer.yields.verdict import StudyPlan
 
 UNKNOWN_PERIODS = 20
@@ -52,14 +52,14 @@ class Query:
     """One run of ngspice. expected : the exact circuit's response. refinements : how often the
     step is halved at most."""
 
-    subject: Subject
+    subject: GateSubject
     settings: SolverSettings
     expected: str
     refinements: int = OWN_REFINEMENTS
 
 
 @dataclass(frozen=True)
-class Heard:
+class NgspiceAnswer:
     """What ngspice said: n-p-q, status or `UNDECIDED`, with the reason and the remedies of the last
     run. An undecided one's reason has both answers, as has ``either`` if both are any."""
 
@@ -95,7 +95,7 @@ def hear(
         if subject is None or question.settings is None:
             continue
         halvings = OWN_REFINEMENTS
-        if ask.kind is Kind.NOMINAL:
+        if ask.kind is StartKind.NOMINAL:
             way = periods_to_settle(_flow(subject), question.start.start, subject.orbit)
             if way > MOST_PERIODS:
                 heard[k] = _too_long(ask, way)
@@ -127,11 +127,11 @@ def hear(
 
 def _subjects(
     plan: StudyPlan, asks: Sequence[Ask], jobs: int
-) -> dict[tuple[int, int], Subject | None]:
+) -> dict[tuple[int, int], GateSubject | None]:
     """What ngspice needs of each board, by (sample, question)."""
     numbers = sorted({a.question for a in asks})
     fewer = replace(plan, questions=tuple(plan.questions[n] for n in numbers))
-    found: dict[tuple[int, int], Subject | None] = {}
+    found: dict[tuple[int, int], GateSubject | None] = {}
     for run in _runs(sorted({a.sample for a in asks})):
         for answer, subject in exact_rung.subjects(fewer, run, jobs):
             found[answer.sample, numbers[answer.question]] = subject
@@ -163,7 +163,7 @@ def _too_long(ask: Ask, way: float) -> Hearing:
     return Hearing(ask.sample, ask.question, ask.kind, ask.why, "", reason, "", 0, False)
 
 
-def _flow(subject: Subject) -> Flow:
+def _flow(subject: GateSubject) -> Flow:
     return Flow(subject.system, subject.excitation.drive)
 
 
@@ -204,7 +204,7 @@ def confirm(
     pool: SpicePool,
     queries: Sequence[Query],
     progress: Callable[[], None] = lambda: None,
-) -> list[Heard]:
+) -> list[NgspiceAnswer]:
     """ngspice's answers, in order.
 
     A first answer that is the expected one stands: its settings have passed the gate at two step
@@ -214,7 +214,7 @@ def confirm(
     not settled: it is made again, longer (`longer`). Neither is done where it would take more than
     `MOST_AGAIN` periods' steps. ``progress`` is called once a query.
     """
-    heard: list[Heard | None] = [None] * len(queries)
+    heard: list[NgspiceAnswer | None] = [None] * len(queries)
     asked = [_Try(k, q.subject, q.settings) for k, q in enumerate(queries)]
     while asked:
         # The longest first: the workers then end together.
@@ -240,7 +240,7 @@ class _Try:
     answer at a larger step, None where there was none."""
 
     query: int
-    subject: Subject
+    subject: GateSubject
     settings: SolverSettings
     halved: int = 0
     before: str | None = None
@@ -251,7 +251,7 @@ class _Try:
         return numerics_gate.length(self.subject) * self.subject.period / self.settings.max_step
 
 
-def _after(tried: _Try, query: Query, said: Heard) -> _Try | Heard:
+def _after(tried: _Try, query: Query, said: NgspiceAnswer) -> _Try | NgspiceAnswer:
     """What is asked next, or what is heard in the end."""
     none = not is_answer(said.response)
     if not none and said.response == (tried.before or query.expected):
@@ -273,22 +273,24 @@ def _after(tried: _Try, query: Query, said: Heard) -> _Try | Heard:
     return said if none else _undecided(tried.before, said)
 
 
-def longer(subject: Subject) -> Subject:
+def longer(subject: GateSubject) -> GateSubject:
     """Twice the way and `STRETCH` more, and `LONG` periods to judge: what had not settled may have
     been on its way yet, or have a period or none that a few strobes do not show."""
     return replace(subject, discard=2 * subject.discard + STRETCH, judged=LONG)
 
 
-def _undecided(before: str | None, said: Heard) -> Heard:
+def _undecided(before: str | None, said: NgspiceAnswer) -> NgspiceAnswer:
     if before is None:
-        return Heard(UNDECIDED, f"only one run had an answer: {said.response}", said.remedies)
+        return NgspiceAnswer(
+            UNDECIDED, f"only one run had an answer: {said.response}", said.remedies
+        )
     both = f"{before}, at a smaller step {said.response}"
-    return Heard(UNDECIDED, both, said.remedies, either=OR.join((before, said.response)))
+    return NgspiceAnswer(UNDECIDED, both, said.remedies, either=OR.join((before, said.response)))
 
 
-def _heard(outcome: remedies.Outcome[Read]) -> Heard:
+def _heard(outcome: remedies.AidedRun[Read]) -> NgspiceAnswer:
     tried = " ".join(outcome.tried)
     if isinstance(outcome.result, SimulationFailed):
-        return Heard(str(OrbitStatus.FAILED), outcome.result.reason, tried)
+        return NgspiceAnswer(str(OrbitStatus.FAILED), outcome.result.reason, tried)
     orbit = outcome.result.orbit
-    return Heard(orbit.response, orbit.reason, tried, bool(orbit.symmetric))
+    return NgspiceAnswer(orbit.response, orbit.reason, tried, bool(orbit.symmetric))

@@ -38,14 +38,14 @@ OR = " or "
 """Between the two answers of an undecided board."""
 
 
-class Kind(StrEnum):
+class StartKind(StrEnum):
     """Where ngspice started."""
 
     OWN = "own"
     NOMINAL = "nominal"
 
 
-class Outcome(StrEnum):
+class NgspiceVerdict(StrEnum):
     """What became of asking ngspice for the response that the exact rung names."""
 
     AGREED = "agreed"
@@ -70,7 +70,7 @@ class Ask:
 
     sample: int
     question: int
-    kind: Kind
+    kind: StartKind
     why: Why
 
 
@@ -87,7 +87,7 @@ class Hearing:
 
     sample: int
     question: int
-    kind: Kind
+    kind: StartKind
     why: Why
     response: str
     reason: str
@@ -109,12 +109,12 @@ class Hearing:
         said = _both(self.either)
         return False if said and answer.response not in said else None
 
-    def outcome(self, answer: Answer) -> Outcome:
+    def outcome(self, answer: Answer) -> NgspiceVerdict:
         """`FAILED` where there is no answer at all."""
         same = self.agrees(answer)
         if same is None:
-            return Outcome.UNDECIDED if self.response == UNDECIDED else Outcome.FAILED
-        return Outcome.AGREED if same else Outcome.DIFFERED
+            return NgspiceVerdict.UNDECIDED if self.response == UNDECIDED else NgspiceVerdict.FAILED
+        return NgspiceVerdict.AGREED if same else NgspiceVerdict.DIFFERED
 
     def survives(self, question: Question) -> bool | None:
         """Whether the board shows the wanted response in ngspice; None where it does not say."""
@@ -190,11 +190,11 @@ def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> lis
         if not _orbits(a):
             continue
         if a.sample < OWN_SAMPLES:
-            asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
+            asks.append(Ask(a.sample, a.question, StartKind.OWN, Why.RANDOM))
         if a.sample < nominal:
-            asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.RANDOM))
+            asks.append(Ask(a.sample, a.question, StartKind.NOMINAL, Why.RANDOM))
         elif a.sample < SUBSET and a.radius > SLOW:
-            asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.SLOW))
+            asks.append(Ask(a.sample, a.question, StartKind.NOMINAL, Why.SLOW))
     return asks
 
 
@@ -213,7 +213,7 @@ def ask_boundary(
         Ask(sample, question, kind, Why.BOUNDARY)
         for question, boards in enumerate(near)
         for _, sample in sorted(boards)[:BOUNDARY_SAMPLES]
-        for kind in Kind
+        for kind in StartKind
         if (sample, question, kind) not in have
     ]
 
@@ -226,10 +226,10 @@ def ask_differing(
     mine = {(a.sample, a.question): a for a in answers}
     have = {(k.sample, k.question, k.kind) for k in known}
     return [
-        Ask(h.sample, h.question, Kind.OWN, Why.DIFFERS)
+        Ask(h.sample, h.question, StartKind.OWN, Why.DIFFERS)
         for h in heard
-        if h.kind is Kind.NOMINAL
-        and (h.sample, h.question, Kind.OWN) not in have
+        if h.kind is StartKind.NOMINAL
+        and (h.sample, h.question, StartKind.OWN) not in have
         and h.agrees(mine[h.sample, h.question]) is False
     ]
 
@@ -240,8 +240,8 @@ def ask_all(answers: Iterable[Answer]) -> list[Ask]:
     for a in answers:
         if _orbits(a):
             if a.sample < OWN_SAMPLES:
-                asks.append(Ask(a.sample, a.question, Kind.OWN, Why.RANDOM))
-            asks.append(Ask(a.sample, a.question, Kind.NOMINAL, Why.ALL))
+                asks.append(Ask(a.sample, a.question, StartKind.OWN, Why.RANDOM))
+            asks.append(Ask(a.sample, a.question, StartKind.NOMINAL, Why.ALL))
     return asks
 
 

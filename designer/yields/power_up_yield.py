@@ -27,7 +27,7 @@ STREAM = "phase:"
 
 
 @dataclass(frozen=True)
-class Reached:
+class PowerUpAnswer:
     """One sample of one response, switched on by the recipe.
 
     verdict, response, reason : as of a board as built. phase : of the generator at power-up [rad].
@@ -115,7 +115,7 @@ def reached_block(
     recipes: Sequence[Recipe],
     jobs: int,
     progress: Callable[[], None] = lambda: None,
-) -> list[Reached]:
+) -> list[PowerUpAnswer]:
     """A row for every board of the block and every question, in order.
 
     recipes : one for each question (``yields.start_recipe_search``). progress : called once a row.
@@ -128,7 +128,7 @@ def reached_block(
     for (i, number), ended in zip(asked, switched_on(ensemble, starts, jobs), strict=True):
         arrival = ended.arrival
         rows.append(
-            Reached(
+            PowerUpAnswer(
                 sample=indices[i],
                 question=number,
                 verdict=ended.verdict,

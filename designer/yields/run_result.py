@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from designer.catalog.catalog import Catalog
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
@@ -23,7 +23,7 @@ class RunResult:
     catalog: Catalog
     found: tuple[ModelResponse, ...]
     design: Design
-    checked: tuple[Checked, ...]
+    checked: tuple[CheckedResponse, ...]
     study: Study
     provenance: dict[str, Any] = field(default_factory=dict)
     cost: dict[str, float] = field(default_factory=dict)

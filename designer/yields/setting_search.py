@@ -33,7 +33,7 @@ from designer.model.tuning_bands import Bands
 from designer.yields import window_path
 from designer.yields.generator_offsets import AS_BUILT, Adjustment
 from designer.yields.verdict import Question, Verdict, judge
-from designer.yields.window_path import Trail, find_window
+from designer.yields.window_path import PathTrail, find_window
 
 HALVED = 4
 """Pairs of settings halved at once."""
@@ -63,7 +63,7 @@ class Try:
 
 
 @dataclass
-class Case:
+class BoardCase:
     """One board, by its place in the ensemble, and one response that it does not show as built.
 
     centre : the DC offset that centres the board, over the amplitude. followed : orbits that were
@@ -99,8 +99,8 @@ Asked = tuple[Adjustment, Array]
 
 
 def seek(
-    ensemble: Ensemble, cases: Sequence[Case], bands: Bands, *, jobs: int = 1
-) -> Sequence[Case]:
+    ensemble: Ensemble, cases: Sequence[BoardCase], bands: Bands, *, jobs: int = 1
+) -> Sequence[BoardCase]:
     """Ask every case in rounds until it works or the rounds are over; fills in the tries."""
     for propose in _rounds(ensemble.boards, bands):
         left = [case for case in cases if case.found is None]
@@ -120,14 +120,14 @@ def seek(
     return cases
 
 
-Round = Callable[[Case], list[Asked]]
+Round = Callable[[BoardCase], list[Asked]]
 
 
 def _rounds(boards: Boards, bands: Bands) -> list[Round]:
     def centred(points: Sequence[tuple[float, float]]) -> Round:
         """Frequency and amplitude in half-bands as settings, from the nominal orbit."""
 
-        def propose(case: Case) -> list[Asked]:
+        def propose(case: BoardCase) -> list[Asked]:
             settings = [
                 Adjustment(bands.frequency * f, bands.amplitude * a, case.centre).within(bands)
                 for f, a in points
@@ -140,7 +140,7 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
         return lambda case: _halfway(case, bands, follow)
 
     def path(first: float, tied: bool) -> Round:
-        def propose(case: Case) -> list[Asked]:
+        def propose(case: BoardCase) -> list[Asked]:
             board = boards.take([case.board])
             trail = find_window(board, case.question, bands, first, tied=tied)
             case.followed += trail.followed
@@ -159,7 +159,7 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
     ]
 
 
-def _deepest(trail: Trail, case: Case, bands: Bands) -> list[Adjustment]:
+def _deepest(trail: PathTrail, case: BoardCase, bands: Bands) -> list[Adjustment]:
     """Settings of a path, the one deepest inside the window first, and none twice.
 
     A window may be smaller than ``APART``, so a setting is left out only where the very same was
@@ -174,7 +174,7 @@ def _deepest(trail: Trail, case: Case, bands: Bands) -> list[Adjustment]:
     return chosen[:SPOTS]
 
 
-def _halfway(case: Case, bands: Bands, follow: bool) -> list[Asked]:
+def _halfway(case: BoardCase, bands: Bands, follow: bool) -> list[Asked]:
     """Between pairs of settings that leave the wanted counts between them, the best pair first.
 
     follow : start from the attractor of the better one; otherwise from the nominal orbit.
@@ -191,7 +191,7 @@ def _halfway(case: Case, bands: Bands, follow: bool) -> list[Asked]:
     return chosen
 
 
-def _brackets(case: Case, bands: Bands) -> list[tuple[Try, Try]]:
+def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
     """Pairs of tries, the better one of each first, by how far their counts are off and then by
     their distance. A pair leaves the wanted count of a stop between it if not both have too many
     impacts there, or both too few; one stop of which that holds is enough, two are better."""
@@ -217,7 +217,7 @@ def _brackets(case: Case, bands: Bands) -> list[tuple[Try, Try]]:
     return [(counted[i], counted[j]) for _, _, i, j in sorted(found)]
 
 
-def _new(case: Case, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
+def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
     """Those that differ from what was tried, from as built and from each other."""
     known = [AS_BUILT, *(t.setting for t in case.tries)]
     fresh: list[Adjustment] = []

@@ -21,7 +21,7 @@ FINER = 5
 """Into so many parts each step of a sweep is cut where it stands for a smooth one."""
 
 
-class Way(StrEnum):
+class RecipeKind(StrEnum):
     """Kinds of recipe, the simplest first."""
 
     DIRECT = "direct"
@@ -43,7 +43,7 @@ class Recipe:
     without steps, and one ``SLOWER`` times as slow, did as well.
     """
 
-    way: Way
+    way: RecipeKind
     omega: float | None
     target: Excitation
     first: Excitation
@@ -102,7 +102,7 @@ class Recipe:
     def text(self) -> str:
         """The recipe in words, for ``setup.csv``: what a person sets on a generator."""
         said = [f"wait {seconds(self.wait_seconds)} or longer", *self._success()]
-        if self.way is Way.DIRECT:
+        if self.way is RecipeKind.DIRECT:
             return "; ".join(["switch on at this setting", *said])
         return "; ".join([f"set {self._setting(self.first)}, switch on", self._sweep(), *said])
 
@@ -111,7 +111,7 @@ class Recipe:
         took = seconds(self.sweep_seconds)
         steps = f"in {self.steps} steps of equal ratio, {self.hold} periods each ({took} in all)"
         slower = f" (up to {SLOWER} times slower is fine)" if self.slower else ""
-        if self.way is Way.AMPLITUDE:
+        if self.way is RecipeKind.AMPLITUDE:
             how = f"in {took}" if self.smooth else steps
             return f"raise the amplitude to {volts(self.target.amplitude)} V peak {how}{slower}"
         to = f"{self._hertz(self.target)}"

@@ -23,7 +23,7 @@ from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
 from designer.yields.power_up_yield import switched_on
-from designer.yields.start_recipe import SLOWER, Recipe, Way
+from designer.yields.start_recipe import SLOWER, Recipe, RecipeKind
 from designer.yields.verdict import Question, StudyPlan, Verdict, judge
 
 TRIALS = 12
@@ -68,7 +68,7 @@ def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Re
     target = question.excitation
     wait = _wait(question.start)
 
-    def sweep(way: Way, frequency: float, amplitude: float) -> Recipe:
+    def sweep(way: RecipeKind, frequency: float, amplitude: float) -> Recipe:
         first = Excitation(frequency, amplitude, target.offset)
         ratio = max(
             abs(math.log(frequency / target.frequency)),
@@ -78,13 +78,13 @@ def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Re
         return Recipe(way, question.spec.omega, target, first, steps, HOLD, wait)
 
     frequency, amplitude = target.frequency, target.amplitude
-    yield Recipe(Way.DIRECT, question.spec.omega, target, target, 0, HOLD, wait)
-    yield sweep(Way.FROM_ABOVE, frequency * (1.0 + ASIDE), amplitude)
-    yield sweep(Way.FROM_BELOW, frequency * (1.0 - ASIDE), amplitude)
-    yield sweep(Way.AMPLITUDE, frequency, SOFT * amplitude)
+    yield Recipe(RecipeKind.DIRECT, question.spec.omega, target, target, 0, HOLD, wait)
+    yield sweep(RecipeKind.FROM_ABOVE, frequency * (1.0 + ASIDE), amplitude)
+    yield sweep(RecipeKind.FROM_BELOW, frequency * (1.0 - ASIDE), amplitude)
+    yield sweep(RecipeKind.AMPLITUDE, frequency, SOFT * amplitude)
     far = ABOVE * highest_resonance(system)
     if far > frequency * (1.0 + ASIDE):
-        yield sweep(Way.FROM_FAR, far, amplitude)
+        yield sweep(RecipeKind.FROM_FAR, far, amplitude)
 
 
 def highest_resonance(system: PiecewiseLinearSystem) -> float:
@@ -184,7 +184,7 @@ def _by_hand(trials: _Trials, bench: _Bench) -> Recipe:
     """The recipe with how freely its sweep may be done: without steps, and slower. These are tried
     from one phase of each board."""
     recipe = trials.counted
-    if recipe.way is Way.DIRECT:
+    if recipe.way is RecipeKind.DIRECT:
         return recipe
     first = trials.boards[: len(bench.able)]
 

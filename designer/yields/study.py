@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.yields import two_engine_yield as combined
 from designer.yields.blame_analysis import Blame
 from designer.yields.blame_status import BlameStatus
 from designer.yields.joint_yield import all_on_one
 from designer.yields.ngspice_sampling import Hearing
-from designer.yields.power_up_yield import Reached
+from designer.yields.power_up_yield import PowerUpAnswer
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
@@ -34,7 +34,7 @@ class Study:
     blame, maps : by question, where they were asked for. blame_wanted : whether a blame was.
     """
 
-    checked: tuple[Checked, ...]
+    checked: tuple[CheckedResponse, ...]
     plan: StudyPlan
     asked: tuple[int, ...]
     left_out: dict[int, str]
@@ -44,7 +44,7 @@ class Study:
     narrow: bool | None = None
     tuned: tuple[Tuned, ...] | None = None
     trimmed: tuple[Trimmed, ...] | None = None
-    reached: tuple[Reached, ...] | None = None
+    reached: tuple[PowerUpAnswer, ...] | None = None
     recipes: tuple[Recipe, ...] | None = None
     blame: Blame | None = None
     maps: tuple[YieldMap, ...] = ()
@@ -66,7 +66,7 @@ class Study:
         """The rows of the trimmed layer of response number ``index``."""
         return tuple(t for t in self.trimmed or () if self.asked[t.question] == index)
 
-    def reached_of(self, index: int) -> tuple[Reached, ...]:
+    def reached_of(self, index: int) -> tuple[PowerUpAnswer, ...]:
         """The rows of the reached layer of response number ``index``."""
         return tuple(r for r in self.reached or () if self.asked[r.question] == index)
 
@@ -119,7 +119,9 @@ class Study:
         """The same from power-up by the recipes."""
         return self._on_one(self.reached)
 
-    def _on_one(self, rows: Sequence[Answer | Tuned | Trimmed | Reached] | None) -> Yield | None:
+    def _on_one(
+        self, rows: Sequence[Answer | Tuned | Trimmed | PowerUpAnswer] | None
+    ) -> Yield | None:
         if not rows or len(self.asked) < max(len(self.checked), 2):
             return None
         return all_on_one(rows, self.plan.census)

@@ -25,11 +25,11 @@ from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
 from designer.base.seal import BLANK
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.deck import SolverSettings
-from designer.spice.equation_check import EquationCheck, Finding
+from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
-from designer.yields.blame_replay import Subject
+from designer.yields.blame_replay import BlamedPart
 from designer.yields.corners import Corner
 from designer.yields.crossings import Crossing
 from designer.yields.margins import Limit, Prediction
@@ -45,8 +45,8 @@ _Items = Mapping[str, tuple[str, Any]]
 _RECORDS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
-        Axis, Blame, Corner, Crossing, EquationCheck, Finding, GateResult, Index, Limit, NearLimit,
-        Orbit, Prediction, Read, ResponseBlame, SolverSettings, Subject, YieldMap,
+        Axis, BlamedPart, Blame, Corner, Crossing, EquationCheck, EquationFinding, GateResult,
+        Index, Limit, NearLimit, Orbit, Prediction, Read, ResponseBlame, SolverSettings, YieldMap,
     )
 }  # fmt: skip
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}

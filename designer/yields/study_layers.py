@@ -16,10 +16,10 @@ from designer.spice.pool import SpicePool
 from designer.yields import layers, ngspice_sampling
 from designer.yields.blame_analysis import Blame, blame
 from designer.yields.blame_extent import BUDGET, extent_of
-from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_pieces import StoredParts
 from designer.yields.layers import Runner
 from designer.yields.ngspice_sampling import NOMINAL_SAMPLES, Ask, Hearing
-from designer.yields.power_up_yield import Reached
+from designer.yields.power_up_yield import PowerUpAnswer
 from designer.yields.row_store import BlockStore
 from designer.yields.start_recipe import Recipe
 from designer.yields.start_recipe_search import find_recipes
@@ -57,7 +57,9 @@ class Stores:
     def trimmed(self, plan: StudyPlan, trim: DcTrim) -> BlockStore[Trimmed] | None:
         return None
 
-    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[Reached] | None:
+    def reached(
+        self, plan: StudyPlan, recipes: Sequence[Recipe]
+    ) -> BlockStore[PowerUpAnswer] | None:
         return None
 
     def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
@@ -67,13 +69,13 @@ class Stores:
     def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
         pass
 
-    def blame_pieces(self, plan: StudyPlan) -> Pieces:
+    def blame_pieces(self, plan: StudyPlan) -> StoredParts:
         """Where the finished parts of a blame are."""
-        return Pieces()
+        return StoredParts()
 
-    def maps(self, plan: StudyPlan) -> Pieces:
+    def maps(self, plan: StudyPlan) -> StoredParts:
         """Where the finished yield maps are."""
-        return Pieces()
+        return StoredParts()
 
 
 @dataclass(frozen=True)

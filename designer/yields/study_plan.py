@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from designer.base.doubt import Doubt
 from designer.catalog.catalog import Catalog
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.trust import Trust
 from designer.circuit.design import Design
 from designer.model.model_file import ModelFile
@@ -17,7 +17,7 @@ from designer.yields.verdict import Answer, Question, StudyPlan, Yield, count
 def plan_study(
     modelfile: ModelFile,
     design: Design,
-    checked: Sequence[Checked],
+    checked: Sequence[CheckedResponse],
     catalog: Catalog,
     *,
     samples: int,

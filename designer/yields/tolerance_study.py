@@ -9,7 +9,7 @@ from designer.base.checks import at_least, cores
 from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
 from designer.base.progress import Progress
 from designer.check import checked_design
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model_file import need_responses
@@ -30,7 +30,7 @@ def check(
     pool: SpicePool | None,
     progress: Progress | None = None,
     gates: Sequence[GateResult] | None = None,
-) -> tuple[Checked, ...]:
+) -> tuple[CheckedResponse, ...]:
     """Every response of a design on the exact circuit and, with a pool, in ngspice.
 
     gates : see ``checked_design.check``.
@@ -57,7 +57,7 @@ def tolerance(
     seed: int = SEED,
     jobs: int | None = None,
     pool: SpicePool | None = None,
-    checked: tuple[Checked, ...] | None = None,
+    checked: tuple[CheckedResponse, ...] | None = None,
     stores: Stores | None = None,
     runner: Runner | None = None,
     progress: Progress | None = None,
@@ -124,7 +124,7 @@ def tolerance(
     return work.mapped(study, maps) if maps else study
 
 
-def _why_not(checked: Checked) -> str:
+def _why_not(checked: CheckedResponse) -> str:
     """Why a response cannot be a question of a study; "" where it can."""
     if not checked.model.found:
         return "the model does not show it"

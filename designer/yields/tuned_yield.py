@@ -23,7 +23,7 @@ from designer.spread.spread import draw_many
 from designer.yields.bench_procedure import BenchResult, find_on_bench
 from designer.yields.centring import centring_offset
 from designer.yields.generator_offsets import AS_BUILT, Adjustment
-from designer.yields.setting_search import Case, seek
+from designer.yields.setting_search import BoardCase, seek
 from designer.yields.verdict import Answer, StudyPlan, Verdict, judge, kept
 
 DIGITS = 6
@@ -113,7 +113,9 @@ def tuned_block(
             return 0.0
         return round(volts / plan.questions[number].excitation.amplitude, DIGITS)
 
-    cases = {(i, number): Case(i, plan.questions[number], centre(i, number)) for i, number in bad}
+    cases = {
+        (i, number): BoardCase(i, plan.questions[number], centre(i, number)) for i, number in bad
+    }
     seek(ensemble, list(cases.values()), bands, jobs=jobs)
     benches = _on_bench(
         plan, indices, ensemble, [known[indices[i], number] for i, number in asked], bands, jobs
@@ -159,7 +161,7 @@ def benched_block(
     return [row[1] for row in _on_bench(plan, indices, ensemble, asked, bands, jobs)]
 
 
-def _outcome(answer: Answer, case: Case | None) -> dict[str, Any]:
+def _outcome(answer: Answer, case: BoardCase | None) -> dict[str, Any]:
     """The columns of what exists: the search's where there was one, else the board's as built."""
     if case is None or case.found is None:
         verdict, reason = answer.verdict, answer.reason
@@ -177,7 +179,7 @@ def _outcome(answer: Answer, case: Case | None) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def _not_found(answer: Answer, case: Case) -> tuple[Verdict, str]:
+def _not_found(answer: Answer, case: BoardCase) -> tuple[Verdict, str]:
     met = [answer.verdict, *(t.verdict for t in case.tries)]
     silent = met.count(Verdict.FAILED)
     if silent == len(met):
@@ -192,7 +194,7 @@ def _not_found(answer: Answer, case: Case) -> tuple[Verdict, str]:
 
 def _columns(
     setting: Adjustment,
-    case: Case | None,
+    case: BoardCase | None,
     verdict: Verdict,
     response: str,
     reason: str,

@@ -32,7 +32,14 @@ import numpy as np
 from designer.base.proportion import wilson
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.read_orbit import STROBE_TOLERANCE
-from designer.yields.ngspice_sampling import BOUNDARY_SAMPLES, SLOW, Hearing, Kind, Why, distance
+from designer.yields.ngspice_sampling import (
+    BOUNDARY_SAMPLES,
+    SLOW,
+    Hearing,
+    StartKind,
+    Why,
+    distance,
+)
 from designer.yields.verdict import Answer, Question, Verdict
 
 
@@ -53,7 +60,7 @@ class Disagreement:
     """One board on which ngspice says another response than the exact rung."""
 
     sample: int
-    kind: Kind
+    kind: StartKind
     why: Why
     exact: str
     ngspice: str
@@ -124,7 +131,7 @@ def combine(
     theirs = {
         h.sample: said
         for h in heard
-        if h.kind is Kind.NOMINAL and (said := h.survives(question)) is not None
+        if h.kind is StartKind.NOMINAL and (said := h.survives(question)) is not None
     }
     theirs = {sample: said for sample, said in theirs.items() if sample in mine}
     if not theirs:
@@ -135,14 +142,14 @@ def combine(
     silent = {
         h.sample
         for h in heard
-        if h.kind is Kind.NOMINAL and h.sample in mine and h.survives(question) is None
+        if h.kind is StartKind.NOMINAL and h.sample in mine and h.survives(question) is None
     }
 
     def if_all(said: bool) -> float:
         whole = {**theirs, **dict.fromkeys(silent, said)}
         return interval(ok, _strata(list(mine.values()), whole, heard, question))[0]
 
-    random = [h for h in heard if h.kind is Kind.NOMINAL and h.why in (Why.RANDOM, Why.ALL)]
+    random = [h for h in heard if h.kind is StartKind.NOMINAL and h.why in (Why.RANDOM, Why.ALL)]
     known = {a.sample: a for a in answers}
     agreed = [h.agrees(known[h.sample]) for h in random if h.sample in known]
     return Combined(
@@ -243,7 +250,7 @@ def differences(
     stayed = {
         h.sample
         for h in heard
-        if h.kind is Kind.OWN and h.sample in known and h.agrees(known[h.sample])
+        if h.kind is StartKind.OWN and h.sample in known and h.agrees(known[h.sample])
     }
     return [
         Disagreement(
@@ -269,6 +276,6 @@ def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) ->
         return Explanation.GRAZING
     if answer.response == OrbitStatus.CLIPPED:
         return Explanation.CLIPPED
-    if said.kind is Kind.NOMINAL and stayed:
+    if said.kind is StartKind.NOMINAL and stayed:
         return Explanation.BASIN
     return Explanation.NONE

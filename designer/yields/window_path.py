@@ -24,7 +24,7 @@ from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import FloatingCircuit
-from designer.dynamics.continued_orbit import Followed, Function, follow, functions, valleys
+from designer.dynamics.continued_orbit import ContinuedOrbit, Function, follow, functions, valleys
 from designer.dynamics.flow import Flow
 from designer.model.tuning_bands import Bands
 from designer.spread.board_quantities import between
@@ -49,7 +49,7 @@ RESERVE = 24
 
 
 @dataclass(frozen=True)
-class Spot:
+class PathSetting:
     """A setting on a path. radius : half-bands, of the ball about it on which the linearised
     functions stay positive; negative outside of the window; -inf where the path ended on the way to
     the board."""
@@ -59,11 +59,11 @@ class Spot:
 
 
 @dataclass(frozen=True)
-class Trail:
+class PathTrail:
     """What a path met on the board itself, in order, or the one spot where it ended on the way.
     followed : orbits that were shot for."""
 
-    spots: tuple[Spot, ...]
+    spots: tuple[PathSetting, ...]
     followed: int
 
 
@@ -74,7 +74,7 @@ class _Point:
 
     share: float
     setting: Array
-    orbit: Followed
+    orbit: ContinuedOrbit
     wanted: tuple[Function, ...]
     values: Array
 
@@ -90,7 +90,7 @@ class _Slopes:
 
 def find_window(
     board: Boards, question: Question, bands: Bands, first: float = 0.0, *, tied: bool = True
-) -> Trail:
+) -> PathTrail:
     """Follow the question's orbit to a board (``Boards`` of one).
 
     first : half-bands of DC offset at which the path sets out on the nominal board. Where a window
@@ -99,7 +99,7 @@ def find_window(
     far. Neither leads into every window that the other does.
     """
     path = _Path(board, question, bands)
-    return Trail(tuple(path.walk(first, tied)), path.followed)
+    return PathTrail(tuple(path.walk(first, tied)), path.followed)
 
 
 class _Path:
@@ -109,7 +109,7 @@ class _Path:
         self.followed = 0
         self._reduced = (np.nan, Ensemble(board, fast=False))
 
-    def walk(self, first: float, tied: bool) -> list[Spot]:
+    def walk(self, first: float, tied: bool) -> list[PathSetting]:
         nominal = self.question.start
         orbit = self._orbit(0.0, np.zeros(3), nominal.start) if nominal.n else None
         if orbit is None:
@@ -133,10 +133,10 @@ class _Path:
                 break
             stride, here = min(4.0 * ahead, STRIDE), there
         if here.share < 1.0:
-            return [Spot(self._adjustment(here.setting), -np.inf)]
+            return [PathSetting(self._adjustment(here.setting), -np.inf)]
         return self._centred(here)
 
-    def _centred(self, here: _Point) -> list[Spot]:
+    def _centred(self, here: _Point) -> list[PathSetting]:
         """From this point on the board itself to the middle of the window.
 
         Steps of one length at first, whatever they lead to: the functions have kinks where two
@@ -166,7 +166,7 @@ class _Path:
                 trust *= 0.5
                 continue
             radius, _, here, slopes = met[-1]
-        return [Spot(setting, radius) for radius, setting, _, _ in met]
+        return [PathSetting(setting, radius) for radius, setting, _, _ in met]
 
     @property
     def _may_go_on(self) -> bool:
@@ -192,7 +192,7 @@ class _Path:
         known = [f.moved_to(orbit) for f, met in zip(here.wanted, there, strict=True) if met]
         return _Point(here.share + ahead, setting, orbit, tuple(known), values[there])
 
-    def _orbit(self, share: float, setting: Array, near: Array) -> Followed | None:
+    def _orbit(self, share: float, setting: Array, near: Array) -> ContinuedOrbit | None:
         self.followed += 1
         try:
             if self._reduced[0] != share:
@@ -250,7 +250,7 @@ def _near(found: Sequence[Function]) -> tuple[Function, ...]:
     return tuple(f for f in found if f.extreme is None or f.value < REACH * deepest)
 
 
-def _values(orbit: Followed, wanted: Sequence[Function]) -> Array:
+def _values(orbit: ContinuedOrbit, wanted: Sequence[Function]) -> Array:
     """(k,) of these functions on an orbit; nan where one is not found."""
     found = [f.on(orbit) for f in wanted]
     return np.array([np.nan if v is None else v for v in found])

@@ -7,7 +7,15 @@ import sys
 
 import pytest
 
-from designer.base.progress import EVERY, Lines, Progress, Terminal, how_far, progress_for, rate
+from designer.base.progress import (
+    EVERY,
+    Progress,
+    ProgressLines,
+    Terminal,
+    how_far,
+    progress_for,
+    rate,
+)
 
 
 @pytest.mark.parametrize(
@@ -32,7 +40,7 @@ def test_rates() -> None:
 
 def test_lines_say_how_far_from_time_to_time(capsys: pytest.CaptureFixture[str]) -> None:
     now = [0.0]
-    lines = Lines(lambda: now[0])
+    lines = ProgressLines(lambda: now[0])
     step = lines.stage("boards", 100)
     for _ in range(100):
         now[0] += EVERY / 10.0
@@ -50,7 +58,7 @@ def test_lines_say_how_far_from_time_to_time(capsys: pytest.CaptureFixture[str])
 def test_a_stage_of_unknown_length_is_not_silent(capsys: pytest.CaptureFixture[str]) -> None:
     """Blame and yield maps seek as many attractors as it takes."""
     now = [0.0]
-    step = Lines(lambda: now[0]).stage("blame")
+    step = ProgressLines(lambda: now[0]).stage("blame")
     for _ in range(60):
         now[0] += 1.0
         step()

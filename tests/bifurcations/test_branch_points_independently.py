@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from designer.bifurcations.continuation import Branch, start, trace
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.dynamics.attractors import settle
 from designer.model import swept_model
 from tests.bifurcations.test_continuation import PAPER, PLAIN, monodromy
@@ -28,9 +28,9 @@ TOUCHES = [
 ]
 CHANGES = [
     # the same, a point where stability changes, and the multiplier there
-    (0.32, 0.3145, 0.3205, 0.3150786, Kind.DOUBLING, -1.0),
-    (1.342, 1.335, 1.37, 1.3361967, Kind.DOUBLING, -1.0),
-    (1.342, 1.335, 1.37, 1.3687522838, Kind.FOLD, 1.0),
+    (0.32, 0.3145, 0.3205, 0.3150786, PointKind.DOUBLING, -1.0),
+    (1.342, 1.335, 1.37, 1.3361967, PointKind.DOUBLING, -1.0),
+    (1.342, 1.335, 1.37, 1.3687522838, PointKind.FOLD, 1.0),
 ]
 STARTS = np.random.default_rng(5).uniform(-0.5, 0.5, (40, 4))
 
@@ -47,7 +47,7 @@ def branch(omega: float, low: float, high: float) -> Branch:
     raise AssertionError(f"no such orbit at ω = {omega}")
 
 
-def point(where: Branch, kind: Kind, near: float) -> Bifurcation:
+def point(where: Branch, kind: PointKind, near: float) -> Bifurcation:
     (one,) = [p for p in locate(where) if p.kind is kind and abs(p.value - near) < 2e-7]
     return one
 
@@ -60,7 +60,7 @@ def test_last_impact_shrinks_to_nothing_at_a_grazing_point(
     """How far the turning point, tip or dip, lies past its stop goes through nought: that is what
     the velocity of the impact that is lost squares to."""
     where = branch(omega, low, high)
-    p = point(where, Kind.GRAZING, near)
+    p = point(where, PointKind.GRAZING, near)
     shifts = np.array([-1e-8, 1e-8])
     past = []
     for shift in shifts:
@@ -75,7 +75,7 @@ def test_last_impact_shrinks_to_nothing_at_a_grazing_point(
 @pytest.mark.slow
 @pytest.mark.parametrize(("omega", "low", "high", "near", "kind", "unit"), CHANGES)
 def test_multiplier_at_the_ends_of_impacting_windows(
-    omega: float, low: float, high: float, near: float, kind: Kind, unit: float
+    omega: float, low: float, high: float, near: float, kind: PointKind, unit: float
 ) -> None:
     where = branch(omega, low, high)
     p = point(where, kind, near)

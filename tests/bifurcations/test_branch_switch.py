@@ -7,7 +7,7 @@ import pytest
 
 from designer.bifurcations.branch_switch import _leaving, switch
 from designer.bifurcations.continuation import Branch, start, trace
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.dynamics.attractors import settle
 from designer.model import swept_model
 from tests.bifurcations.test_continuation import PAPER
@@ -21,7 +21,7 @@ def fork_from(begun: float, high: float) -> tuple[Branch, Bifurcation]:
     over = swept_model.of_model(PAPER, begun, "omega")
     origin = start(over, settle(over.flow(begun), np.zeros(4)), begun)
     branch = trace(origin, 0.27, high)
-    found = [p for p in locate(branch) if p.kind is Kind.PITCHFORK]
+    found = [p for p in locate(branch) if p.kind is PointKind.PITCHFORK]
     return branch, min(found, key=lambda p: abs(p.value - FORK))
 
 

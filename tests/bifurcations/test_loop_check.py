@@ -11,7 +11,7 @@ import pytest
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.continuation import Branch, End, start, trace
 from designer.bifurcations.loop_check import images, place
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.windows import NOT_LOCATED, all_windows
 from designer.dynamics.attractors import settle, twin
 from designer.dynamics.flow import Flow
@@ -100,7 +100,7 @@ def test_doubled_branches_appear_once_each() -> None:
     twins = next(
         n for n, b in enumerate(found.branches) if b.ends == (End.JOINED, End.JOINED)
     )  # fmt: skip
-    leaving = [p for p in found.on(twins) if p.kind is Kind.DOUBLING]
+    leaving = [p for p in found.on(twins) if p.kind is PointKind.DOUBLING]
     assert len(leaving) == 4
     children = [b for b, q in zip(found.branches, found.parents, strict=True) if q == twins]
     assert [b.ends for b in children] == [(End.JOINED, End.JOINED)] * 2
@@ -115,9 +115,11 @@ def test_doubled_branches_appear_once_each() -> None:
 @pytest.mark.slow
 def test_no_fold_stands_where_branches_meet() -> None:
     found = doubled(0.28)
-    meetings = [p.value for p in found.points if p.kind in (Kind.PITCHFORK, Kind.DOUBLING)]
+    meetings = [
+        p.value for p in found.points if p.kind in (PointKind.PITCHFORK, PointKind.DOUBLING)
+    ]
     for p in found.points:
-        if p.kind is Kind.FOLD:
+        if p.kind is PointKind.FOLD:
             assert min(abs(p.value - m) for m in meetings) > 1e-9
     # The doubled orbits leave 0.3121564 towards lower ω and turn back, once, before they are seen
     # above it: each fold is the end of one stretch in that direction.
@@ -126,7 +128,7 @@ def test_no_fold_stands_where_branches_meet() -> None:
     )
     rises = np.diff(found.branches[number].values) > 0.0
     turns = int(np.sum(rises[1:] != rises[:-1]))
-    assert sum(p.kind is Kind.FOLD for p in found.on(number)) == turns
+    assert sum(p.kind is PointKind.FOLD for p in found.on(number)) == turns
 
 
 @pytest.mark.slow
@@ -136,7 +138,7 @@ def test_a_branch_goes_on_where_it_turns_sharply_beside_a_grazing() -> None:
     found = survey(over, [(0.25, settle(over.flow(0.25), np.zeros(4)))], 0.2285, 0.2527, depth=1)
     assert all(End.LOST not in b.ends for b in found.branches)
     one = next(w for w in all_windows(found) if w.response == "1-8-7")
-    assert (one.low.why, one.high.why) == (Kind.DOUBLING, Kind.FOLD)
+    assert (one.low.why, one.high.why) == (PointKind.DOUBLING, PointKind.FOLD)
     orbit = settle(flow_at(0.22992), one.high.orbit.start)
     assert orbit.response == "1-8-7"
     branch = found.branches[one.branch]
@@ -155,7 +157,7 @@ def test_a_branch_that_is_lost_from_one_end_is_followed_from_the_other() -> None
     assert len(twins) == 1
     assert twins[0].ends == (End.JOINED, End.JOINED)
     ends = sorted(twins[0].points[k].value for k in (0, -1))
-    forks = [p.value for p in found.on(0) if p.kind is Kind.PITCHFORK]
+    forks = [p.value for p in found.on(0) if p.kind is PointKind.PITCHFORK]
     assert all(min(abs(e - f) for f in forks) < 1e-9 for e in ends)
     names = facts(list(found.points))
     assert len(set(names)) == len(names)

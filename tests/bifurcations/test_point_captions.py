@@ -16,7 +16,7 @@ from designer.bifurcations.branch_switch import birth
 from designer.bifurcations.captions import changes
 from designer.bifurcations.continuation import Branch, start, trace
 from designer.bifurcations.point_captions import caption
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.sweep import Sweep, SweepPlan
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
@@ -32,13 +32,13 @@ CASES = [
     # for; what the caption says
     (
         (0.75, 0.70, 0.77),
-        (0.718977872, Kind.DOUBLING, 0.712),
+        (0.718977872, PointKind.DOUBLING, 0.712),
         "period doubling of 1-2-2 asymmetric at ω = 0.718977872: stable above, unstable below; "
         "2-4-4 is born below, stable",
     ),
     (
         (0.80, 0.77, 0.81),
-        (0.78722435, Kind.PITCHFORK, 0.783),
+        (0.78722435, PointKind.PITCHFORK, 0.783),
         "pitchfork of 1-2-2 symmetric at ω = 0.78722435: stable above, unstable below; "
         "its two asymmetric twins 1-2-2 are born below, stable",
     ),
@@ -51,7 +51,7 @@ def branch(omega: float, low: float, high: float) -> Branch:
     return trace(start(over, settle(over.flow(omega), np.zeros(4)), omega), low, high)
 
 
-def located(where: Branch, kind: Kind, near: float) -> Bifurcation:
+def located(where: Branch, kind: PointKind, near: float) -> Bifurcation:
     (point,) = [p for p in locate(where) if p.kind is kind and abs(p.value - near) < 1e-8]
     return replace(point, born=birth(where, point))
 
@@ -66,7 +66,7 @@ def counts(run: Trajectory, omega: float, periods: int) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(("course", "point", "text"), CASES)
 def test_a_caption_is_what_another_integrator_sees(
-    course: tuple[float, float, float], point: tuple[float, Kind, float], text: str
+    course: tuple[float, float, float], point: tuple[float, PointKind, float], text: str
 ) -> None:
     where = branch(*course)
     p = located(where, point[1], point[0])
@@ -92,14 +92,14 @@ def test_a_caption_is_what_another_integrator_sees(
     assert counts(run, omega, n) == p.born.response
     moved = np.abs(run.strobes[-1] - run.strobes[:-1][::-1]).max(axis=1)
     assert moved[n - 1] < 1e-4 < 1e-3 < (np.abs(run.strobes[-1] - gone.x)).max()
-    if point[1] is Kind.DOUBLING:
+    if point[1] is PointKind.DOUBLING:
         assert moved[0] > 1e-3
 
 
 def test_a_fold_and_a_grazing_point_are_told_by_their_own_branch() -> None:
     """Both sides of the grazing are run by the other integrator; past the fold there is none."""
     touched = branch(0.70, 0.6855, 0.701)
-    p = located(touched, Kind.GRAZING, 0.6859225816)
+    p = located(touched, PointKind.GRAZING, 0.6859225816)
     low = min({p.before, p.after} - {"2-4-4"})
     assert low in ("2-5-4", "2-4-5")  # either twin
     assert caption(p, "ω") == (
@@ -114,7 +114,7 @@ def test_a_fold_and_a_grazing_point_are_told_by_their_own_branch() -> None:
     over = swept_model.of_model(PAPER, 1.342, "omega")
     met = next(o for o in (settle(over.flow(1.342), x) for x in STARTS) if o.response == "1-1-2")
     folded = trace(start(over, met, 1.342), 1.34, 1.40)
-    q = located(folded, Kind.FOLD, 1.3687522838)
+    q = located(folded, PointKind.FOLD, 1.3687522838)
     assert caption(q, "ω") == (
         "fold of 1-1-2 asymmetric at ω = 1.36875228: a stable and an unstable orbit meet, both "
         "below; above there is neither"
@@ -138,7 +138,7 @@ def test_a_fold_and_a_grazing_point_are_told_by_their_own_branch() -> None:
 def test_a_track_that_is_not_on_the_branch_says_nothing_of_its_point(
     track: str, below: str, above: str, told: bool
 ) -> None:
-    p = located(branch(0.75, 0.70, 0.77), Kind.DOUBLING, 0.718977872)
+    p = located(branch(0.75, 0.70, 0.77), PointKind.DOUBLING, 0.718977872)
     steps = tuple(step_of(r) for r in (below, below, below, above, above, above))
     values = p.value + np.linspace(-5e-3, 5e-3, 6)
     plan = SweepPlan(ModelSubject(PAPER), "omega", values, (track,))

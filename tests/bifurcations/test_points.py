@@ -15,7 +15,7 @@ from designer.bifurcations.branch_survey import Survey, passes, survey
 from designer.bifurcations.continuation import End, apart, start, trace
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.orbit_curve import Curve, Solved
-from designer.bifurcations.points import Bifurcation, Kind, locate
+from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.windows import NOT_LOCATED, all_windows, outside, window, windows
 from designer.circuit import swept_board
 from designer.circuit.netlist import nominal_board
@@ -39,7 +39,7 @@ def first_cascade() -> Survey:
     return survey(over, [(1.55, settle(over.flow(1.55), np.zeros(4)))], 1.28, 1.6)
 
 
-def point(found: Survey, kind: Kind, near: float) -> Bifurcation:
+def point(found: Survey, kind: PointKind, near: float) -> Bifurcation:
     """The one point of a kind within 1e-3 of a value, on the first branch that has it."""
     return next(p for p in found.points if p.kind is kind and abs(p.value - near) < 1e-3)
 
@@ -63,7 +63,7 @@ def test_grazing_of_the_linear_response_is_where_its_amplitude_is_the_clearance(
     touching = next(p for p in branch.points if p.response == "1-1-1" and p.value < exact)
     back = trace(start(over, touching.orbit, touching.value), exact - 0.05, exact + 0.05)
     for one in (branch, back):
-        found = [p for p in locate(one) if p.kind is Kind.GRAZING]
+        found = [p for p in locate(one) if p.kind is PointKind.GRAZING]
         assert len(found) == 1
         assert {found[0].before, found[0].after} == {"1-1-1", "1-0-0"}
         assert abs(found[0].value - exact) < 1e-10
@@ -75,7 +75,7 @@ def test_grazing_over_the_clearance(omega: float) -> None:
     over = swept_model.of_model(PAPER, omega, "b")
     free = start(over, linear_orbit(omega), 1.02 * exact, symmetric=True)
     found = locate(trace(free, 0.98 * exact, 1.03 * exact))
-    grazing = [p.value for p in found if p.kind is Kind.GRAZING]
+    grazing = [p.value for p in found if p.kind is PointKind.GRAZING]
     assert grazing == pytest.approx([exact], rel=1e-10)
 
 
@@ -102,7 +102,7 @@ def test_error_of_a_point_grows_with_what_newtons_method_left() -> None:
     c = free.curve
     rough = replace(free, curve=Stalling(c.family, c.n, c.symmetric, c.scale))
     branch = trace(rough, 0.98 * exact, 1.03 * exact)
-    found = [p for p in locate(branch) if p.kind is Kind.GRAZING]
+    found = [p for p in locate(branch) if p.kind is PointKind.GRAZING]
     assert found
     for p in found:
         assert 2e-11 < abs(p.value - exact) < p.error < 1e-8
@@ -117,7 +117,7 @@ def test_torus_where_an_oscillators_damping_vanishes() -> None:
     over = Family("c", -1.0, 1.0, build)
     branch = trace(start(over, settle(over.flow(0.2), np.zeros(2)), 0.2), -0.1, 0.3)
     found = locate(branch)
-    assert [p.kind for p in found] == [Kind.TORUS]
+    assert [p.kind for p in found] == [PointKind.TORUS]
     assert abs(found[0].value) < 1e-11
     assert found[0].stable == (False, True)
 
@@ -143,7 +143,7 @@ def rate(found: Survey, p: Bifurcation, at: complex) -> float:
 @pytest.mark.slow
 def test_pitchfork_and_doubling_have_their_multiplier_by_an_independent_integrator() -> None:
     found = first_cascade()
-    for kind, near, at in ((Kind.PITCHFORK, 1.4605, 1.0), (Kind.DOUBLING, 1.34995, -1.0)):
+    for kind, near, at in ((PointKind.PITCHFORK, 1.4605, 1.0), (PointKind.DOUBLING, 1.34995, -1.0)):
         p = point(found, kind, near)
         off = abs(multiplier(p, at) - at)
         assert off < 1e-5
@@ -163,7 +163,7 @@ def half_map(p: Plain, omega: float, x: Array) -> Array:
 
 @pytest.mark.slow
 def test_pitchfork_is_the_half_period_multiplier_minus_one() -> None:
-    p = point(first_cascade(), Kind.PITCHFORK, 1.4605)
+    p = point(first_cascade(), PointKind.PITCHFORK, 1.4605)
     x, step = p.point.orbit.start, 1e-4
     assert np.abs(half_map(PLAIN, p.value, x) - x).max() < 1e-10
 
@@ -188,7 +188,7 @@ def test_pitchfork_is_the_half_period_multiplier_minus_one() -> None:
 @pytest.mark.slow
 def test_twins_meet_at_the_pitchfork() -> None:
     found = first_cascade()
-    p = point(found, Kind.PITCHFORK, 1.4605)
+    p = point(found, PointKind.PITCHFORK, 1.4605)
     child = next(b for b, q in zip(found.branches, found.parents, strict=True) if q == p.branch)
     assert child.ends[0] is End.JOINED
     near = [q for q in child.points if abs(q.value - p.value) < 2e-3][:6]
@@ -212,7 +212,7 @@ def test_no_branch_falls_back_onto_its_parent() -> None:
 
 
 def test_doubling_is_where_long_runs_change_their_period() -> None:
-    p = point(first_cascade(), Kind.DOUBLING, 1.34995)
+    p = point(first_cascade(), PointKind.DOUBLING, 1.34995)
     for shift, n in ((3e-3, 1), (-3e-3, 2)):
         omega = p.value + shift
         strobes = Flow(
@@ -244,7 +244,7 @@ def tip(p: Plain, omega: float, x: Array, periods: int) -> float:
 @pytest.mark.slow
 def test_grazing_within_a_cascade_by_an_independent_integrator() -> None:
     found = first_cascade()
-    p = point(found, Kind.GRAZING, 1.33931)
+    p = point(found, PointKind.GRAZING, 1.33931)
     assert {p.before, p.after} in ({"2-2-2", "2-2-3"}, {"2-2-2", "2-3-2"})
     curve = found.branches[p.branch].curve
     signs = []
@@ -257,7 +257,7 @@ def test_grazing_within_a_cascade_by_an_independent_integrator() -> None:
 
 def test_fold_ends_what_a_long_run_follows() -> None:
     branch = branch_of(PAPER, 0.85, "omega", 0.8, 0.95)
-    p = next(q for q in locate(branch) if q.kind is Kind.FOLD)
+    p = next(q for q in locate(branch) if q.kind is PointKind.FOLD)
     assert p.direction == 0
     assert p.stable[0] != p.stable[1]
     x = p.point.orbit.start
@@ -338,15 +338,17 @@ def test_a_branch_begins_with_the_counts_of_the_orbit_that_it_leaves() -> None:
     for number, (child, _) in enumerate(children, 1):
         pairs = zip(child.points, child.points[1:], strict=False)
         changes = sum(a.counts != b.counts for a, b in pairs)
-        assert sum(p.kind is Kind.GRAZING for p in found.on(number)) == changes
+        assert sum(p.kind is PointKind.GRAZING for p in found.on(number)) == changes
 
 
 def test_window_behind_a_grazing_does_not_begin_at_the_pitchfork() -> None:
     one = next(w for w in all_windows(below_1_6_6()) if w.response in ("1-6-5", "1-5-6"))
     fork = next(
-        p for p in below_1_6_6().points if p.kind is Kind.PITCHFORK and p.stable == (True, False)
+        p
+        for p in below_1_6_6().points
+        if p.kind is PointKind.PITCHFORK and p.stable == (True, False)
     )
-    assert one.low.why == Kind.FOLD
+    assert one.low.why == PointKind.FOLD
     assert one.low.value < fork.value - 1e-8
     # Both are attractors between the fold and the pitchfork, by running the flow.
     middle = 0.5 * (one.low.value + fork.value)
@@ -357,11 +359,11 @@ def test_window_behind_a_grazing_does_not_begin_at_the_pitchfork() -> None:
 
 def test_windows_end_where_a_change_of_stability_was_not_located() -> None:
     branch = branch_of(PAPER, 1.55, "omega", 1.4, 1.6)
-    fork = next(p for p in locate(branch) if p.kind is Kind.PITCHFORK)
+    fork = next(p for p in locate(branch) if p.kind is PointKind.PITCHFORK)
     (known,) = windows(branch, [fork])
     (guessed,) = windows(branch, [])
     assert known.high == guessed.high
-    assert (known.low.why, guessed.low.why) == (Kind.PITCHFORK, NOT_LOCATED)
+    assert (known.low.why, guessed.low.why) == (PointKind.PITCHFORK, NOT_LOCATED)
     assert abs(guessed.low.value - fork.value) <= guessed.low.error
     assert guessed.low.error < 1e-2
 
@@ -369,7 +371,7 @@ def test_windows_end_where_a_change_of_stability_was_not_located() -> None:
 def test_windows_have_one_response_where_a_grazing_was_not_located() -> None:
     branch = branch_of(PAPER, 0.85, "omega", 0.76, 0.95)
     points = locate(branch)
-    grazing = [p for p in points if p.kind is Kind.GRAZING and p.stable == (True, True)]
+    grazing = [p for p in points if p.kind is PointKind.GRAZING and p.stable == (True, True)]
     assert grazing
     whole = windows(branch, points)
     split = windows(branch, [p for p in points if p not in grazing])
@@ -410,5 +412,5 @@ def test_a_board_folds_where_its_model_does() -> None:
     scale = e.frequency / 0.85
     board = trace(start(over, case.orbit, e.frequency), 0.8 * scale, 0.95 * scale)
     model = branch_of(PAPER, 0.85, "omega", 0.8, 0.95)
-    found = [next(p for p in locate(b) if p.kind is Kind.FOLD).value for b in (board, model)]
+    found = [next(p for p in locate(b) if p.kind is PointKind.FOLD).value for b in (board, model)]
     assert found[0] / scale == pytest.approx(found[1], rel=1e-9)

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from designer.base.errors import InputError
-from designer.board.footprint_shapes import Footprint
+from designer.board.footprint_shapes import FootprintShape
 from designer.board.footprints import EXAMPLES, footprint
 from designer.catalog.catalog import load_catalog
 
@@ -54,7 +54,7 @@ def test_a_chip_stands_on_its_pads(
     assert first.height >= width
 
 
-def pins(made: Footprint) -> dict[str, tuple[float, float]]:
+def pins(made: FootprintShape) -> dict[str, tuple[float, float]]:
     return {pad.number: (pad.x, pad.y) for pad in made.pads}
 
 

@@ -177,7 +177,7 @@ def test_kicads_own_deck_shows_the_same_responses(tmp_path: Path) -> None:
         for answer in checked:
             assert answer.gate is not None
             assert answer.gate.passed
-            subject = numerics_gate.Subject(reduction, answer.excitation, answer.circuit)
+            subject = numerics_gate.GateSubject(reduction, answer.excitation, answer.circuit)
             own = numerics_gate.job(subject, answer.gate.settings)
             run = FirstRun(
                 answer.excitation, answer.gate.settings, own.stop_time, answer.circuit.start

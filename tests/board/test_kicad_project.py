@@ -25,7 +25,7 @@ from designer.board.kicad_names import (
     project_name,
     safe_text,
 )
-from designer.board.kicad_placement import Placement, Spot, place
+from designer.board.kicad_placement import PlacedComponent, Placement, place
 from designer.board.kicad_project import Project, files
 from designer.circuit.netlist import Resistor
 from tests.base.test_views import CIRCUITS
@@ -176,7 +176,7 @@ def placed(made: Project) -> Placement:
     return place(made.circuit, [c for c in made.components if View.BOARD in c.views])
 
 
-def courtyard(spot: Spot) -> tuple[float, float, float, float]:
+def courtyard(spot: PlacedComponent) -> tuple[float, float, float, float]:
     left, top, right, bottom = spot.footprint.courtyard
     if spot.angle == 180:
         left, top, right, bottom = -right, -bottom, -left, -top

@@ -49,7 +49,7 @@ CASES: dict[str, tuple[Circuit, Sides, float, Mounting, dict[float, str]]] = {
 """Circuit, its stops, f20, mounting, and the response by drive frequency."""
 
 
-def subject(circuit: Circuit, sides: Sides, f20: float, omega: float) -> numerics_gate.Subject:
+def subject(circuit: Circuit, sides: Sides, f20: float, omega: float) -> numerics_gate.GateSubject:
     """The nominal board at omega, started on the model's own orbit."""
     wanted = model(sides, f20).second_order()
     errors = coefficient_errors(circuit, wanted)
@@ -57,7 +57,7 @@ def subject(circuit: Circuit, sides: Sides, f20: float, omega: float) -> numeric
     excitation = Excitation(errors.scales.frequency(omega), 1.0 / errors.drive_gain[0])
     reduction = Reduction(circuit, nominal_board(circuit))
     flow = Flow(reduction.system(), excitation.drive)
-    return numerics_gate.Subject(
+    return numerics_gate.GateSubject(
         reduction, excitation, settle(flow, orbit.start * errors.scales.volts)
     )
 

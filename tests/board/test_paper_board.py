@@ -14,7 +14,7 @@ from designer.board.kicad_project import Project, files
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.paper_values import MODEL, OPAMP, circuit, corrected, rounded
 from designer.design_rules import run_rules
-from designer.design_rules.subject import Subject
+from designer.design_rules.subject import RuleSubject
 from designer.model.board_table import BoardChoice
 from designer.model.model_file import parse_model_file
 from tests.base.test_views import CIRCUITS
@@ -32,7 +32,7 @@ UNSOLD = 1e-7
 
 
 @cache
-def subject() -> Subject:
+def subject() -> RuleSubject:
     """The printed values with the errata's corrections, each the nearest that is sold."""
     values = rounded(corrected(), parse_model_file(TEXT).circuit, CATALOG)
     return subject_of(circuit(MODEL, values, CATALOG.opamp(OPAMP)), MODEL, TEXT)

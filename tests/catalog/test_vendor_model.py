@@ -11,7 +11,7 @@ from designer.base.errors import InputError
 from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
 from designer.catalog.vendor_model import MOST_BYTES, PINS, read_vendor_model
-from designer.spice.opamp_check import Bench
+from designer.spice.opamp_check import OpAmpBench
 
 SHIPPED = Path(__file__).resolve().parents[2] / "catalogs" / "opamps.toml"
 
@@ -60,7 +60,7 @@ def test_a_vendor_model_takes_the_place_of_ours_on_the_finest_rung(tmp_path: Pat
     save(tmp_path)
     (tmp_path / "own.toml").write_text(entry(GOOD), encoding="utf-8")
     opamp = load_catalog(tmp_path).opamp("TL074C")
-    bench = Bench.of(opamp, "full")
+    bench = OpAmpBench.of(opamp, "full")
     assert bench.open_loop_gain() == pytest.approx(1e5, rel=1e-3)
     frequency, margin = bench.unity_gain()
     assert frequency == pytest.approx(2e6, rel=1e-2)
@@ -68,7 +68,7 @@ def test_a_vendor_model_takes_the_place_of_ours_on_the_finest_rung(tmp_path: Pat
     assert bench.swing(1e6)[1] == pytest.approx(14.1, abs=0.1)
     assert bench.supply_current() == pytest.approx((2e-3, 2e-3), rel=1e-2)
     assert bench.offset() == pytest.approx(opamp.offset.nominal, rel=1e-3)
-    assert Bench.of(opamp, "dynamic").open_loop_gain() == pytest.approx(200e3, rel=1e-3)
+    assert OpAmpBench.of(opamp, "dynamic").open_loop_gain() == pytest.approx(200e3, rel=1e-3)
 
 
 def test_the_hash_of_the_catalogue_follows_the_model(tmp_path: Path) -> None:

@@ -23,10 +23,10 @@ from designer.base.figure_style import to_svg
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.centering import cure_measure, cure_search
-from designer.centering.cure_branch import Branch
+from designer.centering.cure_branch import CureBranch
 from designer.centering.cure_couplings import finest
-from designer.centering.cure_linear_model import Picture
-from designer.centering.cure_measure import Book, Measured, measure, measure_together
+from designer.centering.cure_linear_model import LinearModel
+from designer.centering.cure_measure import Book, MeasuredYield, measure, measure_together
 from designer.centering.cure_milp import cheapest
 from designer.centering.cure_plots import front_chart
 from designer.centering.cure_result_json import cure_json
@@ -35,7 +35,7 @@ from designer.centering.cure_slots import PartSlot, network_slots, part_slots, t
 from designer.centering.cure_table import text
 from designer.centering.cure_trial import Cure
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_parts_kept
-from designer.centering.cure_ways import Way, best_place
+from designer.centering.cure_ways import ResponseWay, best_place
 from designer.jobs import rung_choice
 from designer.jobs.cure_job import CURE, STUDIES, cure
 from designer.jobs.options import Options
@@ -65,8 +65,8 @@ TARGET = 0.97
 
 
 @cache
-def branch() -> Branch:
-    return Branch(Upgrades(), paper_cases.synthesised(), 0.0)
+def branch() -> CureBranch:
+    return CureBranch(Upgrades(), paper_cases.synthesised(), 0.0)
 
 
 @cache
@@ -85,14 +85,14 @@ def known_margin(nominal: float, otherwise: bool = False) -> Margin:
     return Margin(differing, (replace(limit, sigma=sigma),))
 
 
-def known_picture(nominal: float) -> Picture:
+def known_picture(nominal: float) -> LinearModel:
     """The picture of that limit: the better grades of a few parts are what can be bought."""
     from designer.centering import cure_linear_model
 
     parts = tuple(p for p in part_slots(branch().made) if p.slot.name in SLOTS)
-    way = Way(0, "as it is", cast(Question, None), None, known_margin(nominal), 0.5)
+    way = ResponseWay(0, "as it is", cast(Question, None), None, known_margin(nominal), 0.5)
     ratios = cure_linear_model._ratios(branch(), parts, 5)
-    return Picture(branch(), parts, ((way,),), ratios, 0.0, 5)
+    return LinearModel(branch(), parts, ((way,),), ratios, 0.0, 5)
 
 
 def test_a_demand_holds_the_variance_of_the_drawn_boards() -> None:
@@ -122,10 +122,10 @@ def test_the_quantile_is_that_of_the_drawn_form() -> None:
 def truth(nominal: float, otherwise: bool = False) -> Any:
     """What a study measures where the limit is known: boards are ok where it is positive."""
 
-    def of(plan: StudyPlan, target: float, book: Book, **_: object) -> Measured:
+    def of(plan: StudyPlan, target: float, book: Book, **_: object) -> MeasuredYield:
         boards = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
         ok = int((known_margin(nominal, otherwise).of(boards) > 0.0).sum())
-        return Measured(Yield(ok, 8000 - ok, 0, 0), target)
+        return MeasuredYield(Yield(ok, 8000 - ok, 0, 0), target)
 
     return of
 
@@ -143,12 +143,12 @@ def by_hand(nominal: float) -> float:
 
 def searched(
     monkeypatch: pytest.MonkeyPatch,
-    picture: Picture | Callable[..., Picture],
+    picture: LinearModel | Callable[..., LinearModel],
     real: Any,
     budget: float | None = None,
 ) -> Cure:
     """The search with this picture, where ``real`` is what studies measure."""
-    taken = (lambda *_, **__: picture) if isinstance(picture, Picture) else picture
+    taken = (lambda *_, **__: picture) if isinstance(picture, LinearModel) else picture
     monkeypatch.setattr(cure_search, "picture", taken)
     monkeypatch.setattr(cure_search, "measure", real)
     monkeypatch.setattr(cure_measure, "measure", real)  # as measure_together calls it
@@ -224,7 +224,7 @@ def test_the_picture_knows_what_missed(
     class _Taken(Exception):
         pass
 
-    def taken(*_: object, missed: list[int], **__: object) -> Picture:
+    def taken(*_: object, missed: list[int], **__: object) -> LinearModel:
         told.append(missed)
         raise _Taken
 
@@ -428,7 +428,7 @@ def test_a_trade_that_sends_every_board_to_ngspice_is_told(
     design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rung: RungName, told: int
 ) -> None:
     folder = Path(shutil.copytree(design, tmp_path / "design"))
-    choice = rung_choice.Choice(rung, "rung by trade.json: because")
+    choice = rung_choice.RungChoice(rung, "rung by trade.json: because")
     monkeypatch.setattr(rung_choice, "choose", lambda _: choice)
     said = _Notes()
     with pytest.raises(_Stopped):
@@ -483,11 +483,11 @@ def trimming() -> PartSlot:
     return slot
 
 
-def with_trimmer(nominal: float, rate: float) -> Picture:
+def with_trimmer(nominal: float, rate: float) -> LinearModel:
     """The known picture, where a trimmer can be had as well: so many boards show it trimmed."""
     seen = known_picture(nominal)
     slot = trimming()
-    rows = (*seen.ways[0], Way(0, "trimmer", cast(Question, None), None, None, rate))
+    rows = (*seen.ways[0], ResponseWay(0, "trimmer", cast(Question, None), None, None, rate))
     parts = (*seen.parts, slot)
     return replace(seen, parts=parts, ways=(rows,))
 
@@ -549,10 +549,10 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
     """Few boards promised what many do not show: the next choice is the cheapest of grades."""
     real = truth(6.5)
 
-    def of(plan: StudyPlan, target: float, book: Book, **more: object) -> Measured:
+    def of(plan: StudyPlan, target: float, book: Book, **more: object) -> MeasuredYield:
         if more.get("trim") is not None:
-            return Measured(Yield(7000, 1000, 0, 0), target)
-        return cast(Measured, real(plan, target, book))
+            return MeasuredYield(Yield(7000, 1000, 0, 0), target)
+        return cast(MeasuredYield, real(plan, target, book))
 
     seen = with_trimmer(6.5, 1.0)
     free = replace(
@@ -561,7 +561,7 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
     )
     seen = replace(seen, parts=(*seen.parts[:-1], replace(seen.parts[-1], slot=free)))
 
-    def pictured(seen: Picture, which: Sequence[tuple[int, int]], *_: object) -> Picture:
+    def pictured(seen: LinearModel, which: Sequence[tuple[int, int]], *_: object) -> LinearModel:
         """With a margin that sees no limit of the trimmed boards."""
         assert which == [(0, 1)]
         plain, trimmed = seen.ways[0]
@@ -591,7 +591,7 @@ def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     assert book.block(plan, range(6), None, 1)[1]
 
 
-def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> Picture:
+def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> LinearModel:
     """A limit of the elements of one array alone, with slopes of these signs, and of R50."""
     from designer.centering import cure_linear_model
 
@@ -607,10 +607,10 @@ def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> Picture:
     margin = Margin(differing, (replace(limit, sigma=sigma),))
     names = {*network.network, "R50"}
     parts = (*(p for p in part_slots(made) if p.slot.name in names), network)
-    way = Way(0, "as it is", cast(Question, None), None, margin, 0.5)
+    way = ResponseWay(0, "as it is", cast(Question, None), None, margin, 0.5)
     ratios = cure_linear_model._ratios(branch(), parts, 5)
     matched = cure_linear_model._matched(branch(), parts, 5)
-    return Picture(branch(), parts, ((way,),), ratios, 0.0, 5, matched)
+    return LinearModel(branch(), parts, ((way,),), ratios, 0.0, 5, matched)
 
 
 @pytest.mark.parametrize("signs", [(2.0, -2.0, 2.0, -2.0), (2.0, 2.0, 2.0, 2.0), (3.0, -1.0)])
@@ -640,7 +640,7 @@ def test_an_array_costs_what_it_changes_on_the_bill() -> None:
     for slot in slots[::3]:
         assert 2 <= len(slot.network) <= 4
         assert len({values[name] for name in slot.network}) == 1
-        seen = Picture(branch(), (slot,), (), (), 0.0, 5)
+        seen = LinearModel(branch(), (slot,), (), (), 0.0, 5)
         upgrades = seen.upgrades((1,))
         assert [n.parts for n in upgrades.networks] == [slot.network]
         assert Upgrades.of_dict(json.loads(json.dumps(upgrades.as_dict()))) == upgrades
@@ -682,7 +682,7 @@ def test_arrays_are_chosen_as_by_enumeration(
 def test_the_finest_choices_can_be_built() -> None:
     parts = (*part_slots(branch().made), *network_slots(branch().made))
     for most in finest(parts, CATALOG):
-        seen = Picture(branch(), parts, (), (), 0.0, 5)
+        seen = LinearModel(branch(), parts, (), (), 0.0, 5)
         file = upgraded_file(branch().made.modelfile, seen.upgrades(most))
         spread_of(file, branch().made.design.circuit, CATALOG)
         assert any(most)

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from designer.centering.cure_measure import Measured
+from designer.centering.cure_measure import MeasuredYield
 from designer.centering.cure_plots import front_chart
 from designer.centering.cure_trial import Cure, Trial
-from designer.centering.cure_upgrade import Place, Upgrades
+from designer.centering.cure_upgrade import Upgrades, WindowPlace
 from designer.yields.verdict import Yield
 from tests.shared import paper_cases
 
 
 def trial(price: float, ok: int, upgrades: Upgrades | None = None) -> Trial:
-    measured = Measured(Yield(ok, 500 - ok, 0, 0), 0.99)
+    measured = MeasuredYield(Yield(ok, 500 - ok, 0, 0), 0.99)
     return Trial("as it is", upgrades or Upgrades(), price, (0.995,), (measured,), 0.99)
 
 
@@ -42,7 +42,7 @@ def test_prices_are_along_the_axis() -> None:
 
 def test_where_nothing_costs_anything_rounds_are_along_the_axis() -> None:
     """Each point has a place of its own, also one that the front leaves out."""
-    places = [Upgrades(places={0: Place(w, 0.25)}) for w in (0.84, 0.86)]
+    places = [Upgrades(places={0: WindowPlace(w, 0.25)}) for w in (0.84, 0.86)]
     before = trial(0.0, 100)
     rounds = [trial(0.0, 400, places[0]), trial(0.0, 499, places[1])]
     found = cured(before, rounds, [before, rounds[1]])

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from designer.centering import cure_linear_model, cure_measure, cure_search
-from designer.centering.cure_branch import KINDS, Branch, cured
-from designer.centering.cure_measure import Book, Measured
+from designer.centering.cure_branch import KINDS, CureBranch, cured
+from designer.centering.cure_measure import Book, MeasuredYield
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_slots import part_slots
 from designer.centering.cure_trial import Cure
 from designer.centering.cure_upgrade import Upgrades, price
-from designer.centering.cure_ways import Way
+from designer.centering.cure_ways import ResponseWay
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
@@ -58,17 +58,17 @@ def test_the_references_are_taken_where_they_move_the_limit(
     sigma = float(Margin(differing, (limit,)).each(boards).std())
     margin = Margin(differing, (replace(limit, sigma=sigma),))
 
-    def counted(plan: StudyPlan, target: float, book: Book, **_: object) -> Measured:
+    def counted(plan: StudyPlan, target: float, book: Book, **_: object) -> MeasuredYield:
         drawn = draw_many(plan.circuit, plan.spread, plan.seed, range(8000))
         ok = int((margin.of(drawn) > 0.0).sum())
-        return Measured(Yield(ok, 8000 - ok, 0, 0), target)
+        return MeasuredYield(Yield(ok, 8000 - ok, 0, 0), target)
 
     slots = part_slots(base, frozenset(KINDS) - {"reference"})
     (slot,) = slots
-    branch = Branch(Upgrades(), base, 0.0)
-    way = Way(0, "as it is", cast(Question, None), None, margin, 0.5)
+    branch = CureBranch(Upgrades(), base, 0.0)
+    way = ResponseWay(0, "as it is", cast(Question, None), None, margin, 0.5)
     ratios = cure_linear_model._ratios(branch, slots, 5)
-    seen = cure_linear_model.Picture(branch, slots, ((way,),), ratios, 0.0, 5)
+    seen = cure_linear_model.LinearModel(branch, slots, ((way,),), ratios, 0.0, 5)
     monkeypatch.setattr(cure_search, "picture", lambda *_, **__: seen)
     monkeypatch.setattr(cure_search, "measure", counted)
     monkeypatch.setattr(cure_measure, "measure", counted)

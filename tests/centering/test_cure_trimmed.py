@@ -11,7 +11,7 @@ import pytest
 from designer.centering import cure_trimmed
 from designer.centering.cure_measure import Book
 from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways, without_wiper
-from designer.centering.cure_ways import Looker, Way
+from designer.centering.cure_ways import Looker, ResponseWay
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import nominal_board
 from designer.circuit.rest_point import at_rest
@@ -57,10 +57,12 @@ class _Looker(Looker):
         return replace(plan(6, spread=ROUGH), questions=())
 
 
-def ways(best: StudyPlan, target: float) -> list[Way] | None:
+def ways(best: StudyPlan, target: float) -> list[ResponseWay] | None:
     none = cast(Any, None)
     looker = _Looker(none, target, 1, Book(), 0.0, frozenset(), (best,), 2, lambda: None)
-    return trimmer_ways(looker, trim(), [Way(0, "as it is", plan(6, spread=ROUGH).questions[0])])
+    return trimmer_ways(
+        looker, trim(), [ResponseWay(0, "as it is", plan(6, spread=ROUGH).questions[0])]
+    )
 
 
 def test_what_trimmed_boards_show_is_what_a_study_of_them_finds(

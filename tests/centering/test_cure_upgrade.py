@@ -21,12 +21,12 @@ from designer.board.bom import bill, bill_csv
 from designer.board.component import components
 from designer.catalog.catalog import load_catalog
 from designer.catalog.entries import PRICE_CLASSES
-from designer.centering.cure_branch import Branch, better_opamps, branch_of, branches
+from designer.centering.cure_branch import CureBranch, better_opamps, branch_of, branches
 from designer.centering.cure_slots import part_slots
 from designer.centering.cure_upgrade import (
     PartNetwork,
-    Place,
     Upgrades,
+    WindowPlace,
     price,
     upgraded_file,
     with_parts_kept,
@@ -76,7 +76,7 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
     upgrades = Upgrades(
         opamp="TL074H",
         grades={"R50": 0.001, "R4": 0.001},
-        places={1: Place(0.87, 0.26)},
+        places={1: WindowPlace(0.87, 0.26)},
         trim=0.03,
         trimmer=True,
         networks=(PartNetwork("Vishay ACAS 0612", ("R2", "R3")),),
@@ -161,7 +161,7 @@ def test_another_opamp_on_the_same_parts_has_its_own_limits(base: Synthesis) -> 
 @pytest.mark.slow
 def test_where_a_condition_breaks_the_parts_are_chosen_anew(base: Synthesis) -> None:
     branch = branch_of(base, Upgrades(opamp="TL074H", grades={"R50": 0.001}))
-    assert isinstance(branch, Branch)
+    assert isinstance(branch, CureBranch)
     assert branch.upgrades == Upgrades(opamp="TL074H")
     design = branch.made.design
     assert all(check.holds for check in design.checks)

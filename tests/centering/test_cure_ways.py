@@ -13,8 +13,17 @@ from scipy.stats import binom
 
 from designer.centering import cure_ways
 from designer.centering.cure_branch import PLACE
-from designer.centering.cure_measure import Book, Measured
-from designer.centering.cure_ways import FEW, RARE, Looker, Way, drawn, forecast, foretold, settled
+from designer.centering.cure_measure import Book, MeasuredYield
+from designer.centering.cure_ways import (
+    FEW,
+    RARE,
+    Looker,
+    ResponseWay,
+    drawn,
+    forecast,
+    foretold,
+    settled,
+)
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
@@ -56,8 +65,8 @@ def looker(monkeypatch: pytest.MonkeyPatch, lost: dict[int, int], verdict: Verdi
 
 def bounded(
     monkeypatch: pytest.MonkeyPatch, first: int, second: int, verdict: Verdict = Verdict.LOST
-) -> Way:
-    way = Way(0, "as it is", cast(Any, None), rate=0.5)
+) -> ResponseWay:
+    way = ResponseWay(0, "as it is", cast(Any, None), rate=0.5)
     boards = [cast(Any, _Boards())]
     return looker(monkeypatch, {0: first, FEW: second}, verdict).bounded(way, boards)
 
@@ -123,11 +132,11 @@ def test_boards_that_settle_slowly_are_not_lost() -> None:
     assert {a.verdict for a in foretold(boards, question, 2)} == {Verdict.OK}
     none = cast(Any, None)
     looker = Looker(none, TARGET, 1, Book(), 0.0, frozenset(), (plan,), 2, lambda: None)
-    assert not looker.bounded(Way(0, "as it is", question, rate=0.5)).hopeless
+    assert not looker.bounded(ResponseWay(0, "as it is", question, rate=0.5)).hopeless
 
 
 def test_a_way_that_lost_no_board_is_not_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    sure = Way(0, "omega", cast(Any, None), rate=1.0)
+    sure = ResponseWay(0, "omega", cast(Any, None), rate=1.0)
     assert looker(monkeypatch, {0: FEW}, Verdict.LOST).bounded(sure) is sure
     assert sure.certain
 
@@ -140,12 +149,12 @@ def test_what_was_measured_to_miss_gets_further_ways(
     nothing = cast(Any, None)
     monkeypatch.setattr(cure_ways, "plan_of", lambda *_: nothing)
     monkeypatch.setattr(
-        cure_ways, "measure", lambda *_, **__: Measured(Yield(100, 0, 0, 0), TARGET)
+        cure_ways, "measure", lambda *_, **__: MeasuredYield(Yield(100, 0, 0, 0), TARGET)
     )
     branch = cast(Any, SimpleNamespace(made=nothing))
     looker = Looker(
         branch, TARGET, 1, Book(), 0.05, frozenset({PLACE}), (), 1, lambda: None, missed
     )
-    found = looker.ways(Way(0, "as it is", nothing, rate=1.0))
+    found = looker.ways(ResponseWay(0, "as it is", nothing, rate=1.0))
     assert [way.kind for way in found] == ["as it is", "trim"][:kinds]
     assert not any(way.hopeless for way in found)

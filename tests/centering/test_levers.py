@@ -14,10 +14,10 @@ from designer.centering import levers
 from designer.centering.candidate import ALIKE, GAIN, Candidate, Listened, better
 from designer.centering.design_search import BOARDS, look, search
 from designer.centering.distance import Stand, Stretched
-from designer.centering.levers import LEVERS, Choice, slower, topologies, variants
+from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
 from designer.centering.ngspice_check import Agreement
 from designer.centering.places import Scored, score
-from designer.centering.windows import Place, Stretch
+from designer.centering.windows import ResponsePlace, Stretch
 from designer.model import find_responses
 from designer.model.model_file import ModelFile
 from designer.model.response_table import Response
@@ -31,12 +31,12 @@ BOTH = file(PLACE, zone="saturation", zones='"saturation", "rectifier"')
 
 def test_the_file_s_own_choice_is_first() -> None:
     found = topologies(BOTH, catalog())
-    assert found[0] == Choice.of(BOTH.circuit)
+    assert found[0] == DesignChoice.of(BOTH.circuit)
     assert [c.dead_zone for c in found] == ["saturation", "rectifier"]
     wider = replace(BOTH, search=replace(BOTH.search, opamps=("TL074H", "TL074C")))
     found = topologies(wider, catalog())
     assert len(found) == 4
-    assert found[0] == Choice.of(BOTH.circuit)
+    assert found[0] == DesignChoice.of(BOTH.circuit)
 
 
 def test_an_unknown_op_amp_is_refused() -> None:
@@ -48,7 +48,7 @@ def test_an_unknown_op_amp_is_refused() -> None:
 
 @pytest.mark.parametrize("lever", LEVERS[2:])
 def test_a_variant_moves_one_lever(lever: str) -> None:
-    own = Choice.of(BOTH.circuit)
+    own = DesignChoice.of(BOTH.circuit)
     found = list(variants(own, lever))
     assert found
     for other in found:
@@ -150,14 +150,14 @@ def test_a_dead_zone_gets_its_chance_at_the_places_that_were_found(
     assert not any(better(c.rank, found.final.rank) for c in every)
 
 
-def _enumerated(modelfile: ModelFile, choice: Choice) -> Candidate:
+def _enumerated(modelfile: ModelFile, choice: DesignChoice) -> Candidate:
     model, spec = modelfile.model, choice.spec(modelfile.circuit)
     found = find_responses.find(model, modelfile.responses)
     held = find_responses.peaks(model, found)
     design = parts_choice.synthesise(model, spec, catalog(), held, found, aims=choice.aims)
     spread = spread_of(modelfile, design.circuit, catalog())
     bench = Stretched(design, spread, 1, BOARDS)
-    places = [Place(r.omega, r.b, r.orbit.start) for r in found]
+    places = [ResponsePlace(r.omega, r.b, r.orbit.start) for r in found]
     scored = tuple(score(bench, r.spec, [p], BOARDS)[0] for r, p in zip(found, places, strict=True))
     return Candidate(choice, design, found, scored)
 
@@ -213,7 +213,7 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:
-    own = Choice.of(BOTH.circuit)
+    own = DesignChoice.of(BOTH.circuit)
     low, high = own.frequency
     found = list(slower(own, high, low))
     for before, after in itertools.pairwise((high, *(c.frequency[1] for c in found))):

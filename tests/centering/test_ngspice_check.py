@@ -21,13 +21,13 @@ from designer.centering.ngspice_check import (
     Agreement,
     Listener,
 )
-from designer.centering.windows import Place
+from designer.centering.windows import ResponsePlace
 from designer.circuit.reduction import Reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.pool import SpicePool
 from designer.spread.board_quantities import between
 from designer.spread.spread import draw_many
-from designer.yields.ngspice_runs import Heard, Query
+from designer.yields.ngspice_runs import NgspiceAnswer, Query
 from designer.yields.ngspice_sampling import OR, UNDECIDED
 from tests.shared.search_cases import made, spread
 
@@ -35,7 +35,7 @@ from tests.shared.search_cases import made, spread
 def bench(memory: Memory | None = None) -> tuple[Stretched, Stand]:
     found = Stretched(made().design, spread(), 1, LISTENED, memory=memory)
     (response,) = made().found
-    place = Place(response.omega, response.b, response.orbit.start)
+    place = ResponsePlace(response.omega, response.b, response.orbit.start)
     (stand,) = found.stands([(response.spec, place)])
     assert stand is not None
     return found, stand
@@ -87,10 +87,12 @@ def test_what_ngspice_says_is_counted(
 ) -> None:
     """ngspice is played: these answers."""
 
-    def confirm(_: object, queries: Sequence[Query]) -> list[Heard]:
+    def confirm(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
         assert all(q.subject.rung == "dynamic" for q in queries)
         assert {q.expected for q in queries} == {"1-2-2"}
-        return [Heard(UNDECIDED, either=a) if OR in a else Heard(a) for a in answers]
+        return [
+            NgspiceAnswer(UNDECIDED, either=a) if OR in a else NgspiceAnswer(a) for a in answers
+        ]
 
     boards, stand = bench()
     wanted = replace(stand, spec=replace(stand.spec, **spec))
@@ -114,8 +116,8 @@ def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.M
 def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where eight boards are left the others are unanswered, where fewer are nobody is asked."""
 
-    def confirm(_: object, queries: Sequence[Query]) -> list[Heard]:
-        return [Heard("1-2-2")] * len(queries)
+    def confirm(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
+        return [NgspiceAnswer("1-2-2")] * len(queries)
 
     boards, stand = bench()
     monkeypatch.setattr(

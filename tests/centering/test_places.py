@@ -7,7 +7,7 @@ import pytest
 
 from designer.centering.distance import LADDER, Stretched
 from designer.centering.places import MANY, places, room_of, score
-from designer.centering.windows import Place, stretches
+from designer.centering.windows import ResponsePlace, stretches
 from designer.model.response_table import Expect, Response
 from designer.model.search_table import SearchSpec
 from tests.shared.search_cases import made, spread
@@ -28,7 +28,7 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
 
     near = {s.b: s for s in seen}
     grid = [
-        Place(float(omega), float(b), start.start)
+        ResponsePlace(float(omega), float(b), start.start)
         for b in np.linspace(0.25, 0.265, 4)
         for stretch in [near[min(near, key=lambda v: abs(v - b))]]
         for omega in np.geomspace(0.49, 0.58, 24)

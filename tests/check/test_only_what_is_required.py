@@ -24,7 +24,7 @@ from designer.model.model import Dimensionless
 from designer.model.response_table import Response
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings, write
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spread.spread import Spread
 from designer.yields.exact_rung import block
 from designer.yields.verdict import Question, StudyPlan
@@ -185,7 +185,7 @@ def test_vectors_that_ngspice_keeps(name: str) -> None:
     excitation, on = drive(scene)
     orbit = settle(Flow(reduction.system(), on), np.zeros(4))
     settings = SolverSettings("trap", 1e-5)
-    job = numerics_gate.job(Subject(reduction, excitation, orbit), settings)
+    job = numerics_gate.job(GateSubject(reduction, excitation, orbit), settings)
     assert set(job.signals) == saved(job.netlist) == {"v1", "v2", "v3", "v4", "vg"}
     text = write(
         scene.circuit, reduction.board, excitation, settings, title="a deck", stop_time=1.0

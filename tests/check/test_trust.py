@@ -197,11 +197,11 @@ def test_a_yield_is_no_better_than_the_nominal_response() -> None:
     assert said.as_dict()["reasons"] == ["the nominal response: so it is (by 2)"]
 
 
-def _checked(k0: float, gate: GateResult | None = None) -> checked_design.Checked:
+def _checked(k0: float, gate: GateResult | None = None) -> checked_design.CheckedResponse:
     """A response whose circuit's flow is the model's, against a stop of this stiffness."""
     flow, orbit = found(k0)
     response = ModelResponse(Response(0.9, Expect(1, 1, 0)), 0.5, orbit, (), True)
-    return checked_design.Checked(response, orbit, Excitation(200.0, 4.0), gate, flow=flow)
+    return checked_design.CheckedResponse(response, orbit, Excitation(200.0, 4.0), gate, flow=flow)
 
 
 @pytest.mark.parametrize(("k0", "trusted"), [(STIFFEST, False), (0.999, True)])

@@ -12,7 +12,7 @@ from designer.base.arrays import Array
 from designer.circuit import ensemble
 from designer.circuit.board_arrays import Boards
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.ensemble import Ensemble, Response
+from designer.circuit.ensemble import Ensemble, SettledBoard
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
@@ -54,7 +54,7 @@ def nominal(kind: str, p: int) -> tuple[Drive, Orbit]:
 
 def respond(
     kind: str, p: int, indices: range, *, fast: bool = True, jobs: int = 1
-) -> list[Response]:
+) -> list[SettledBoard]:
     drive, orbit = nominal(kind, p)
     boards = Ensemble(draw_many(STAGES[kind], FEW[kind], 7, indices), fast=fast)
     count = len(indices)
@@ -149,7 +149,7 @@ def test_where_chaos_is_not_plain_the_general_kernel_has_the_word(
         assert (got.lyapunov, got.periods) == (want.lyapunov, want.periods)
 
 
-def raw(response: Response) -> tuple[bytes, ...]:
+def raw(response: SettledBoard) -> tuple[bytes, ...]:
     o = response.orbit
     arrays: list[Array] = [o.start, o.extremes, o.impact_times, o.impact_velocities]
     numbers = np.array([o.asymmetry, o.lyapunov, o.penetration, o.miss, o.periods])

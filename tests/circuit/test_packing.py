@@ -12,7 +12,7 @@ import pytest
 
 from designer.board.board_parts import fitted
 from designer.board.component import components
-from designer.catalog.entries import OpAmp, Section as PinTable
+from designer.catalog.entries import OpAmp, SectionPins as PinTable
 from designer.circuit.dead_zone_parts import idle_limits
 from designer.circuit.netlist import Circuit, Excitation, Section, nominal_board
 from designer.circuit.packing import assignment, packed

@@ -23,7 +23,7 @@ from designer.board.component import Component, joined
 from designer.board.kicad_names import kicad_net
 from designer.board.kicad_reader import BoardFile, arc_length, check_belongs, read_board
 from designer.board.kicad_rules import CustomRule, rules_text, spacing
-from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Outcome, Override
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Override, RuleOutcome
 from designer.catalog.design_rules import RULES
 from designer.design_rules import drc_specimen, kicad_drc, on_board
 from designer.design_rules.kicad_drc import CheckFailed, DesignRuleCheck
@@ -104,11 +104,11 @@ def track(net: str, width: float, length: float, y: float = -20.0) -> Expression
     )
 
 
-def by_id(outcomes: tuple[Outcome, ...]) -> dict[str, Outcome]:
+def by_id(outcomes: tuple[RuleOutcome, ...]) -> dict[str, RuleOutcome]:
     return {o.rule.id: o for o in outcomes}
 
 
-def looked(text: str, folder: Path) -> dict[str, Outcome]:
+def looked(text: str, folder: Path) -> dict[str, RuleOutcome]:
     """What the rules say of a board of the design."""
     board = board_of(text, folder)
     return by_id(on_board.checked(board, base().components, custom(), {}))
@@ -292,13 +292,13 @@ def shifted(name: str, by: tuple[float, float]) -> str:
     return edited(moved)
 
 
-def by_reading(text: str, folder: Path) -> dict[str, Outcome]:
+def by_reading(text: str, folder: Path) -> dict[str, RuleOutcome]:
     """What is said of a board without KiCad."""
     board = board_of(text, folder)
     return by_id(on_board.on_board(board, base().components, custom(), {}, "not asked"))
 
 
-def decoupled(distance: float, folder: Path) -> Outcome:
+def decoupled(distance: float, folder: Path) -> RuleOutcome:
     """C903 moved so that its nearer pad is this far from U1's V+."""
     board = board_of(drawn(), folder)
     pin = next(p for p in board.pads("U1") if p.net == "vcc")
@@ -347,7 +347,7 @@ def pads_of(name: str) -> list[tuple[float, float, float, float]]:
     return out
 
 
-def at_edge(gap: float, folder: Path, name: str = "R4", side: str = "right") -> Outcome:
+def at_edge(gap: float, folder: Path, name: str = "R4", side: str = "right") -> RuleOutcome:
     """A component moved so that its outermost copper is this far inside one side of the board."""
     limits = edge()[1]
     if side == "right":
@@ -597,7 +597,7 @@ def answer(*misunderstood: str, unconnected: Mapping[str, int] = NOTHING) -> Des
     return DesignRuleCheck("9.0.0", (), frozenset(misunderstood), unconnected)
 
 
-def on_drawn(text: str, folder: Path, told: DesignRuleCheck) -> dict[str, Outcome]:
+def on_drawn(text: str, folder: Path, told: DesignRuleCheck) -> dict[str, RuleOutcome]:
     board = board_of(text, folder)
     return by_id(on_board.on_board(board, base().components, custom(), {}, told))
 
@@ -714,7 +714,7 @@ def test_places_are_said_in_printable_words() -> None:
 
 
 @cache
-def examples(*, breaking: bool, folder: Path) -> dict[str, Outcome]:
+def examples(*, breaking: bool, folder: Path) -> dict[str, RuleOutcome]:
     """What the rules say of a board whose examples break them, or just keep them."""
     folder.mkdir(exist_ok=True)
     board = board_of(drc_specimen.specimen(custom(), breaking=breaking), folder)

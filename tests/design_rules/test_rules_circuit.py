@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Found, Override, judged
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.entries import Figure
 from designer.circuit.dead_zone_kind import Kind, Sides
@@ -17,7 +17,7 @@ from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.force_at_clearance import Statics, leftover, thermal
 from designer.design_rules.operating_point import operating, stuck
-from designer.design_rules.subject import Subject
+from designer.design_rules.subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
 from designer.synthesis import output_loads
 from designer.synthesis.output_loads import Run
@@ -166,7 +166,7 @@ def test_operating_values_are_the_loads_that_ngspice_confirms() -> None:
 
 def test_a_virtual_ground_leaves_ground_while_its_output_is_at_its_limit() -> None:
     """U3C at its limit: its input divides what is on either side of it."""
-    subject = Subject(base().made, stage("saturation", "both", EXACT), base().components)
+    subject = RuleSubject(base().made, stage("saturation", "both", EXACT), base().components)
     met = subject.operating
     r202, r203 = EXACT["R202"], EXACT["R203"]
     high, limit = met.high["w1"].value, subject.circuit.saturation
@@ -212,7 +212,7 @@ def test_protection_shares_the_fault_current() -> None:
 
 def test_without_responses_nothing_is_said_of_operation() -> None:
     made = replace(base().made, found=())
-    subject = Subject(made, base().circuit, base().components)
+    subject = RuleSubject(made, base().circuit, base().components)
     for id_ in ("swing", "power", "slew", "common-mode", "power-stuck"):
         found = run_rules.look(id_, subject)
         assert found.status == NOT_RUN
@@ -224,7 +224,7 @@ def test_without_responses_nothing_is_said_of_operation() -> None:
 # Errors as forces
 
 
-def shift(subject: Subject, **board: dict[str, float]) -> float:
+def shift(subject: RuleSubject, **board: dict[str, float]) -> float:
     """Where the mass rests in the middle of the clearance [V], of a board with these errors: by
     the reduction's own offsets and biases, and its guards."""
     circuit = subject.circuit
@@ -239,7 +239,7 @@ def shift(subject: Subject, **board: dict[str, float]) -> float:
     return float(-0.5 * (side[0] * distances[0] + side[1] * distances[1]))
 
 
-def per_volt(subject: Subject) -> float:
+def per_volt(subject: RuleSubject) -> float:
     """How far one volt of the generator moves it."""
     circuit = subject.circuit
     mode = Reduction(circuit, nominal_board(circuit)).system().mode(circuit.rest)
@@ -249,7 +249,7 @@ def per_volt(subject: Subject) -> float:
 @pytest.mark.parametrize("kind", ["rectifier", "saturation"])
 def test_offsets_and_currents_move_the_mass_as_the_reduction_says(kind: str) -> None:
     circuit = base().circuit if kind == "rectifier" else stage("saturation", "both", EXACT)
-    subject = Subject(base().made, circuit, base().components)
+    subject = RuleSubject(base().made, circuit, base().components)
     forces = Statics(circuit).forces
     rest, unit = shift(subject), per_volt(subject)
     for section in circuit.sections:
@@ -356,17 +356,18 @@ def test_another_limit_decides_and_its_reason_is_kept() -> None:
 
 def test_the_worst_place_is_the_one_furthest_past_its_own_limit() -> None:
     rule = BY_ID["swing"]
-    found = judged(rule, [Found(9.0, "a", 10.0), Found(8.0, "b", 8.1)])
+    found = judged(rule, [Finding(9.0, "a", 10.0), Finding(8.0, "b", 8.1)])
     assert found.where == "b"
     # Under one limit for all it is the largest.
     assert (
-        judged(rule, [Found(9.0, "a", 10.0), Found(8.0, "b", 8.1)], Override(9.5, "")).where == "a"
+        judged(rule, [Finding(9.0, "a", 10.0), Finding(8.0, "b", 8.1)], Override(9.5, "")).where
+        == "a"
     )
 
 
 def test_a_value_that_is_no_number_never_passes() -> None:
     for id_ in ("swing", "load"):
-        found = judged(BY_ID[id_], [Found(1e6, "a", 2e6), Found(float("nan"), "b", 1.0)])
+        found = judged(BY_ID[id_], [Finding(1e6, "a", 2e6), Finding(float("nan"), "b", 1.0)])
         assert (found.status, found.where) == (FAIL, "b")
 
 

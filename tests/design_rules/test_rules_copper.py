@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from designer.base.sexpr import Expression, expression, expression_text, read, word
-from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Outcome
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.design_rules import kicad_drc, on_board
 from tests.design_rules.test_rules_board import (
     answer,
@@ -68,7 +68,7 @@ def segment(net: int, start: tuple[float, float], end: tuple[float, float]) -> E
     )  # fmt: skip
 
 
-def looked(text: str, folder: Path) -> dict[str, Outcome]:
+def looked(text: str, folder: Path) -> dict[str, RuleOutcome]:
     board = board_of(text, folder)
     return by_id(on_board.checked(board, [], custom(), {}))
 

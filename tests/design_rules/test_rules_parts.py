@@ -9,7 +9,7 @@ import pytest
 
 from designer.base.sexpr import Expression, expression_text, read
 from designer.board.component import Component
-from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Outcome
+from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.design_rules import on_board
 from tests.design_rules.test_rules_board import (
     OF_PARTS,
@@ -65,7 +65,7 @@ def written(name: str, key: str, text: str) -> str:
     return changed(name, lambda t: t.replace(f'"{key}" "{old}"', f'"{key}" "{text}"'))
 
 
-def looked(text: str, folder: Path) -> dict[str, Outcome]:
+def looked(text: str, folder: Path) -> dict[str, RuleOutcome]:
     """What the rules say of a board of the design, without KiCad."""
     found = on_board.on_board(
         board_of(text, folder), base().components, custom(), {}, "no KiCad in this test"

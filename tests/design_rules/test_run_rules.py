@@ -20,9 +20,9 @@ from designer.catalog.design_rule import (
     FAIL,
     NOT_RUN,
     PASS,
-    Found,
-    Outcome,
+    Finding,
     Override,
+    RuleOutcome,
     judged,
     not_run,
 )
@@ -293,10 +293,10 @@ def test_a_design_made_anew_forgets_its_rules(design: Path) -> None:
 # JUnit
 
 
-def outcomes(reason: str) -> tuple[Outcome, ...]:
+def outcomes(reason: str) -> tuple[RuleOutcome, ...]:
     return (
-        judged(BY_ID["swing"], [Found(13.0, reason, 12.0)]),
-        judged(BY_ID["load"], [Found(3e3, "U1A")], Override(1e3, reason)),
+        judged(BY_ID["swing"], [Finding(13.0, reason, 12.0)]),
+        judged(BY_ID["load"], [Finding(3e3, "U1A")], Override(1e3, reason)),
         not_run(BY_ID["clearance"], reason),
     )
 

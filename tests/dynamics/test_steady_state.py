@@ -16,7 +16,7 @@ from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.kernel_modal import CHANGE, WIDTH
 from designer.dynamics.orbit import MAX_PERIOD, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.dynamics.steady_state import Course, Setting, Steady, by_flow
+from designer.dynamics.steady_state import Course, DrivenSystem, Steady, by_flow
 from designer.model.model import Dimensionless
 from designer.model.swept_model import ModelSubject
 from designer.model.swept_tables import ModalBatch
@@ -28,7 +28,7 @@ PERIODIC = (1.55, 1.43, 0.85, 0.54, 0.41, 0.337, 0.284, 0.24, 0.215, 0.3, 0.1, 1
 CHAOTIC = (1.0, 1.2, 0.95, 0.6, 0.66, 0.48)
 
 
-def setting(omega: float, model: Dimensionless = PAPER) -> Setting:
+def setting(omega: float, model: Dimensionless = PAPER) -> DrivenSystem:
     (made,) = ModelSubject(model).settings([{"omega": omega}])
     assert made.tables is not None
     return made

@@ -16,7 +16,7 @@ from hypothesis import given, strategies as st
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
-from designer.base.manifest import Stage
+from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.cli import entry
@@ -24,9 +24,9 @@ from designer.dynamics.kernel_four_state import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity import gate as trade_gate, pieces, rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock
-from designer.fidelity.label import Label
+from designer.fidelity.label import ResponseLabel
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, alike, compare, difference
-from designer.fidelity.rungs import Answer
+from designer.fidelity.rungs import RungAnswer
 from designer.fidelity.trade_files import front, sheet, trade_json
 from designer.fidelity.trade_study import (
     IDEAL,
@@ -38,8 +38,8 @@ from designer.fidelity.trade_study import (
     SHARE,
     UNSURE,
     WAVE,
-    Response,
     Trade,
+    TradedResponse,
     cheapest,
     trade,
 )
@@ -80,23 +80,25 @@ def orbit(
     )
 
 
-def said(rung: str, level: str, error: float, seconds: float, kind: Orbit | None = None) -> Answer:
+def said(
+    rung: str, level: str, error: float, seconds: float, kind: Orbit | None = None
+) -> RungAnswer:
     """An answer whose displacement is off by ``error`` of the peak, RMS, and its velocities too."""
     found = orbit(up=(1.0 + error,), down=(1.0,)) if kind is None else kind
     shown = WAVEFORM + math.sqrt(2.0) * error * np.cos(2.0 * np.pi * 7 * np.arange(POINTS) / POINTS)
-    return Answer(rung, level, {}, found, shown, seconds)
+    return RungAnswer(rung, level, {}, found, shown, seconds)
 
 
-ONE = Label(1, 1.55, 0.25, "1-1-1")
+ONE = ResponseLabel(1, 1.55, 0.25, "1-1-1")
 
 
 def answered(
-    *answers: Answer, label: Label = ONE, boards: BoardTrade | LeftOut | None = None
-) -> Response:
-    return Response(*compare(label, answers), boards)
+    *answers: RungAnswer, label: ResponseLabel = ONE, boards: BoardTrade | LeftOut | None = None
+) -> TradedResponse:
+    return TradedResponse(*compare(label, answers), boards)
 
 
-def judged(*answers: Answer, boards: BoardTrade | LeftOut | None = None) -> Trade:
+def judged(*answers: RungAnswer, boards: BoardTrade | LeftOut | None = None) -> Trade:
     return trade([answered(*answers, boards=boards)])
 
 
@@ -180,7 +182,7 @@ def test_a_truth_that_is_not_sure_answers_nothing() -> None:
         assert (one.rung, one.shown, one.note) == (None, False, UNSURE)
     assert f"| {WAVE} | board | – | – | – | no | – | {UNSURE} |" in sheet(document(found))
     both = cheapest(
-        RESPONSE, BOARD, [answered(*LADDER, label=Label(2, 2.0, 0.2, "")), *found.responses]
+        RESPONSE, BOARD, [answered(*LADDER, label=ResponseLabel(2, 2.0, 0.2, "")), *found.responses]
     )
     assert both is not None
     assert (both.shown, both.note) == (False, f"{UNSURE} (response 1)")
@@ -223,7 +225,7 @@ def test_all_responses_together_ask_one_setting() -> None:
 def test_two_responses_at_one_frequency_are_told_apart() -> None:
     """By number and b, wherever one of them is named."""
     other = [replace(a, orbit=orbit(2, 2, (1.0, 1.0), (1.0, 1.0))) for a in LADDER]
-    labels = Label(1, 1.55, 0.25, "1-1-1"), Label(2, 1.55, 0.3, "1-2-2")
+    labels = ResponseLabel(1, 1.55, 0.25, "1-1-1"), ResponseLabel(2, 1.55, 0.3, "1-2-2")
     answer = document(
         trade(
             [
@@ -270,7 +272,7 @@ def test_where_nothing_strikes_no_impact_velocity_is_asked() -> None:
         assert (one.rung, one.level, one.shown, one.note) == (None, None, None, NO_IMPACTS)
         assert picked(found, RESPONSE, of).shown
     assert f"| {IMPACT} | board | – | – | – | – | – | no impacts |" in sheet(document(found))
-    second = answered(*quiet, label=Label(2, 1.55, 1.5, "1-0-0"))
+    second = answered(*quiet, label=ResponseLabel(2, 1.55, 1.5, "1-0-0"))
     both = cheapest(IMPACT, BOARD, [answered(*LADDER), second])
     assert both is not None
     assert (both.rung, both.shown, both.note) == ("circuit", True, "without response 2: no impacts")
@@ -456,7 +458,7 @@ def test_the_yield_goes_to_the_exact_circuit_unless_it_is_shown_to_be_off() -> N
 
 
 def test_yields_of_all_responses_name_those_that_were_not_asked() -> None:
-    labels = [Label(n, 1.55, 0.25, "1-1-1") for n in (1, 2)]
+    labels = [ResponseLabel(n, 1.55, 0.25, "1-1-1") for n in (1, 2)]
     asked = replace(of_boards(1000, 0, 0), label=labels[0])
     found = trade(
         [
@@ -505,7 +507,7 @@ def folder_with(path: Path, answer: dict[str, Any] | None) -> Folder:
 
 
 def test_a_study_takes_the_rung_that_was_measured(tmp_path: Path) -> None:
-    assert choose(Folder(tmp_path / "none")) == rung_choice.Choice("auto", "")
+    assert choose(Folder(tmp_path / "none")) == rung_choice.RungChoice("auto", "")
     assert choose(folder_with(tmp_path / "begun", None)).rung == "auto"
     near = document(judged(*LADDER, boards=of_boards(1000, 0, 0)))
     choice = choose(folder_with(tmp_path / "near", near))
@@ -562,7 +564,7 @@ def test_ngspice_is_asked_about_forty_boards_at_least() -> None:
     answers: Any = [
         SimpleNamespace(sample=i, question=0, verdict="ok", radius=0.1) for i in range(200)
     ]
-    for kind in ngspice_sampling.Kind:
+    for kind in ngspice_sampling.StartKind:
         asked = [a for a in ngspice_sampling.ask_random(answers) if a.kind is kind]
         assert len(asked) >= rung_choice.LEAST
 
@@ -578,7 +580,7 @@ def test_a_stage_of_its_own_that_goes_with_the_design() -> None:
 
     assert "trade" in STAGES
     assert "trade" in OF_DESIGN
-    assert Stage({"a": 1}).hash == Stage({"a": 1}).hash
+    assert ManifestStage({"a": 1}).hash == ManifestStage({"a": 1}).hash
 
 
 # ---------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog, load_catalog
-from designer.catalog.entries import Case, mounting_of
+from designer.catalog.entries import PartCase, mounting_of
 from designer.centering import design_search
 from designer.check import synthesis_result
 from designer.cli import entry
@@ -62,7 +62,7 @@ def for_rails(volts: float, *, tht: bool = False) -> list[str]:
     ]
 
 
-def cases(first: str, others: tuple[Case, ...]) -> list[str]:
+def cases(first: str, others: tuple[PartCase, ...]) -> list[str]:
     return [first, *(case.footprint for case in others)]
 
 

@@ -16,10 +16,10 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from designer.base.design_folder import DESIGN, Folder
 from designer.base.errors import InputError
+from designer.base.guarded_reading import csv_rows, parse_json, read_bytes, read_text, reading
 from designer.base.keyed_store import KeyedStore
 from designer.base.manifest import MANIFEST, read_json
 from designer.base.parquet_entry import ParquetForm
-from designer.base.reading import csv_rows, parse_json, read_bytes, read_text, reading
 from designer.base.report_guard import check_ours
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_reader import read_board

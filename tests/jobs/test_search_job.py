@@ -17,7 +17,7 @@ from designer.base.errors import InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
-from designer.centering.levers import Choice
+from designer.centering.levers import DesignChoice
 from designer.centering.memory import Memory
 from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
@@ -154,7 +154,7 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     found.write("search.json", dumps({"format": 1, "trade": again}))
     assert rung_choice.choose(found) == choice  # said once, however often it is handed on
     found.write("search.json", dumps({"format": 1, "trade": {**again, "model": "another"}}))
-    assert rung_choice.choose(found) == rung_choice.Choice("auto", "")  # of another design
+    assert rung_choice.choose(found) == rung_choice.RungChoice("auto", "")  # of another design
     with_trade(tmp_path / "found", "circuit")
     assert rung_choice.choose(Folder(tmp_path / "found")).rung == "auto"
     found.write("search.json", dumps({"format": 1, "trade": {"rung": "none"}}))
@@ -231,7 +231,7 @@ def test_forty_boards_of_each_response_confirm_even_where_some_have_no_answer() 
 def test_a_resolved_file_says_what_was_open() -> None:
     asked_file = parse_model_file(asked(OPEN, more=MORE))
     synthesis = made()
-    found = resolved(asked_file, synthesis, Choice.of(asked_file.circuit), Path("model.toml"))
+    found = resolved(asked_file, synthesis, DesignChoice.of(asked_file.circuit), Path("model.toml"))
     (response,) = found.responses
     assert response.omega == synthesis.found[0].omega
     assert response.b == synthesis.found[0].b

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from designer.base import progress
-from designer.base.progress import SILENCE, Lines, Progress, Terminal, doing, part
+from designer.base.progress import SILENCE, Progress, ProgressLines, Terminal, doing, part
 from designer.cli import entry
 from designer.jobs import study_job
 from designer.jobs.options import Options
@@ -34,7 +34,7 @@ class Clock:
 
 def test_a_stage_without_steps_says_how_long_it_has_lasted(capsys: Captured) -> None:
     clock = Clock()
-    lines = Lines(clock)
+    lines = ProgressLines(clock)
     lines.stage("parts")
     lines.beat()
     clock.now = SILENCE - 0.1
@@ -56,7 +56,7 @@ def test_a_stage_without_steps_says_how_long_it_has_lasted(capsys: Captured) -> 
 
 def test_a_stage_whose_steps_are_slow_says_how_far_it_is(capsys: Captured) -> None:
     clock = Clock()
-    lines = Lines(clock)
+    lines = ProgressLines(clock)
     step = lines.stage("boards", 10)
     for _ in range(4):
         clock.now += 1.0
@@ -103,7 +103,7 @@ def test_what_is_watched_is_looked_at_from_time_to_time(
     """Without a call from the work: it may sit in a solver."""
     heard = threading.Event()
 
-    class Listener(Lines):
+    class Listener(ProgressLines):
         def _say(self, line: str) -> None:
             super()._say(line)
             heard.set()
@@ -159,7 +159,7 @@ def test_quiet_is_quiet_and_the_log_has_it(
     assert "so far: linear block, errors up to" in capfd.readouterr().err
 
 
-class Walk(Lines):
+class Walk(ProgressLines):
     """Every stage lasts too long without a step, and so does all that it works on."""
 
     def __init__(self) -> None:

@@ -10,7 +10,7 @@ from designer.base.errors import InputError
 from designer.cli import entry
 from designer.model.measured_values import read_measured
 from designer.model.model_file import parse_model_file, read_model_file
-from designer.model.spread_table import NetworkRule, Offset, PartRule, Shape, SpreadSpec
+from designer.model.spread_table import NetworkRule, Offset, PartRule, SpreadShape, SpreadSpec
 from designer.spread.part_rules import spread_of
 from tests.circuit.test_reduction import EXACT
 from tests.shared.stages import bought, stage
@@ -41,7 +41,7 @@ def test_the_example_states_every_key_and_is_valid() -> None:
 def test_what_the_comments_of_the_example_offer_is_valid() -> None:
     said = 'resistors = { law = "binned", inner = 0.002 }\noffset = 0\nbias = "typical"'
     read = table(said + "\nreference_grade = 0.001")
-    assert read.resistors == Shape("binned", inner=0.002)
+    assert read.resistors == SpreadShape("binned", inner=0.002)
     assert read.offset == Offset(0.0, 0.0)
 
 
@@ -76,7 +76,7 @@ network = [{ parts = ["R1", "R7"], share = 1 }, { parts = ["C2", "C4"], share = 
 part = [{ names = "R1", tempco = 5e-6 }]
 """
     )
-    assert (read.resistors, read.capacitors) == (Shape("normal"), Shape("normal", 2.0))
+    assert (read.resistors, read.capacitors) == (SpreadShape("normal"), SpreadShape("normal", 2.0))
     assert read.offset == Offset(5e-4, 2e-3)
     assert read.bias == (-1e-11, 2e-11)
     assert read.gain_bandwidth == (1e6, 2e6)

@@ -23,7 +23,7 @@ from designer.fidelity.cpu_clock import Entrant, here, rounds
 from designer.model.find_responses import ModelResponse, find
 from designer.model.model import Dimensionless
 from designer.paper import misprints, reproduce_circuit
-from designer.paper.circuit_cases import Extent
+from designer.paper.circuit_cases import CircuitExtent
 from designer.paper.circuit_ngspice import _stage, stage_curve
 from designer.paper.circuit_pictures import _between
 from designer.paper.circuits import (
@@ -42,7 +42,7 @@ from designer.paper.reproduce_circuit import names, reproduce
 from designer.spice.pool import SpicePool
 
 CATALOG = load_catalog()
-SMALL = Extent(p=(1,), circuits=(PRINTED, CORRECTED), patterns=4, clocked=(1,), rounds=2)
+SMALL = CircuitExtent(p=(1,), circuits=(PRINTED, CORRECTED), patterns=4, clocked=(1,), rounds=2)
 
 
 @cache
@@ -271,7 +271,7 @@ def test_it_goes_on_where_it_was(made: Path, monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(InputError, match="--resume"):
         reproduce(made, jobs=1, extent=SMALL)
     with pytest.raises(InputError, match="other settings"):
-        reproduce(made, jobs=1, extent=Extent(p=(1,), patterns=5), resume=True)
+        reproduce(made, jobs=1, extent=CircuitExtent(p=(1,), patterns=5), resume=True)
     before = {p.name: p.read_bytes() for p in made.iterdir() if p.is_file()}
     (made / "cases" / "offsets-corrected.json").unlink()
     worked: list[float] = []

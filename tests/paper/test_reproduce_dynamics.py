@@ -20,7 +20,7 @@ from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.report_guard import check_ours
 from designer.bifurcations.doubling_cascade import cascade
-from designer.bifurcations.points import Kind
+from designer.bifurcations.points import PointKind
 from designer.bifurcations.windows import BranchWindow, WindowEnd
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
@@ -31,7 +31,7 @@ from designer.dynamics.orbit import failed
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model_file import read_model_file
 from designer.paper import reproduce_dynamics
-from designer.paper.reproduce_dynamics import Dynamics, Extent, measure, reproduce
+from designer.paper.reproduce_dynamics import Dynamics, DynamicsExtent, measure, reproduce
 from designer.paper.response_order import Gap, faults, gaps
 from designer.paper.statements import (
     AGREES,
@@ -46,7 +46,7 @@ from designer.paper.statements import (
 )
 from designer.report import bifurcation_plots
 
-SMALL = Extent(low=1.29, high=1.6, depth=2, figures=(), shared=(1.55,), chatter=(0.2, 0.05))
+SMALL = DynamicsExtent(low=1.29, high=1.6, depth=2, figures=(), shared=(1.55,), chatter=(0.2, 0.05))
 DOCS = Path(__file__).parents[2] / "docs" / "bifurcations.md"
 
 
@@ -151,13 +151,13 @@ def test_bounces_that_die_out(speeds: list[float], dying: bool) -> None:
 def test_the_touch_that_counts_lies_beyond_the_end(turned: bool) -> None:
     """A touch nearer to the end, but on the window's side, is not it."""
 
-    def point(position: float, kind: Kind, stable: tuple[bool, bool]) -> Any:
+    def point(position: float, kind: PointKind, stable: tuple[bool, bool]) -> Any:
         if turned:
             position, stable = 10.0 - position, stable[::-1]
         return SimpleNamespace(position=position, kind=kind, stable=stable, value=1.0)
 
-    end = point(5.5, Kind.FOLD, (True, False))
-    near, far = (point(p, Kind.GRAZING, (True, True)) for p in (5.1, 8.5))
+    end = point(5.5, PointKind.FOLD, (True, False))
+    near, far = (point(p, PointKind.GRAZING, (True, True)) for p in (5.1, 8.5))
     found: Any = SimpleNamespace(on=lambda _: [near, end, far])
     window: Any = SimpleNamespace(branch=0, low=SimpleNamespace(point=end))
     assert _grazing(found, window) is far
@@ -184,7 +184,12 @@ def test_each_step_of_the_first_cascade_is_what_long_runs_show() -> None:
 
 def grazing(before: str, after: str, direction: int, *stable: bool) -> Any:
     return SimpleNamespace(
-        kind=Kind.GRAZING, value=1.2, before=before, after=after, stable=stable, direction=direction
+        kind=PointKind.GRAZING,
+        value=1.2,
+        before=before,
+        after=after,
+        stable=stable,
+        direction=direction,
     )
 
 

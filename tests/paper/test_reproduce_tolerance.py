@@ -14,7 +14,7 @@ from designer.catalog.catalog import load_catalog
 from designer.paper import reproduce_tolerance
 from designer.paper.reproduce_tolerance import KINDS, reproduce
 from designer.paper.tolerance_cases import OMEGA, cases
-from designer.paper.tolerance_rows import Row
+from designer.paper.tolerance_rows import YieldRow
 from designer.yields.exact_rung import block
 from designer.yields.verdict import count
 
@@ -22,14 +22,14 @@ TWO = ("rectifier-r1-c1-offsets", "corrected-r0.1-c1-level")
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[Row, ...]]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[YieldRow, ...]]:
     out = tmp_path_factory.mktemp("tolerance")
     return out, reproduce(out, samples=3, seed=4, jobs=2, only=TWO, short=1)
 
 
 @pytest.mark.slow
 def test_every_yield_is_that_of_a_study_of_the_same_case(
-    made: tuple[Path, tuple[Row, ...]],
+    made: tuple[Path, tuple[YieldRow, ...]],
 ) -> None:
     _, rows = made
     assert len(rows) == 2 * len(KINDS) * len(OMEGA)
@@ -49,14 +49,14 @@ def test_every_yield_is_that_of_a_study_of_the_same_case(
 
 
 @pytest.mark.slow
-def test_the_files_say_the_same(made: tuple[Path, tuple[Row, ...]]) -> None:
+def test_the_files_say_the_same(made: tuple[Path, tuple[YieldRow, ...]]) -> None:
     out, rows = made
     said = json.loads((out / "tolerance.json").read_text(encoding="utf-8"))
     assert [r["ok"] for r in said["rows"]] == [r.ok for r in rows]
     assert set(said["blame"]) == {"rectifier"}
     assert said["provenance"]["seed"] == 4
     table = pq.read_table(out / "tolerance.parquet").to_pylist()
-    assert [Row(**r) for r in table] == list(rows)
+    assert [YieldRow(**r) for r in table] == list(rows)
     text = (out / "README.md").read_text(encoding="utf-8")
     assert "designer reproduce tolerance --samples 3 --seed 4" in text.splitlines()[2]
     assert "## Rectifier stage" in text
@@ -67,7 +67,7 @@ def test_the_files_say_the_same(made: tuple[Path, tuple[Row, ...]]) -> None:
 
 @pytest.mark.slow
 def test_it_goes_on_where_it_was_and_refuses_what_is_not_its_own(
-    made: tuple[Path, tuple[Row, ...]], monkeypatch: pytest.MonkeyPatch
+    made: tuple[Path, tuple[YieldRow, ...]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, rows = made
     with pytest.raises(InputError, match="--resume"):

@@ -17,7 +17,7 @@ from designer.catalog.catalog import load_catalog
 from designer.catalog.entries import PRICE_CLASSES
 from designer.circuit import paper_values
 from designer.circuit.netlist import Board, Circuit, nominal_board
-from designer.circuit.paper_values import Candidate
+from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import Reduction
 from designer.cli import entry
 from designer.dynamics.flow import Flow
@@ -29,7 +29,7 @@ from designer.model.model_file import parse_model_file
 from designer.model.response_table import Response
 from designer.report import compare_plots, compare_table, comparison
 from designer.report.compare_json import comparison_json
-from designer.report.comparison import OURS, Column
+from designer.report.comparison import OURS, DesignColumn
 
 CATALOG = load_catalog()
 PAPER, SPEC = paper_values.MODEL, CircuitSpec()
@@ -54,7 +54,7 @@ SMALL = BASE.format(k0=0.95)
 
 
 @pytest.fixture(scope="module")
-def columns() -> dict[str, Column]:
+def columns() -> dict[str, DesignColumn]:
     """The paper's columns, for one response at ω = 0.85 and one that nothing is expected of."""
     found = find(PAPER, [*parse_model_file(SMALL).responses, Response(1.55)])
     return {
@@ -63,7 +63,7 @@ def columns() -> dict[str, Column]:
     }
 
 
-def test_printed_values_show_what_the_errata_say(columns: dict[str, Column]) -> None:
+def test_printed_values_show_what_the_errata_say(columns: dict[str, DesignColumn]) -> None:
     """μ = 21.06 · 20/20.88 = 20.17; b = 0.25 · 1.2346/1.28; 357.419 Hz for 355.88 Hz."""
     printed = columns["paper, as printed"]
     mu = 21.06 * 20.0 / 20.88
@@ -78,7 +78,7 @@ def test_printed_values_show_what_the_errata_say(columns: dict[str, Column]) -> 
     assert [s.kept for s in printed.shown] == [True, True]
 
 
-def test_corrected_values_have_these_right(columns: dict[str, Column]) -> None:
+def test_corrected_values_have_these_right(columns: dict[str, DesignColumn]) -> None:
     for name in ("paper, corrected", "paper, corrected, rounded"):
         assert columns[name].b == pytest.approx(0.25, rel=1e-9)
         assert columns[name].frequency_error == pytest.approx(0.0, abs=1e-12)
@@ -90,7 +90,7 @@ def test_f20_by_the_ratio_of_the_driving_resistors() -> None:
     model = replace(PAPER, f20=0.3)
     values = paper_values.way(model) | {"R12": 300e3}
     circuit = paper_values.circuit(model, values, CATALOG.opamp("TL074C"))
-    candidate = Candidate("x", "", circuit, *paper_values.generator(model, values))
+    candidate = ComparedCircuit("x", "", circuit, *paper_values.generator(model, values))
     got = comparison.column(candidate, model, [], SPEC, CATALOG)
     assert got.f20 == pytest.approx(1.0 / (1.0 + 3.0), rel=1e-9)
     assert got.b == pytest.approx(0.25, rel=1e-9)
@@ -99,7 +99,7 @@ def test_f20_by_the_ratio_of_the_driving_resistors() -> None:
     assert got.current is None
 
 
-def test_parts_and_price_by_counting(columns: dict[str, Column]) -> None:
+def test_parts_and_price_by_counting(columns: dict[str, DesignColumn]) -> None:
     """11 + 1 + 8 + 11 resistors (R12 and the stops' R50 counted once), 4 capacitors, 3 packages."""
     printed = columns["paper, as printed"].bill
     assert printed.parts == 11 + 1 + 8 + 11 + 4 + 3
@@ -181,7 +181,8 @@ def test_no_clearance_no_share() -> None:
     linear = replace(PAPER, k0=0.0)
     circuit = paper_values.circuit(linear, paper_values.way(linear), CATALOG.opamp("TL074C"))
     assert comparison.offset_share(circuit, CATALOG.opamp("TL074C")) is None
-    candidate = Candidate("linear", "", circuit, *paper_values.generator(linear, circuit.values
+    candidate = ComparedCircuit("linear", "", circuit, *paper_values.generator(linear,
+    circuit.values
         | {n: paper_values.PRINTED[n] for n in ("R200", "R201", "R202", "R203")}))  # fmt: skip
     got = comparison.column(candidate, linear, find(linear, [Response(0.9)]), SPEC, CATALOG)
     assert math.isnan(got.k0)

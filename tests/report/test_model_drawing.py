@@ -12,13 +12,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from designer.base import figure_style
+from designer.model.ascii_sketch import sketch
 from designer.model.equations import (
     dimensionless_equations,
     equations_with_numbers,
     mechanical_equations,
 )
 from designer.model.model import Dimensionless, Mechanical, Sides
-from designer.model.sketch import sketch
 from designer.model.template import TEXT
 from designer.report.model_drawing import model_drawing
 from tests.shared.figure_text import clipped, overlapping

@@ -14,7 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from designer.base import figure_style
-from designer.check.checked_design import Checked
+from designer.check.checked_design import CheckedResponse
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
@@ -49,10 +49,10 @@ def _orbit(n: int = 1, p: int = 1, q: int = 1) -> Orbit:
 
 def _checked(
     model: Orbit | None = None, circuit: Orbit | None = None, gate: GateResult | None = None
-) -> Checked:
+) -> CheckedResponse:
     spec = Response(1.0, Expect(1, 1, 1))
     response = ModelResponse(spec, 0.25, model or _orbit(), (), True)
-    return Checked(response, circuit or _orbit(), Excitation(200.0, 4.0), gate)
+    return CheckedResponse(response, circuit or _orbit(), Excitation(200.0, 4.0), gate)
 
 
 def _heard(orbit: Orbit | None = None) -> GateResult:

@@ -18,7 +18,7 @@ from designer.report.tolerance import facts
 from designer.report.write import render_html, render_markdown
 from designer.yields import study_plan
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
-from designer.yields.blame_replay import Subject
+from designer.yields.blame_replay import BlamedPart
 from designer.yields.corners import Corner
 from designer.yields.exact_rung import block
 from designer.yields.margins import Prediction
@@ -96,9 +96,9 @@ def plain() -> ReportData:
 
 def blamed(question: int, lost: int) -> ResponseBlame:
     subjects = (
-        Subject("all offsets", "group", 9, 10, 1, 4),
-        Subject("U3C", "op-amp", 6, 10, 0, 4),
-        Subject("R204", "resistor", 0, 10, 0, 4),
+        BlamedPart("all offsets", "group", 9, 10, 1, 4),
+        BlamedPart("U3C", "op-amp", 6, 10, 0, 4),
+        BlamedPart("R204", "resistor", 0, 10, 0, 4),
     )
     return ResponseBlame(
         question,

@@ -15,11 +15,11 @@ from designer.base.arrays import Array
 from designer.paper.reproduce_tolerance import KINDS
 from designer.paper.tolerance_cases import OMEGA, TITLES
 from designer.paper.tolerance_page import readme, yield_sheet
-from designer.paper.tolerance_rows import Row
+from designer.paper.tolerance_rows import YieldRow
 from designer.report.blame_plots import avoided_chart, index_chart
 from designer.report.map_plots import map_chart
 from designer.yields.blame_analysis import ResponseBlame
-from designer.yields.blame_replay import Subject
+from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Prediction
 from designer.yields.sobol import Index
 from designer.yields.yield_maps import Axis, YieldMap
@@ -30,7 +30,7 @@ LABELS = ["ω = 0.54   1-3-3", "ω = 0.41   1-4-4"]
 
 def blamed(shares: dict[str, int]) -> ResponseBlame:
     subjects = tuple(
-        Subject(name, "group" if " " in name else "resistor", avoided, 10, 0, 0)
+        BlamedPart(name, "group" if " " in name else "resistor", avoided, 10, 0, 0)
         for name, avoided in shares.items()
     )
     indices = tuple(Index(f"R{k}", f"R{k}", 0.1, 0.5 / (k + 1)) for k in range(12))
@@ -51,11 +51,11 @@ def mapped(two: bool = False) -> YieldMap:
     )  # fmt: skip
 
 
-def rows() -> list[Row]:
-    def row(circuit: str, resistor: float, kind: str, p: int) -> Row:
+def rows() -> list[YieldRow]:
+    def row(circuit: str, resistor: float, kind: str, p: int) -> YieldRow:
         half = 5 if p < 8 else 0  # the nominal circuit does not show 1-8-8
         name = f"1-{p}-{p}"
-        return Row(
+        return YieldRow(
             circuit, resistor, 0.01, True, name, OMEGA[p], kind, p < 8, half, half, 0, 0
         )  # fmt: skip
 

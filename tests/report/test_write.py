@@ -20,10 +20,10 @@ from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
+from designer.model.ascii_sketch import sketch
 from designer.model.model import Sides
 from designer.model.model_file import parse_model_file
 from designer.model.response_table import Expect
-from designer.model.sketch import sketch
 from designer.report.data import ReportData
 from designer.report.tables import Table, ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
@@ -32,7 +32,7 @@ from designer.spice.simulator import SimulationFailed
 from designer.yields import study_plan
 from designer.yields.layers import Samples
 from designer.yields.ngspice_runs import hear
-from designer.yields.ngspice_sampling import Hearing, Kind, ask_random
+from designer.yields.ngspice_sampling import Hearing, StartKind, ask_random
 from designer.yields.run_result import RunResult
 from designer.yields.study import Study
 from designer.yields.verdict import Verdict
@@ -449,7 +449,7 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
         word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(h.sample, h.response)
         return replace(h, response=word, reason=f"why {word}")
 
-    data = replace(whole, heard=tuple(said(h) for h in whole.heard if h.kind is Kind.OWN))
+    data = replace(whole, heard=tuple(said(h) for h in whole.heard if h.kind is StartKind.OWN))
     table = ngspice_table(data)
     assert table is not None
     for row in table.rows:

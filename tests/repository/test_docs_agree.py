@@ -93,9 +93,9 @@ def test_a_default_is_one_constant(verb: str, option: str, default: int) -> None
 
 def test_the_defaults_of_the_library_are_those_of_the_commands() -> None:
     from designer.jobs.options import Options
-    from designer.jobs.trade_job import Extent
+    from designer.jobs.trade_job import TradeExtent
 
-    assert Extent().boards == default_counts.TRADE_BOARDS
+    assert TradeExtent().boards == default_counts.TRADE_BOARDS
     assert (Options().samples, Options().seed) == (default_counts.SAMPLES, default_counts.SEED)
 
 

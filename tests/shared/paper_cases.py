@@ -17,7 +17,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.model.model_file import read_model_file
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from tests.circuit.test_coefficients import exact_for_paper
 from tests.circuit.test_reduction import circuit_of
 
@@ -26,7 +26,7 @@ OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.2
 """Drive frequency of the 1-p-p response, by p."""
 
 
-def flow_of(subject: Subject) -> Flow:
+def flow_of(subject: GateSubject) -> Flow:
     """The exact flow of a subject's board under its excitation."""
     return Flow(subject.system, subject.excitation.drive)
 
@@ -41,7 +41,7 @@ def synthesised() -> Synthesis:
 
 
 @cache
-def subject(p: int) -> Subject:
+def subject(p: int) -> GateSubject:
     """The nominal board on its 1-p-p orbit of the exact circuit."""
     circuit = circuit_of(exact_for_paper())
     errors = coefficient_errors(circuit, MODEL.second_order())
@@ -51,7 +51,7 @@ def subject(p: int) -> Subject:
     orbit = next(o for o in met if (o.n, o.p, o.q) == (1, p, p))
     volts = float(1.0 / errors.drive_gain[0])
     excitation = Excitation(errors.scales.frequency(OMEGA[p]), volts)
-    rough = Subject(reduction, excitation, orbit)
+    rough = GateSubject(reduction, excitation, orbit)
     found = settle(flow_of(rough), orbit.start * errors.scales.volts)
     assert found.response == f"1-{p}-{p}"
-    return Subject(reduction, excitation, found)
+    return GateSubject(reduction, excitation, found)

@@ -15,14 +15,14 @@ from typing import Any
 from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
 from designer.board.pins import Pin
-from designer.catalog.design_rule import Outcome
+from designer.catalog.design_rule import RuleOutcome
 from designer.catalog.entries import Figure
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Resistor, Section
 from designer.design_rules import run_rules
-from designer.design_rules.subject import Subject
+from designer.design_rules.subject import RuleSubject
 from designer.model.find_responses import find
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
@@ -43,16 +43,16 @@ expect = "1-1-1"
 dead_zone = "rectifier"
 """
 )
-Look = Callable[[], Outcome]
+Look = Callable[[], RuleOutcome]
 
 
 @cache
-def base() -> Subject:
+def base() -> RuleSubject:
     """The rectifying design, with one response."""
     return subject_of(stage("rectifier", "both", bought(rectifier())), PAPER, TEXT)
 
 
-def subject_of(circuit: Circuit, model: Dimensionless, text: str) -> Subject:
+def subject_of(circuit: Circuit, model: Dimensionless, text: str) -> RuleSubject:
     """What the rules look at of a circuit for this model, with the model file's responses."""
     modelfile = parse_model_file(text)
     design = Design(
@@ -66,20 +66,20 @@ def subject_of(circuit: Circuit, model: Dimensionless, text: str) -> Subject:
     )
     made = Synthesis(modelfile, CATALOG, find(model, modelfile.responses), design)
     fitted, choice = board_circuit(made)
-    return Subject(made, fitted, components(fitted, CATALOG, choice))
+    return RuleSubject(made, fitted, components(fitted, CATALOG, choice))
 
 
-def with_circuit(circuit: Circuit) -> Subject:
+def with_circuit(circuit: Circuit) -> RuleSubject:
     """The same design on other parts."""
-    return Subject(base().made, circuit, base().components)
+    return RuleSubject(base().made, circuit, base().components)
 
 
-def with_components(change: Callable[[Component], Component]) -> Subject:
+def with_components(change: Callable[[Component], Component]) -> RuleSubject:
     """The same design with every component changed."""
-    return Subject(base().made, base().circuit, tuple(change(c) for c in base().components))
+    return RuleSubject(base().made, base().circuit, tuple(change(c) for c in base().components))
 
 
-def with_figure(name: str, **bounds: float | None) -> Subject:
+def with_figure(name: str, **bounds: float | None) -> RuleSubject:
     """The same design with another figure of the op-amp."""
     circuit = base().circuit
     assert circuit.figures is not None
@@ -90,7 +90,7 @@ def with_figure(name: str, **bounds: float | None) -> Subject:
     return with_circuit(replace(circuit, figures=figures))
 
 
-def with_values(**values: float) -> Subject:
+def with_values(**values: float) -> RuleSubject:
     """The same design with other values of parts [Ω, F]."""
     return with_circuit(valued(base().circuit, values))
 
@@ -106,14 +106,14 @@ def valued(circuit: Circuit, values: Mapping[str, float]) -> Circuit:
     return replace(circuit, parts=parts)
 
 
-def with_part(part: Resistor | Section) -> Subject:
+def with_part(part: Resistor | Section) -> RuleSubject:
     """The same design with one part more, or in the place of the one of the same name."""
     circuit = base().circuit
     parts = tuple(p for p in circuit.parts if p.name != part.name)
     return with_circuit(replace(circuit, parts=(*parts, part)))
 
 
-def rated(name: str, words: str) -> Subject:
+def rated(name: str, words: str) -> RuleSubject:
     """The same design with another rating of one component."""
 
     def change(c: Component) -> Component:
@@ -124,7 +124,7 @@ def rated(name: str, words: str) -> Subject:
     return with_components(change)
 
 
-def rewired(pins: dict[tuple[str, str], str]) -> Subject:
+def rewired(pins: dict[tuple[str, str], str]) -> RuleSubject:
     """The same design with pins (reference, number) on other nets."""
 
     def change(c: Component) -> Component:
@@ -136,7 +136,7 @@ def rewired(pins: dict[tuple[str, str], str]) -> Subject:
     return with_components(change)
 
 
-def look(id_: str, subject: Subject) -> Outcome:
+def look(id_: str, subject: RuleSubject) -> RuleOutcome:
     """What the rule of this id says."""
     return run_rules.look(id_, subject)
 
@@ -152,24 +152,24 @@ def _without_protection() -> Circuit:
     return replace(circuit, fittings=kept)
 
 
-def _drive(ohms: float) -> Subject:
+def _drive(ohms: float) -> RuleSubject:
     """The generator's resistor, without the diodes behind it."""
     return with_circuit(valued(_without_protection(), {"R6": ohms}))
 
 
-def _kind(names: set[str], kind: str) -> Subject:
+def _kind(names: set[str], kind: str) -> RuleSubject:
     return with_components(lambda c: replace(c, kind=kind) if c.reference in names else c)
 
 
-def _renamed(old: str, new: str) -> Subject:
+def _renamed(old: str, new: str) -> RuleSubject:
     return with_components(lambda c: replace(c, reference=new) if c.reference == old else c)
 
 
-def _farads(reference: str, farads: float) -> Subject:
+def _farads(reference: str, farads: float) -> RuleSubject:
     return with_components(lambda c: replace(c, quantity=farads) if c.reference == reference else c)
 
 
-def _on_v1(ohms: float) -> Subject:
+def _on_v1(ohms: float) -> RuleSubject:
     """A resistor from v1 to ground, so that what v1 carries is this load in all [Ω]."""
     carried = next(
         1.0 / s.load for s in _stages() if s.section.output == "v1"
@@ -183,18 +183,18 @@ def _stages() -> Any:
     return stages(base().circuit)
 
 
-def _leaking(share: float) -> Subject:
+def _leaking(share: float) -> RuleSubject:
     """Rails that leak so much over the board, for the leakage alone: what saturates and what is
     driven stays. The diodes' part does not grow with the rails."""
 
-    def on(volts: float) -> Subject:
+    def on(volts: float) -> RuleSubject:
         return with_circuit(replace(base().circuit, supply=volts))
 
     once, twice = (look("leakage-force", on(volts)).value for volts in (1e3, 2e3))
     return on(1e3 + 1e3 * (share - once) / (twice - once))
 
 
-def _grade(grade: float) -> Subject:
+def _grade(grade: float) -> RuleSubject:
     made = base().made
     spec = replace(made.modelfile.circuit, resistor_grade=grade)
     made = replace(made, modelfile=replace(made.modelfile, circuit=spec))
@@ -208,14 +208,14 @@ def _grade(grade: float) -> Subject:
         else c
         for c in base().components
     ]
-    return Subject(made, circuit, bought)
+    return RuleSubject(made, circuit, bought)
 
 
 def _deviation() -> float:
     return look("dead-zone-stiffness", _grade(0.01)).value / 0.01
 
 
-def _watts(rule: str, share: float) -> Subject:
+def _watts(rule: str, share: float) -> RuleSubject:
     """The resistor that has most of its rating, with a rating that makes it this share."""
     worst = look(rule, base())
     assert worst.value > 0.0
@@ -223,7 +223,7 @@ def _watts(rule: str, share: float) -> Subject:
     return rated(name, f"{0.1 * worst.value / share:.12g}W, 75V")
 
 
-def _volts(share: float) -> Subject:
+def _volts(share: float) -> RuleSubject:
     worst = look("capacitor-voltage", base())
     name = worst.where.split()[0]
     known = next(c for c in base().components if c.reference == name)
@@ -232,7 +232,7 @@ def _volts(share: float) -> Subject:
     return rated(name, f"{rating * worst.value / share:.12g}V")
 
 
-def _absorbing(share: float) -> Subject:
+def _absorbing(share: float) -> RuleSubject:
     worst = look("absorption-force", base())
     farads = base().circuit.values[worst.where]
     return with_values(**{worst.where: farads * share / worst.value})
@@ -360,7 +360,7 @@ def _quiet() -> float:
     return 1e-3 / look("noise-force", with_figure("noise", typ=1e-3)).value
 
 
-def _common_mode(share: float) -> Subject:
+def _common_mode(share: float) -> RuleSubject:
     """A range of this share of what the inputs need."""
     met = base().operating
     nets = [s.inverting for s in base().circuit.sections]

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from designer.base.arrays import Array
 from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.flow_family import Family
-from designer.bifurcations.points import Kind
+from designer.bifurcations.points import PointKind
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
@@ -102,7 +102,7 @@ def main(low: float = 1.3, high: float = 3.4) -> None:
         known.append((omega, orbit))
     print("orbits")
     found = survey(family, known, low, high)
-    doublings = [p for p in found.points if p.kind is Kind.DOUBLING]
+    doublings = [p for p in found.points if p.kind is PointKind.DOUBLING]
     assert doublings, found.points
     for point in doublings:
         end, monodromy, _ = lap(point.value, point.point.orbit.start, point.point.orbit.n)

@@ -22,7 +22,14 @@ from designer.jobs.study_stage import satisfied
 from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
-from designer.spice.equation_check import FLOOR, EquationCheck, Finding, check, explained, transfer
+from designer.spice.equation_check import (
+    FLOOR,
+    EquationCheck,
+    EquationFinding,
+    check,
+    explained,
+    transfer,
+)
 from designer.spice.pool import SpicePool
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
@@ -66,7 +73,7 @@ def pool() -> Iterator[SpicePool]:
         yield pool
 
 
-def by_name(result: EquationCheck) -> dict[str, Finding]:
+def by_name(result: EquationCheck) -> dict[str, EquationFinding]:
     return {f.name: f for f in result.findings}
 
 
@@ -230,8 +237,8 @@ def test_a_diode_that_ngspice_finds_better_alone(pool: SpicePool, values: dict[s
 
 
 def test_a_check_without_an_answer_is_open_and_a_wrong_one_is_not() -> None:
-    right, wrong = Finding("slope", 0.1, 0.2), Finding("slope", 0.3, 0.2)
-    silent = Finding("slope", float("nan"), 0.2, "no answer")
+    right, wrong = EquationFinding("slope", 0.1, 0.2), EquationFinding("slope", 0.3, 0.2)
+    silent = EquationFinding("slope", float("nan"), 0.2, "no answer")
     assert EquationCheck((right, silent)).open
     assert not EquationCheck((right, silent)).passed
     assert not EquationCheck((wrong, silent)).open
@@ -250,7 +257,9 @@ def test_what_did_not_pass_is_said_again_from_the_file(
     deviation: float, reason: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The exit status is 1 then, also where a finished folder is shown again."""
-    found = EquationCheck((Finding("first", 0.01, 0.1), Finding("second", deviation, 0.1, reason)))
+    found = EquationCheck(
+        (EquationFinding("first", 0.01, 0.1), EquationFinding("second", deviation, 0.1, reason))
+    )
     assert found.problem.endswith(words)
     assert bool(found.problem) is bool(words)
     written = json.loads(dumps(found.as_dict()))

@@ -15,9 +15,9 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import numerics_gate
-from designer.spice.convergence_aids import Outcome
+from designer.spice.convergence_aids import AidedRun
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import BOUND, LEVELS, STEPS_PER_CONTACT, GateResult, Subject
+from designer.spice.numerics_gate import BOUND, LEVELS, STEPS_PER_CONTACT, GateResult, GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
@@ -37,18 +37,18 @@ def passed(pool: SpicePool) -> dict[int, GateResult]:
     return dict(zip(P, numerics_gate.check(pool, [subject(p) for p in P]), strict=True))
 
 
-def heard(pool: SpicePool, who: Subject, settings: SolverSettings) -> Orbit:
+def heard(pool: SpicePool, who: GateSubject, settings: SolverSettings) -> Orbit:
     ((_, found),) = pool.map([numerics_gate.job(who, settings)])
     assert not isinstance(found, SimulationFailed), found.reason
     return found.orbit
 
 
-def long_run(who: Subject) -> Subject:
+def long_run(who: GateSubject) -> GateSubject:
     """Enough periods to call a run aperiodic, from the same orbit."""
     return replace(who, orbit=replace(who.orbit, n=0), start=who.orbit.start)
 
 
-def shortest_contact(who: Subject) -> float:
+def shortest_contact(who: GateSubject) -> float:
     """Length of the shortest contact in periods, by a plain count of a dense exact trace."""
     flow = flow_of(who)
     run = flow.run(who.orbit.start, who.orbit.n, points=20_000)
@@ -156,7 +156,7 @@ def test_two_steps_and_two_methods_say_the_same(
     assert np.max(gaps) == pytest.approx(passed[p].difference, rel=1e-9)
 
 
-def rms(who: Subject, read: Read) -> float:
+def rms(who: GateSubject, read: Read) -> float:
     """On an even grid, ngspice's points joined by a cubic spline; worst state, of its peak."""
     assert read.trace is not None
     exact = flow_of(who).run(who.orbit.start, 1, points=5000).strobes
@@ -235,7 +235,7 @@ def test_a_response_without_a_period_is_compared_by_name_alone(
     ((_, ran),) = pool.map([numerics_gate.job(who, SolverSettings("trap", who.period / 400.0))])
     assert isinstance(ran, Read)
     for own, passes in ((ran.orbit, False), (Orbit(OrbitStatus.APERIODIC), True)):
-        outcome = Outcome(replace(ran, orbit=own), SolverSettings("trap", who.period / 400.0))
+        outcome = AidedRun(replace(ran, orbit=own), SolverSettings("trap", who.period / 400.0))
         result = numerics_gate._judge(nameless, [outcome] * 3, (400,), who.period)
         assert result.passed is passes
         assert np.isnan([result.difference, result.wave, result.wave_bound]).all()

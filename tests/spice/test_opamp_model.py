@@ -18,7 +18,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
 from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
-from designer.spice.opamp_check import Bench, Check, checks
+from designer.spice.opamp_check import FigureCheck, OpAmpBench, checks
 from designer.spice.opamp_model import RUNGS, Rung
 from tests.circuit.test_reduction import EXACT, circuit_of
 
@@ -37,7 +37,7 @@ every_rung_with_memory = pytest.mark.parametrize("rung", WITH_MEMORY)
 def test_static_figures(name: str, rung: Rung) -> None:
     """Open-loop gain within 0.1 %, offset within 1 ppm plus 1/gain, bias within 1 fA."""
     opamp = CATALOG.opamp(name)
-    bench = Bench.of(opamp, rung)
+    bench = OpAmpBench.of(opamp, rung)
     assert bench.open_loop_gain() == pytest.approx(opamp.gain.nominal, rel=1e-3)
     offset = opamp.offset.nominal
     assert bench.offset() == pytest.approx(offset, rel=1e-6 + 2.0 / opamp.gain.nominal, abs=1e-11)
@@ -50,7 +50,7 @@ def test_static_figures(name: str, rung: Rung) -> None:
 @pytest.mark.parametrize("rung", ["ideal", "dynamic"])
 def test_swing(name: str, rung: Rung) -> None:
     """Below ``full`` the limits are those of the pin, whatever the load; each rail its own."""
-    bench = Bench.of(CATALOG.opamp(name), rung)
+    bench = OpAmpBench.of(CATALOG.opamp(name), rung)
     low, high = 0.9 * bench.rails[0], 0.97 * bench.rails[1]
     bench = replace(bench, rails=(low, high))
     for load in (2e3, 10e3):
@@ -61,7 +61,7 @@ def test_swing(name: str, rung: Rung) -> None:
 def test_swing_follows_the_load(name: str) -> None:
     """``full``: the figures at 10 kΩ and 2 kΩ within 1 mV, and in between by Ohm's law."""
     opamp = CATALOG.opamp(name)
-    bench = Bench.of(opamp, "full")
+    bench = OpAmpBench.of(opamp, "full")
     light = opamp.saturation.nominal
     assert bench.swing(10e3) == pytest.approx((-light, light), abs=1e-3)
     heavy = bench.swing(2e3)
@@ -78,14 +78,14 @@ def test_swing_follows_the_load(name: str) -> None:
 def test_output_current_limit(name: str) -> None:
     opamp = CATALOG.opamp(name)
     want = opamp.output_current.nominal
-    assert Bench.of(opamp, "full").short_circuit() == pytest.approx((-want, want), rel=1e-3)
+    assert OpAmpBench.of(opamp, "full").short_circuit() == pytest.approx((-want, want), rel=1e-3)
 
 
 @each
 def test_supply_current(name: str) -> None:
     """The quiescent current within 0.1 %; the load's on top, from the rail that carries it."""
     opamp = CATALOG.opamp(name)
-    bench = Bench.of(opamp, "full")
+    bench = OpAmpBench.of(opamp, "full")
     quiet = opamp.supply_current.nominal
     assert bench.supply_current() == pytest.approx((quiet, quiet), rel=1e-3)
     load = (bench.rails[1] / 2 + bench.vos) / 2e3
@@ -96,7 +96,7 @@ def test_supply_current(name: str) -> None:
 def test_noise(name: str) -> None:
     """At 1 kHz the figure within 0.1 %; a corner leaves sqrt(1 + fc/f) of the white level."""
     opamp = CATALOG.opamp(name)
-    bench = Bench.of(opamp, "full")
+    bench = OpAmpBench.of(opamp, "full")
     figure = opamp.noise.nominal
     assert bench.noise(1e3) == pytest.approx(figure, rel=1e-3)
     corner = opamp.noise_corner.nominal if opamp.noise_corner else 0.0
@@ -109,7 +109,7 @@ def test_noise(name: str) -> None:
 def test_second_pole(name: str) -> None:
     """``full``: the phase margin of the catalogue (at most 88°), within 0.1°."""
     opamp = CATALOG.opamp(name)
-    frequency, phase = Bench.of(opamp, "full").unity_gain()
+    frequency, phase = OpAmpBench.of(opamp, "full").unity_gain()
     margin = min(opamp.phase_margin.nominal if opamp.phase_margin else 60.0, 88.0)
     assert phase == pytest.approx(margin, abs=0.1)
     expected = opamp.gbw.nominal * np.sin(np.radians(margin))
@@ -121,7 +121,7 @@ def test_an_input_below_the_common_mode_range(name: str) -> None:
     """A follower follows to 0.5 V inside the range. Beyond, one with phase reversal goes to the
     wrong rail; any other stays at the end of the range, or at its output limit before that."""
     opamp = CATALOG.opamp(name)
-    bench = Bench.of(opamp, "full")
+    bench = OpAmpBench.of(opamp, "full")
     inside, beyond = bench.below_range()
     end = opamp.common_mode.min
     assert end is not None
@@ -144,13 +144,13 @@ def test_frequency_response(name: str, rung: Rung) -> None:
     """Gain-bandwidth within 2 % a decade below unity gain."""
     opamp = CATALOG.opamp(name)
     at = opamp.gbw.nominal / 10.0
-    frequency, gain = Bench.of(opamp, rung).response(at, 2.0 * at)
+    frequency, gain = OpAmpBench.of(opamp, rung).response(at, 2.0 * at)
     assert abs(gain[0]) * frequency[0] == pytest.approx(opamp.gbw.nominal, rel=0.02)
 
 
 @each
 def test_one_pole(name: str) -> None:
-    frequency, phase = Bench.of(CATALOG.opamp(name), "dynamic").unity_gain()
+    frequency, phase = OpAmpBench.of(CATALOG.opamp(name), "dynamic").unity_gain()
     assert frequency == pytest.approx(CATALOG.opamp(name).gbw.nominal, rel=1e-3)
     assert phase == pytest.approx(90.0, abs=0.1)
 
@@ -160,7 +160,7 @@ def test_one_pole(name: str) -> None:
 def test_slew(name: str, rung: Rung) -> None:
     """Both edges within 1 % of the figure."""
     opamp = CATALOG.opamp(name)
-    for edge in Bench.of(opamp, rung).slew():
+    for edge in OpAmpBench.of(opamp, rung).slew():
         assert edge == pytest.approx(opamp.slew.nominal, rel=0.01)
 
 
@@ -171,7 +171,7 @@ def test_recovery_is_the_parameter(name: str, rung: Rung) -> None:
 
     A second pole adds its own time constant.
     """
-    bench = Bench.of(CATALOG.opamp(name), rung)
+    bench = OpAmpBench.of(CATALOG.opamp(name), rung)
     for factor in (0.1, 1.0, 10.0):
         wanted = factor * bench.parameters.recovery
         swept = replace(bench, parameters=replace(bench.parameters, recovery=wanted))
@@ -205,7 +205,7 @@ def test_a_deck_of_every_rung(rung: Rung) -> None:
 def unity_gain(text: str, section: str, gbw: float) -> tuple[float, float]:
     """Frequency [Hz] of unity gain and the phase left there, of one section of a deck."""
 
-    class Taken(Bench):
+    class Taken(OpAmpBench):
         """That section's line and the deck's own models, on the bench."""
 
         def deck(self, around: Sequence[str], *, inputs: tuple[str, str] = ("inp", "inn")) -> str:
@@ -217,7 +217,7 @@ def unity_gain(text: str, section: str, gbw: float) -> tuple[float, float]:
                     " ".join(["XU1", *inputs, "out", *own[4:]])]  # fmt: skip
             return "\n".join([*here, *lines[first : last + 1], *around, ".end"]) + "\n"
 
-    bench = Bench.of(CATALOG.opamp("TL074C"), "full")
+    bench = OpAmpBench.of(CATALOG.opamp("TL074C"), "full")
     parameters = replace(bench.parameters, gbw=gbw)
     return Taken(**{**bench.__dict__, "parameters": parameters}).unity_gain()
 
@@ -298,6 +298,6 @@ def test_a_figure_that_its_model_does_not_have_is_seen() -> None:
     )  # fmt: skip
     found = checks(replace(opamp, spice=vendor), "dynamic")
     assert all(c.agrees for c in found), "below full the model is ours"
-    bench = Bench.of(replace(opamp, spice=vendor), "full")
+    bench = OpAmpBench.of(replace(opamp, spice=vendor), "full")
     assert bench.open_loop_gain() == pytest.approx(1e6, rel=1e-3)
-    assert not Check("gain", "V/V", 2e5, 1e6, 0.01, False).agrees
+    assert not FigureCheck("gain", "V/V", 2e5, 1e6, 0.01, False).agrees

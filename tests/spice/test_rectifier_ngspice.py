@@ -32,7 +32,9 @@ LOW = {**SCALED, "R201": 49.9e3, "R204": 49.9e3}
 BENCH = Spread(0.01, 0.01, 3e-3, 10e-3)
 
 
-def subject(circuit: Circuit, board: Board, sides: Sides, omega: float) -> numerics_gate.Subject:
+def subject(
+    circuit: Circuit, board: Board, sides: Sides, omega: float
+) -> numerics_gate.GateSubject:
     """The response of this board at omega, started on the model's own orbit."""
     wanted = model(sides).second_order()
     errors = coefficient_errors(circuit, wanted)
@@ -40,7 +42,7 @@ def subject(circuit: Circuit, board: Board, sides: Sides, omega: float) -> numer
     excitation = Excitation(errors.scales.frequency(omega), 1.0 / errors.drive_gain[0])
     reduction = Reduction(circuit, board)
     flow = Flow(reduction.system(), excitation.drive)
-    return numerics_gate.Subject(
+    return numerics_gate.GateSubject(
         reduction, excitation, settle(flow, orbit.start * errors.scales.volts)
     )
 

@@ -25,7 +25,7 @@ from designer.model.model_file import parse_model_file
 from designer.spice import deck
 from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import RELTOL, Subject, job
+from designer.spice.numerics_gate import RELTOL, GateSubject, job
 from designer.spice.opamp_model import Rung, limit_into
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
@@ -40,13 +40,13 @@ finer = pytest.mark.parametrize("rung", ["dynamic", "full"])
 
 
 @cache
-def paper() -> dict[float, Subject]:
+def paper() -> dict[float, GateSubject]:
     """The paper's case as synthesised: each wanted response, by omega."""
     found, design = synthesised().found, synthesised().design
     reduction = nominal.nominal_reduction(design)
     system = reduction.system()
     return {
-        r.omega: Subject(
+        r.omega: GateSubject(
             reduction,
             Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)),
             on_circuit(system, design, r),
@@ -55,7 +55,7 @@ def paper() -> dict[float, Subject]:
     }
 
 
-def run(subject: Subject, rung: Rung, steps: int, periods: int) -> Read:
+def run(subject: GateSubject, rung: Rung, steps: int, periods: int) -> Read:
     """That many periods from the orbit of the exact circuit; the last ones are read."""
     settings = SolverSettings("trap", subject.period / steps)
     asked = job(replace(subject, rung=rung), settings)
@@ -148,7 +148,7 @@ def test_bandwidth_changes_the_count_near_grazing(omega: float, slow: str, fast:
     settings = [("trap", 600), ("trap", 1200), ("gear", 1200)]
     jobs = [
         job(
-            Subject(
+            GateSubject(
                 Reduction(near.circuit, replace(near.board, gain_bandwidth=dict.fromkeys(
                     (s.name for s in near.circuit.sections), bandwidth))),
                 Excitation(omega * frequency, volts), orbit, discard=60, rung="dynamic",
@@ -179,7 +179,7 @@ def test_a_rectifier_board(rung: Rung) -> None:
         reduction.system(), Drive(2.0 * np.pi * excitation.frequency, -excitation.amplitude)
     )
     model = settle(Flow(wanted.piecewise_linear(), Drive(1.55)), np.zeros(4))
-    subject = Subject(reduction, excitation, settle(flow, model.start * errors.scales.volts))
+    subject = GateSubject(reduction, excitation, settle(flow, model.start * errors.scales.volts))
     read = run(subject, rung, 200, 10)
     assert read.orbit.response == subject.orbit.response == "1-1-1"
     peak = np.abs(subject.orbit.extremes).max(axis=1)
@@ -220,7 +220,7 @@ def test_a_board_for_low_rails() -> None:
     assert 0.2 < design.errors.scales.threshold < 2.475 / 2
     first = next(r for r in found if r.omega == 1.55)
     reduction = nominal.nominal_reduction(design)
-    subject = Subject(
+    subject = GateSubject(
         reduction,
         Excitation(design.errors.scales.frequency(1.55), design.amplitude(first.b)),
         on_circuit(reduction.system(), design, first),

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from designer.check.response_runs import response_runs
+from designer.check.deck_runs import response_runs
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import nominal_board
 from designer.circuit.nominal import nominal_reduction, on_circuit
@@ -94,7 +94,7 @@ def named(name: str, number: int, found: Waveforms) -> str:
     run = response_runs(whole)[number - 1]
     reduction = nominal_reduction(whole.design)
     orbit = on_circuit(reduction.system(), whole.design, whole.found[number - 1])
-    subject = numerics_gate.Subject(reduction, run.excitation, orbit)
+    subject = numerics_gate.GateSubject(reduction, run.excitation, orbit)
     answer = numerics_gate.job(subject, run.settings).reduce(found)
     assert isinstance(answer, Read)
     assert answer.orbit.response == orbit.response

@@ -28,7 +28,7 @@ from designer.model.find_responses import Peaks
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
 from designer.synthesis import composites
-from designer.synthesis.composites import Pair, Program, best, pairs_near
+from designer.synthesis.composites import Pair, PairProgram, best, pairs_near
 from designer.synthesis.parts_choice import synthesise
 from tests.shared.oracles import Plain, coefficient_error
 from tests.shared.quick_folders import without_starts
@@ -66,7 +66,7 @@ def test_of_too_many_pairs_the_window_is_covered_evenly() -> None:
     assert np.diff(logs).max() < 0.01
 
 
-def error_of(program: Program, change: Array) -> float:
+def error_of(program: PairProgram, change: Array) -> float:
     h = program.h + change
     return float(np.abs(h + program.D @ minimax(h, program.D)).max())
 
@@ -83,7 +83,7 @@ def test_never_worse_than_enumeration(seed: int) -> None:
         table = pairs_near(values, float(values[i % 2]), 10.0)
         tables[f"R{i}"] = table
         changes[f"R{i}"] = np.outer(slope, np.log([p.value / values[i % 2] for p in table]))
-    program = Program(0.01 * rng.standard_normal(4), D, tables, changes, frozenset())
+    program = PairProgram(0.01 * rng.standard_normal(4), D, tables, changes, frozenset())
     chosen = best(program, frozenset())
     options = [
         [(0, np.zeros(4)), *((1, changes[n][:, k]) for k in range(len(tables[n])))] for n in tables
@@ -107,9 +107,9 @@ def test_of_curved_effects_at_most_one_is_used() -> None:
     changes = {"R1": half, "R2": half}
     D = np.zeros((2, 1))
     h = np.array([0.02, 0.0])
-    free = best(Program(h, D, dict.fromkeys(changes, table), changes, frozenset()), frozenset())
+    free = best(PairProgram(h, D, dict.fromkeys(changes, table), changes, frozenset()), frozenset())
     held = best(
-        Program(h, D, dict.fromkeys(changes, table), changes, frozenset(changes)), frozenset()
+        PairProgram(h, D, dict.fromkeys(changes, table), changes, frozenset(changes)), frozenset()
     )
     assert (len(free), len(held)) == (2, 1)
 

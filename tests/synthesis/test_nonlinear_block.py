@@ -16,14 +16,14 @@ from designer.model.model import Dimensionless
 from designer.synthesis import linear_search, rectifier_stage, saturating_search, size_dead_zone
 from designer.synthesis.advice import FREES
 from designer.synthesis.linear_block import Targets
-from designer.synthesis.nonlinear_block import Room, slope_interval, target_of
+from designer.synthesis.nonlinear_block import StageRoom, slope_interval, target_of
 from designer.synthesis.size_dead_zone import size
 from tests.shared.oracles import Plain, coefficient_error
 
 MODEL = Dimensionless(m=0.45, k=0.55, k0=0.95, c=0.4, zeta=0.1, f20=0.0, b=0.25)
 TARGETS = Targets.from_state_matrix(MODEL.second_order().state_matrix())
 PLAIN = Plain(MODEL.m, MODEL.k, MODEL.k0, MODEL.c, MODEL.zeta, MODEL.f20, MODEL.b)
-ROOM = Room(
+ROOM = StageRoom(
     saturation=13.0, swing=11.0, supply=15.0, peaks=np.array([0.65, 0.55, 0.65, 0.6]),
     penetration=0.4, load=2e3,
 )  # fmt: skip

@@ -15,7 +15,7 @@ from designer.check.checked_design import design_for
 from designer.circuit import build
 from designer.circuit.dead_zone_kind import zone_of
 from designer.circuit.dead_zone_parts import idle_limits
-from designer.circuit.design import Check, Design
+from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.circuit.noise_gains import stages
 from designer.circuit.reduction import Reduction
@@ -152,7 +152,7 @@ def test_sections_that_are_meant_to_saturate_keep_no_swing(section: str) -> None
 
 def test_a_check_holds_to_its_limit_and_says_when_it_is_near() -> None:
     for least in (False, True):
-        at = {r: Check("load", "x", 10.0, 10.0 * (r if not least else 1 / r), "", least)
+        at = {r: ConditionCheck("load", "x", 10.0, 10.0 * (r if not least else 1 / r), "", least)
               for r in (0.9, 0.995, 1.0, 1.01)}  # fmt: skip
         assert [at[r].holds for r in at] == [True, True, True, False]
         assert [at[r].at_limit for r in at] == [False, True, True, True]
@@ -349,11 +349,13 @@ def test_a_rectifier_on_high_rails_is_scaled_down(monkeypatch: pytest.MonkeyPatc
     text = "\n".join(line for line in text.splitlines() if not line.startswith("saturation"))
     modelfile = parse_model_file(text)
 
-    def fv() -> Check:
+    def fv() -> ConditionCheck:
         _, made = design_for(modelfile, CATALOG)
         return next(c for c in made.checks if c.quantity == "rectifier_fv_v")
 
     assert fv().holds
-    monkeypatch.setattr("designer.synthesis.limits.Limits.tightened", lambda self, *_, **__: self)
+    monkeypatch.setattr(
+        "designer.synthesis.limits.ConditionLimits.tightened", lambda self, *_, **__: self
+    )
     with pytest.raises(Unreachable, match="swing"):
         fv()

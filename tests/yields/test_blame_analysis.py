@@ -24,7 +24,7 @@ from designer.spread.spread import Group, Spread, draw_many
 from designer.yields import blame_replay
 from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
 from designer.yields.blame_extent import extent_of
-from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_pieces import StoredParts
 from designer.yields.blame_replay import PROBE
 from designer.yields.corners import worst_corners
 from designer.yields.crossings import crossings
@@ -329,7 +329,7 @@ class _Stopped(Exception):
     """Somebody has had enough."""
 
 
-class _Memory(Pieces):
+class _Memory(StoredParts):
     """Pieces that stay."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.job import SpiceJob
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
@@ -30,13 +30,13 @@ from designer.yields.layers import Samples, listen
 from designer.yields.ngspice_runs import (
     MOST_PERIODS,
     REMAINDER,
-    Heard,
+    NgspiceAnswer,
     Query,
     confirm,
     hear,
     periods_to_settle,
 )
-from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, Kind, Why, ask_random
+from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, StartKind, Why, ask_random
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
 from designer.yields.verdict import StudyPlan, Verdict
@@ -258,7 +258,7 @@ def both(samples: range, questions: int = 2) -> list[Ask]:
         Ask(i, number, kind, Why.RANDOM)
         for i in samples
         for number in range(questions)
-        for kind in (Kind.NOMINAL, Kind.OWN)
+        for kind in (StartKind.NOMINAL, StartKind.OWN)
     ]
 
 
@@ -275,7 +275,7 @@ def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
         question, answer = p.questions[h.question], answers[h.sample, h.question]
         assert h.agrees(answer) is True
         assert h.survives(question) is (answer.verdict is Verdict.OK)
-        if h.kind is Kind.OWN:
+        if h.kind is StartKind.OWN:
             assert h.periods == numerics_gate.DISCARD
             continue
         reduction = Reduction(p.circuit, draw(p.circuit, p.spread, p.seed, h.sample))
@@ -283,7 +283,7 @@ def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
         orbit = settle(Flow(reduction.system(), drive), question.start.start)
         settings = question.settings
         assert settings is not None
-        long = Subject(
+        long = GateSubject(
             reduction, question.excitation, orbit, start=question.start.start, discard=54
         )
         ((_, found),) = pool.map([numerics_gate.job(long, settings)])
@@ -296,16 +296,16 @@ def test_how_often_the_step_is_halved_goes_with_the_start(monkeypatch: pytest.Mo
     """As often as is asked from the nominal orbit; a board's own orbit needs no more for it."""
     asked: list[int] = []
 
-    def count(_pool: Any, queries: Sequence[Query], _progress: Any) -> list[Heard]:
+    def count(_pool: Any, queries: Sequence[Query], _progress: Any) -> list[NgspiceAnswer]:
         asked.extend(q.refinements for q in queries)
-        return [Heard("1-1-1") for _ in queries]
+        return [NgspiceAnswer("1-1-1") for _ in queries]
 
     monkeypatch.setattr(ngspice_runs, "confirm", count)
     pool: Any = None
     asks = both(range(1), 1)
     hear(asking(), asks, pool, 1)
     hear(asking(), asks, pool, 1, refinements=5)
-    assert [ask.kind for ask in asks] == [Kind.NOMINAL, Kind.OWN]
+    assert [ask.kind for ask in asks] == [StartKind.NOMINAL, StartKind.OWN]
     assert asked == [1, 2, 5, 2]
 
 
@@ -332,7 +332,7 @@ def test_too_long_a_way_is_left_out_by_name(
     heard = hear(p, both(range(1)), pool, 2, lambda: calls.append(1))
     answers = {a.question: a for a in Samples(p, range(1))(1, nothing)}
     for h in heard:
-        if h.kind is Kind.OWN:
+        if h.kind is StartKind.OWN:
             assert h.agrees(answers[h.question]) is True
         else:
             assert (h.response, h.periods, h.decided) == ("", 0, False)

@@ -18,7 +18,7 @@ from designer.yields.ngspice_sampling import (
     SUBSET,
     Ask,
     Hearing,
-    Kind,
+    StartKind,
     Why,
     ask_all,
     ask_boundary,
@@ -29,7 +29,7 @@ from designer.yields.ngspice_sampling import (
 from designer.yields.verdict import Answer, Question, Verdict
 
 BLANK = Answer(0, 0, Verdict.OK, "1-2-2", "", 0.5, 1.0, 1.0, 0.0, 40)
-HEARD = Hearing(0, 0, Kind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
+HEARD = Hearing(0, 0, StartKind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
 NOMINAL = Orbit(
     OrbitStatus.PERIODIC, n=1, p=2, q=2, multipliers=np.array([0.5 + 0j]), penetration=2.0, miss=4.0
 )
@@ -46,9 +46,9 @@ def test_the_random_subset_and_every_slow_one() -> None:
     radii = {i: 0.95 if i % 3 == 0 else math.nan if i % 3 == 1 else 0.9 for i in range(300)}
     answers = [replace(BLANK, sample=i, radius=r) for i, r in radii.items()]
     asks = ask_random(answers)
-    own = [a for a in asks if a.kind is Kind.OWN]
+    own = [a for a in asks if a.kind is StartKind.OWN]
     assert [a.sample for a in own] == list(range(OWN_SAMPLES))
-    nominal = {a.sample: a.why for a in asks if a.kind is Kind.NOMINAL}
+    nominal = {a.sample: a.why for a in asks if a.kind is StartKind.NOMINAL}
     assert NOMINAL_SAMPLES >= 50
     assert nominal == {
         i: Why.RANDOM if i < NOMINAL_SAMPLES else Why.SLOW
@@ -61,8 +61,8 @@ def test_the_random_subset_and_every_slow_one() -> None:
 
 def test_all_are_asked_where_all_are_wanted() -> None:
     asks = ask_all(replace(BLANK, sample=i) for i in range(300))
-    assert [a.sample for a in asks if a.kind is Kind.NOMINAL] == list(range(300))
-    assert sum(a.kind is Kind.OWN for a in asks) == OWN_SAMPLES
+    assert [a.sample for a in asks if a.kind is StartKind.NOMINAL] == list(range(300))
+    assert sum(a.kind is StartKind.OWN for a in asks) == OWN_SAMPLES
 
 
 @pytest.mark.parametrize(
@@ -92,13 +92,13 @@ def test_the_nearest_to_a_boundary_are_asked_once() -> None:
         replace(BLANK, sample=i // 2, question=i % 2, penetration=float(gaps[i]))
         for i in range(400)
     ]
-    known = [Ask(i, 0, Kind.OWN, Why.RANDOM) for i in range(200)]
+    known = [Ask(i, 0, StartKind.OWN, Why.RANDOM) for i in range(200)]
     asks = ask_boundary(answers, [question(), question()], known)
     for number in (0, 1):
         mine = np.argsort(gaps[number::2])[:BOUNDARY_SAMPLES].tolist()
-        for kind in Kind:
+        for kind in StartKind:
             met = {a.sample for a in asks if a.question == number and a.kind is kind}
-            assert met == (set() if (number, kind) == (0, Kind.OWN) else set(mine))
+            assert met == (set() if (number, kind) == (0, StartKind.OWN) else set(mine))
     assert {a.why for a in asks} == {Why.BOUNDARY}
 
 
@@ -108,12 +108,12 @@ def test_boards_that_differ_are_asked_from_their_own_orbit() -> None:
     answers = [replace(BLANK, sample=i) for i in range(7)]
     said = ["1-2-2", "1-2-2", "undecided", "1-1-1", "1-1-1", "aperiodic"]
     heard = [
-        replace(HEARD, sample=i, kind=Kind.NOMINAL, response=response)
+        replace(HEARD, sample=i, kind=StartKind.NOMINAL, response=response)
         for i, response in enumerate(said)
     ]
     heard.append(replace(HEARD, sample=6, response="1-1-1"))
-    asks = ask_differing(answers, heard, [Ask(3, 0, Kind.OWN, Why.RANDOM)])
-    assert asks == [Ask(i, 0, Kind.OWN, Why.DIFFERS) for i in (4, 5)]
+    asks = ask_differing(answers, heard, [Ask(3, 0, StartKind.OWN, Why.RANDOM)])
+    assert asks == [Ask(i, 0, StartKind.OWN, Why.DIFFERS) for i in (4, 5)]
 
 
 def test_agreement_and_survival() -> None:

@@ -18,8 +18,8 @@ from designer.dynamics.flow import Flow
 from designer.spread.spread import draw, draw_many
 from designer.yields import start_recipe_search
 from designer.yields.power_up import until_strobe
-from designer.yields.power_up_yield import Reached, phases, reached_block, switched_on
-from designer.yields.start_recipe import FINER, SLOWER, Recipe, Way, hertz, volts
+from designer.yields.power_up_yield import PowerUpAnswer, phases, reached_block, switched_on
+from designer.yields.start_recipe import FINER, SLOWER, Recipe, RecipeKind, hertz, volts
 from designer.yields.start_recipe_search import (
     ASIDE,
     HOLD,
@@ -35,7 +35,7 @@ from tests.shared.bench_plans import answers, ensemble, period_counts, plan, que
 from tests.shared.paper_cases import OMEGA, subject
 
 
-def recipes(p: int) -> dict[Way, Recipe]:
+def recipes(p: int) -> dict[RecipeKind, Recipe]:
     return {r.way: r for r in candidates(question(p), subject(p).system)}
 
 
@@ -46,8 +46,8 @@ def nominal(p: int) -> Ensemble:
 # What a recipe is.
 
 
-@pytest.mark.parametrize("way", list(Way))
-def test_a_recipe_ends_at_the_wanted_setting_in_small_steps(way: Way) -> None:
+@pytest.mark.parametrize("way", list(RecipeKind))
+def test_a_recipe_ends_at_the_wanted_setting_in_small_steps(way: RecipeKind) -> None:
     recipe = recipes(2)[way]
     stages = list(recipe.stages())
     assert stages[-1] == (recipe.target, recipe.wait)
@@ -67,11 +67,15 @@ def test_a_recipe_ends_at_the_wanted_setting_in_small_steps(way: Way) -> None:
 def test_candidates_are_what_their_names_say() -> None:
     found = recipes(2)
     target = question(2).excitation
-    assert next(iter(found)) is Way.DIRECT
-    assert found[Way.DIRECT].first == target
-    assert found[Way.FROM_ABOVE].first.frequency == pytest.approx((1 + ASIDE) * target.frequency)
-    assert found[Way.FROM_BELOW].first.frequency == pytest.approx((1 - ASIDE) * target.frequency)
-    assert found[Way.AMPLITUDE].first == Excitation(target.frequency, 0.5 * target.amplitude)
+    assert next(iter(found)) is RecipeKind.DIRECT
+    assert found[RecipeKind.DIRECT].first == target
+    assert found[RecipeKind.FROM_ABOVE].first.frequency == pytest.approx(
+        (1 + ASIDE) * target.frequency
+    )
+    assert found[RecipeKind.FROM_BELOW].first.frequency == pytest.approx(
+        (1 - ASIDE) * target.frequency
+    )
+    assert found[RecipeKind.AMPLITUDE].first == Excitation(target.frequency, 0.5 * target.amplitude)
 
 
 def test_the_long_sweep_begins_above_the_model_s_resonances() -> None:
@@ -85,7 +89,7 @@ def test_the_long_sweep_begins_above_the_model_s_resonances() -> None:
 
 def test_a_recipe_in_words_and_in_json() -> None:
     tried = replace(
-        recipes(1)[Way.FROM_ABOVE],
+        recipes(1)[RecipeKind.FROM_ABOVE],
         reached=12,
         trials=12,
         board_reached=13,
@@ -107,20 +111,20 @@ def test_a_recipe_in_words_and_in_json() -> None:
     assert said["text"] == text
     assert said["to_frequency_hz"] == tried.target.frequency
     assert said["sweep_seconds"] > 0.0
-    direct = recipes(1)[Way.DIRECT]
+    direct = recipes(1)[RecipeKind.DIRECT]
     assert direct.sweep_seconds == 0.0
     assert "at this setting" in direct.text
 
 
 def test_only_what_was_tried_is_promised() -> None:
-    sweep = recipes(1)[Way.FROM_ABOVE]
+    sweep = recipes(1)[RecipeKind.FROM_ABOVE]
     assert "in 10 steps of equal ratio, 20 periods each" in sweep.text
     assert "slower" not in sweep.text
     assert "worked" not in sweep.text
     few = replace(sweep, reached=12, trials=12, board_reached=3, board_trials=3, boards=6, able=1)
     assert "caution: 1 of 6 sample boards" in few.text
     assert "caution: none of 6" in replace(few, board_trials=0, board_reached=0, able=0).text
-    raised = replace(recipes(1)[Way.AMPLITUDE], smooth=True).text
+    raised = replace(recipes(1)[RecipeKind.AMPLITUDE], smooth=True).text
     assert "raise the amplitude to " in raised
     assert "steps" not in raised
 
@@ -134,7 +138,7 @@ def test_a_generator_takes_the_numbers(value: float) -> None:
 
 @pytest.mark.parametrize("slower", [1, SLOWER])
 def test_a_finer_sweep_is_the_same_one(slower: int) -> None:
-    sweep = recipes(2)[Way.FROM_BELOW]
+    sweep = recipes(2)[RecipeKind.FROM_BELOW]
     fine = sweep.refined(slower)
     assert fine.sweep_seconds == pytest.approx(slower * sweep.sweep_seconds, rel=0.01)
     assert (fine.first, fine.target, fine.wait) == (sweep.first, sweep.target, sweep.wait)
@@ -157,7 +161,7 @@ def test_phases_fill_the_half_circle_too() -> None:
 
 @pytest.mark.parametrize(("p", "other"), [(1, "3-3-3"), (2, "1-1-1")])
 def test_a_direct_start_is_left_to_chance(p: int, other: str) -> None:
-    starts = [(0, question(p), recipes(p)[Way.DIRECT], phase(k)) for k in range(32)]
+    starts = [(0, question(p), recipes(p)[RecipeKind.DIRECT], phase(k)) for k in range(32)]
     ended = switched_on(nominal(p), starts)
     met = [e.orbit.response for e in ended]
     assert set(met) == {f"1-{p}-{p}", other}
@@ -168,7 +172,7 @@ def test_a_direct_start_is_left_to_chance(p: int, other: str) -> None:
 
 @pytest.mark.parametrize("p", [1, 2])
 def test_a_sweep_from_above_all_resonances_is_not(p: int) -> None:
-    recipe = recipes(p)[Way.FROM_FAR]
+    recipe = recipes(p)[RecipeKind.FROM_FAR]
     starts = [(0, question(p), recipe, phase(k)) for k in range(8)]
     ended = switched_on(nominal(p), starts)
     assert {e.orbit.response for e in ended} == {f"1-{p}-{p}"}
@@ -178,8 +182,8 @@ def test_recipes_found_keep_their_word_at_other_phases() -> None:
     """On phases that the search has not seen; and 1-3-3 needs no more than to be switched on."""
     of = plan(1, 3)
     found = find_recipes(of, 2)
-    assert found[0].way is not Way.DIRECT
-    assert found[1].way is Way.DIRECT
+    assert found[0].way is not RecipeKind.DIRECT
+    assert found[1].way is RecipeKind.DIRECT
     for recipe, p in zip(found, (1, 3), strict=True):
         assert recipe.reached == recipe.trials > 0
         assert recipe.rate == 1.0
@@ -200,7 +204,7 @@ def test_one_recipe_beats_another_by_more_than_chance() -> None:
     """McNemar: only starts at which one of the two failed say anything about the difference."""
 
     def trials(*worked: int) -> _Trials:
-        return _Trials(recipes(1)[Way.DIRECT], (True,) * 12, tuple(map(bool, worked)))
+        return _Trials(recipes(1)[RecipeKind.DIRECT], (True,) * 12, tuple(map(bool, worked)))
 
     always, once_off = trials(1, 1, 1, 1, 1, 1), trials(1, 1, 0, 1, 1, 1)
     assert always.certain
@@ -231,7 +235,7 @@ def test_what_a_recipe_promises_of_boards_holds_on_others() -> None:
 def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
     """900 periods from discharged capacitors, without sweep, counted by eye."""
     of = plan(2)
-    direct = recipes(2)[Way.DIRECT]
+    direct = recipes(2)[RecipeKind.DIRECT]
     rows = reached_block(of, range(6), [direct], 2)
     assert [(r.sample, r.question) for r in rows] == [(i, 0) for i in range(6)]
     seen = 0
@@ -253,11 +257,11 @@ def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
 
 def test_neither_jobs_nor_blocks_change_what_is_reached() -> None:
     of = plan(1, 3)
-    known = [recipes(1)[Way.FROM_ABOVE], recipes(3)[Way.DIRECT]]
+    known = [recipes(1)[RecipeKind.FROM_ABOVE], recipes(3)[RecipeKind.DIRECT]]
     calls: list[int] = []
     whole = reached_block(of, range(4), known, 2, lambda: calls.append(1))
     assert len(calls) == len(whole) == 8
-    parts: list[Reached] = []
+    parts: list[PowerUpAnswer] = []
     for block in (range(1), range(1, 4)):
         parts += reached_block(of, block, known, 1)
     assert parts == whole
@@ -274,7 +278,7 @@ def test_phases_are_drawn_from_seed_sample_and_response_alone() -> None:
 
 
 def test_a_response_in_front_changes_nothing_of_the_others() -> None:
-    known = [recipes(1)[Way.DIRECT], recipes(3)[Way.DIRECT]]
+    known = [recipes(1)[RecipeKind.DIRECT], recipes(3)[RecipeKind.DIRECT]]
     alone = reached_block(plan(3), range(4), known[1:], 2)
     both = reached_block(plan(1, 3), range(4), known, 2)
     assert [replace(r, question=0) for r in both if r.question == 1] == alone
@@ -299,7 +303,7 @@ def test_recipes_are_tried_on_boards_that_no_study_has(
 def test_reached_agrees_with_as_built_where_one_attractor_is_left() -> None:
     """At ω = 0.54 the nominal circuit has one attractor: how it is started does not matter."""
     of = plan(3)
-    rows = reached_block(of, range(8), [recipes(3)[Way.DIRECT]], 2)
+    rows = reached_block(of, range(8), [recipes(3)[RecipeKind.DIRECT]], 2)
     ok = [a.verdict is Verdict.OK for a in answers(of, range(8))]
     assert any(ok)
     assert sum(r.verdict is Verdict.OK for r in rows) == pytest.approx(sum(ok), abs=1)
@@ -309,8 +313,10 @@ def test_a_board_that_cannot_be_reduced_is_failed() -> None:
     of = plan(1, samples=1)
     broken = replace(of.circuit, parts=(*of.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
     boards = Boards.of(broken, [nominal_board(broken)])
-    (ended,) = switched_on(Ensemble(boards), [(0, question(1), recipes(1)[Way.DIRECT], 1.0)])
+    (ended,) = switched_on(Ensemble(boards), [(0, question(1), recipes(1)[RecipeKind.DIRECT], 1.0)])
     assert ended.verdict is Verdict.FAILED
     assert ended.reason
-    (row,) = reached_block(replace(of, circuit=broken), range(1), [recipes(1)[Way.DIRECT]], 1)
+    (row,) = reached_block(
+        replace(of, circuit=broken), range(1), [recipes(1)[RecipeKind.DIRECT]], 1
+    )
     assert row.verdict is Verdict.FAILED

@@ -30,9 +30,9 @@ from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
 from designer.yields import layers, ngspice_runs, study_layers
 from designer.yields.blame_analysis import blame
-from designer.yields.blame_pieces import Pieces
+from designer.yields.blame_pieces import StoredParts
 from designer.yields.layers import CHUNK, Here, Samples
-from designer.yields.ngspice_sampling import Hearing, Kind, Why, ask_random
+from designer.yields.ngspice_sampling import Hearing, StartKind, Why, ask_random
 from designer.yields.row_store import BlockStore
 from designer.yields.study import Study
 from designer.yields.study_layers import Stores, Work
@@ -214,7 +214,7 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
         return [
             Hearing(
                 a.sample, a.question, a.kind, a.why,
-                "3-3-3" if a.sample == 45 and a.kind is Kind.NOMINAL else "1-1-1",
+                "3-3-3" if a.sample == 45 and a.kind is StartKind.NOMINAL else "1-1-1",
                 "", "", 9, False,
             )
             for a in asks
@@ -249,7 +249,7 @@ def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatc
     asked: list[int] = []
 
     def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
-        asked.append(sum(a.kind is Kind.NOMINAL and a.why is Why.RANDOM for a in asks))
+        asked.append(sum(a.kind is StartKind.NOMINAL and a.why is Why.RANDOM for a in asks))
         return [
             Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
         ]
@@ -353,7 +353,7 @@ def test_a_map_that_is_there_is_not_made_again(
         return MAP
 
     class Kept(Stores):
-        def maps(self, plan: Any) -> Pieces:
+        def maps(self, plan: Any) -> StoredParts:
             return pieces
 
     monkeypatch.setattr(study_layers, "yield_map", yield_map)

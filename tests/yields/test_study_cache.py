@@ -11,11 +11,11 @@ import pytest
 
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.deck import SolverSettings
-from designer.spice.equation_check import EquationCheck, Finding
+from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
-from designer.yields.blame_replay import Subject
+from designer.yields.blame_replay import BlamedPart
 from designer.yields.corners import Corner
 from designer.yields.crossings import Crossing
 from designer.yields.margins import Limit, Prediction
@@ -28,11 +28,13 @@ from tests.shared.bench_plans import question
 ORBIT = question(1).start
 READ = Read(ORBIT, np.arange(12.0).reshape(3, 4) / 7.0, (np.array([0.1]), np.ones((1, 4))))
 GATE = GateResult(SolverSettings("trap", 1e-6), True, 1e-4 / 3.0, READ, (200, 400))
-CHECK = EquationCheck((Finding("slope", 0.1 / 3.0, 1e-2), Finding("threshold", 0.0, 1.0)))
+CHECK = EquationCheck(
+    (EquationFinding("slope", 0.1 / 3.0, 1e-2), EquationFinding("threshold", 0.0, 1.0))
+)
 BLAMED = ResponseBlame(
     0,
     3,
-    (Subject("R1", "resistor", 1, 3, 0, 2),),
+    (BlamedPart("R1", "resistor", 1, 3, 0, 2),),
     (Index("R1", "R1", 0.1, float("nan")),),
     (NearLimit("a fold", 1.0 / 3.0),),
     Prediction(1, 2, 3, 4),

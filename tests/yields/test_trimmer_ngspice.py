@@ -13,7 +13,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.spice import numerics_gate
 from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
-from designer.spice.numerics_gate import Subject
+from designer.spice.numerics_gate import GateSubject
 from designer.yields.trimmed_yield import HIGH, LOW, trimmed_boards
 from tests.shared.bench_plans import plan
 from tests.yields.test_trimmed_yield import ROUGH, TRACK, trim
@@ -29,7 +29,7 @@ def test_ngspice_runs_the_trimmed_board() -> None:
     flow = Flow(reduction.system(), question.excitation.drive)
     orbit = attractors.settle(flow, question.start.start)
     assert orbit.status is OrbitStatus.PERIODIC
-    asked = Subject(reduction, question.excitation, orbit)
+    asked = GateSubject(reduction, question.excitation, orbit)
     steps, points = 1000, 100
     job = numerics_gate.job(asked, SolverSettings("trap", asked.period / steps), whole=True)
     assert board.values[HIGH] + board.values[LOW] == TRACK

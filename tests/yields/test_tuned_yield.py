@@ -20,7 +20,7 @@ from designer.spread.spread import Spread, draw
 from designer.yields import tuned_yield
 from designer.yields.generator_offsets import AS_BUILT, Adjustment
 from designer.yields.joint_yield import all_on_one
-from designer.yields.setting_search import MOST_FOLLOWED, MOST_TRIES, Case, Try, seek
+from designer.yields.setting_search import MOST_FOLLOWED, MOST_TRIES, BoardCase, Try, seek
 from designer.yields.tuned_yield import Tuned, benched_block, tuned_block
 from designer.yields.verdict import Answer, Question, Verdict, judge
 from tests.shared.bench_plans import answers, ensemble, period_counts, plan, question, shifted
@@ -61,7 +61,7 @@ def test_a_constant_force_is_cured_at_the_first_try() -> None:
     boards = ensemble([board], p)
     (lost,) = boards.settle([0], [asked.excitation.drive], asked.start.start[None, :])
     assert judge(lost, asked.spec, asked.start)[0] is Verdict.LOST
-    case = Case(0, asked, ratio)
+    case = BoardCase(0, asked, ratio)
     seek(boards, [case], Bands())
     assert case.found is not None
     assert len(case.tries) == 1
@@ -217,7 +217,7 @@ def test_a_bench_that_breaks_off_is_failed_with_its_reason(
 def test_a_board_given_up_is_lost_only_where_most_settings_answered(
     built: str, statuses: str, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def seek(_ensemble: object, cases: list[Case], *_: object, **__: object) -> None:
+    def seek(_ensemble: object, cases: list[BoardCase], *_: object, **__: object) -> None:
         for case in cases:
             for status in statuses.split():
                 orbit = Orbit(OrbitStatus(status))

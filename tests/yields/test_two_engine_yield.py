@@ -13,7 +13,7 @@ from designer.yields.ngspice_sampling import (
     OR,
     Ask,
     Hearing,
-    Kind,
+    StartKind,
     Why,
     ask_boundary,
     ask_random,
@@ -106,7 +106,7 @@ def test_engines_that_agree_give_the_exact_estimate() -> None:
     assert both.low < low < high < both.high  # fifty boards may hide a difference
     assert both.disagreement.count == 0
     assert both.differences == ()
-    everything = [Ask(i, 0, Kind.NOMINAL, Why.ALL) for i in range(500)]
+    everything = [Ask(i, 0, StartKind.NOMINAL, Why.ALL) for i in range(500)]
     whole = combine(answers, listened(answers, said, everything), QUESTION)
     assert whole is not None
     assert (whole.low, whole.high) == pytest.approx((low, high))
@@ -114,7 +114,7 @@ def test_engines_that_agree_give_the_exact_estimate() -> None:
 
 def test_every_board_in_ngspice_gives_its_own_yield() -> None:
     answers, said = world(np.random.default_rng(2), 400, 0.6, 0.2, 0.2)
-    everything = [Ask(i, 0, Kind.NOMINAL, Why.ALL) for i in range(400)]
+    everything = [Ask(i, 0, StartKind.NOMINAL, Why.ALL) for i in range(400)]
     both = combine(answers, listened(answers, said, everything), QUESTION)
     assert both is not None
     ok = sum(said.values())
@@ -150,7 +150,7 @@ def test_boards_without_an_answer_are_bounded() -> None:
     answers = [replace(BLANK, sample=i) for i in range(60)]
     heard = [
         replace(
-            HEARD, sample=i, kind=Kind.NOMINAL, why=Why.ALL,
+            HEARD, sample=i, kind=StartKind.NOMINAL, why=Why.ALL,
             response="" if i in (7, 20) else "undecided" if i == 33 else "failed" if i > 57
             else LOST if i < 5 else OK,
         )
@@ -173,7 +173,7 @@ def test_a_board_that_is_lost_by_either_step_is_lost() -> None:
     says = {3: OR.join((LOST, "aperiodic")), 7: OR.join((LOST, OK))}
     heard = [
         replace(
-            HEARD, sample=i, kind=Kind.NOMINAL, why=Why.ALL,
+            HEARD, sample=i, kind=StartKind.NOMINAL, why=Why.ALL,
             response="undecided" if i in says else OK, either=says.get(i, ""),
         )
         for i in range(10)
@@ -189,7 +189,9 @@ def test_a_board_that_is_lost_by_either_step_is_lost() -> None:
 
 
 def test_no_answer_from_ngspice_is_no_estimate() -> None:
-    heard = [replace(HEARD, kind=Kind.NOMINAL, response=r) for r in ("failed", "undecided", "")]
+    heard = [
+        replace(HEARD, kind=StartKind.NOMINAL, response=r) for r in ("failed", "undecided", "")
+    ]
     assert combine([BLANK], [], QUESTION) is None
     assert combine([BLANK], [HEARD], QUESTION) is None  # from its own orbit alone
     assert all(combine([BLANK], [h], QUESTION) is None for h in heard)
@@ -221,9 +223,9 @@ def test_limits_lie_about_the_estimate(data: st.DataObject) -> None:
         ({"penetration": 1e-3}, {}, False, Explanation.GRAZING),
         ({"miss": 1e-3}, {}, True, Explanation.GRAZING),
         ({"response": "clipped"}, {}, False, Explanation.CLIPPED),
-        ({}, {"kind": Kind.NOMINAL}, True, Explanation.BASIN),
-        ({"radius": 0.95}, {"kind": Kind.NOMINAL}, False, Explanation.NONE),
-        ({"radius": 0.95}, {"kind": Kind.NOMINAL}, True, Explanation.BASIN),
+        ({}, {"kind": StartKind.NOMINAL}, True, Explanation.BASIN),
+        ({"radius": 0.95}, {"kind": StartKind.NOMINAL}, False, Explanation.NONE),
+        ({"radius": 0.95}, {"kind": StartKind.NOMINAL}, True, Explanation.BASIN),
         ({"response": "5-1-1"}, {}, False, Explanation.NONE),
         ({"response": "aperiodic"}, {}, False, Explanation.NONE),
         ({}, {}, False, Explanation.NONE),

@@ -14,7 +14,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import Spread, draw_many
-from designer.yields.window_path import MOST_FOLLOWED, Spot, find_window
+from designer.yields.window_path import MOST_FOLLOWED, PathSetting, find_window
 from tests.shared.bench_plans import period_counts, plan, question
 from tests.shared.paper_cases import MODEL, subject
 
@@ -27,7 +27,7 @@ def board(p: int, sample: int) -> Boards:
     return draw_many(of.circuit, of.spread, of.seed, range(sample, sample + 1))
 
 
-def response(boards: Boards, p: int, spot: Spot) -> tuple[int, int, int] | None:
+def response(boards: Boards, p: int, spot: PathSetting) -> tuple[int, int, int] | None:
     """n-p-q after 900 drive periods from the nominal orbit, without the search's classifier."""
     asked = question(p)
     system = Reduction(boards.circuit, boards.board(0)).system()
@@ -61,7 +61,7 @@ def test_the_radius_says_where_the_window_ends() -> None:
         out = []
         for turn in turns:
             f, a = here + radius * widths * (np.cos(turn), np.sin(turn))
-            moved = Spot(type(best.setting)(f, a, best.setting.offset), 0.0)
+            moved = PathSetting(type(best.setting)(f, a, best.setting.offset), 0.0)
             out.append(response(boards, p, moved) == (1, p, p))
         return out
 

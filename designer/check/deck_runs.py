@@ -33,7 +33,7 @@ def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:
     )
     reduction = nominal_reduction(design)
     orbit = on_circuit(reduction.system(), design, response)
-    subject = numerics_gate.Subject(reduction, excitation, orbit)
+    subject = numerics_gate.GateSubject(reduction, excitation, orbit)
     contact = numerics_gate.shortest_contact(orbit, subject.system, excitation)
     period = subject.period
     step = period / (FINER * numerics_gate.first_steps(subject, contact))
