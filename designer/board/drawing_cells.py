@@ -178,7 +178,7 @@ def board_cells(
 ) -> tuple[Cell, ...]:
     """What the board has beside the circuit: outputs, generator and trim, supply, decoupling.
 
-    numbers : pads by name of the pin, by unit of a package (``drawing.Numbers``).
+    numbers : pads by name of the pin, by unit of a package (``drawing_cells.Numbers``).
     """
     fittings = circuit.fittings
     if not fittings:

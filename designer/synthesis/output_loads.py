@@ -102,7 +102,7 @@ class Loads:
 def design_loads(design: Design, reduction: Reduction, found: Sequence[ModelResponse]) -> Loads:
     """Loads of a design over its wanted responses and their starts from rest.
 
-    reduction : of the board that is asked about, usually ``pipeline.nominal_reduction(design)``.
+    reduction : of the board that is asked about, usually ``nominal.nominal_reduction(design)``.
     """
     system = reduction.system()
     drives = [circuit_flow(system, design, r).drive for r in found]
