@@ -47,18 +47,16 @@ __all__ = [
 ]
 
 _HOMES = {
-    "designer.check.synthesis_result": (
-        "RunResult",
-        "Synthesis",
-        "run",
-        "synthesise",
-    ),
+    "designer.check.synthesis_result": ("Synthesis", "synthesise"),
+    "designer.jobs.study_job": ("run",),
     "designer.catalog.catalog": ("Catalog", "load_catalog"),
     "designer.base.errors": ("DesignerError", "EnvironmentMissing", "InputError", "Unreachable"),
     "designer.model.model": ("Dimensionless", "Mechanical"),
     "designer.model.model_file": ("ModelFile", "Response", "parse_model_file", "read_model_file"),
     "designer.check.simulation": ("Simulated", "simulate"),
-    "designer.yields.study": ("Study", "tolerance"),
+    "designer.yields.run_result": ("RunResult",),
+    "designer.yields.study": ("Study",),
+    "designer.yields.tolerance_study": ("tolerance",),
 }
 
 

@@ -129,7 +129,7 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("designer.jobs.search_job.look", lambda *_: ())
-    monkeypatch.setattr("designer.jobs.search_job.design_search", interrupted)
+    monkeypatch.setattr("designer.jobs.search_job.search", interrupted)
     words = ("search", model, "--out", out, "-q")
     assert run(*words) == 2  # the design is one that no search made
     assert run(*words, "--overwrite") == 130

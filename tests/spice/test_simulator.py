@@ -443,7 +443,7 @@ def test_ngspice_would_execute_such_comments(tmp_path: Path) -> None:
 
 _PRINT_RESULT = """
 import sys
-from designer.spice.simulator import open_simulator
+from designer.spice.backends import open_simulator
 waves = open_simulator(sys.argv[1]).run(sys.stdin.read(), ["b"], 2e-3)
 print(waves.time.size, waves.time.sum().hex(), waves.signals["b"].sum().hex())
 """
@@ -574,7 +574,7 @@ def test_missing_library_is_said(tmp_path: Path) -> None:
     script = """
 import ctypes.util, os
 from designer.base.errors import EnvironmentMissing
-from designer.spice.simulator import open_simulator
+from designer.spice.backends import open_simulator
 for how in ("nowhere", "unloadable"):
     if how == "nowhere":
         ctypes.util.find_library, find = (lambda name: None), ctypes.util.find_library
