@@ -23,41 +23,54 @@ REACH = 3
 
 @dataclass(frozen=True)
 class ShapePin:
-    """x, y : where a wire meets it, y upwards; angle : from there to the body [degrees]."""
+    """A pin of a symbol."""
 
     number: str
+    """Its number."""
     name: str
+    """Its name."""
     electrical: str
+    """Its electrical type, in KiCad's words."""
     x: int
+    """Where a wire meets it, to the right."""
     y: int
+    """Where a wire meets it, upwards."""
     angle: int
+    """Direction from there to the body [degrees]."""
     length: int
+    """Its length."""
 
 
 @dataclass(frozen=True)
 class SymbolUnit:
-    """One of the drawings that a symbol consists of. lines : polylines of (x, y)."""
+    """One of the drawings that a symbol consists of."""
 
     pins: tuple[ShapePin, ...]
+    """The pins."""
     lines: tuple[tuple[tuple[float, float], ...], ...]
+    """Polylines of points (x, y)."""
     filled: bool = True
+    """Whether the drawing is filled."""
 
 
 @dataclass(frozen=True)
 class SymbolShape:
-    """A symbol: prefix : of its references. power : whether it names its net.
-
-    texts : where reference and value stand, (x, y) with y upwards. names : whether pins show
-    names; numbers, their numbers.
-    """
+    """A symbol."""
 
     name: str
+    """Its name."""
     prefix: str
+    """What its designators begin with."""
     units: tuple[SymbolUnit, ...]
+    """Its drawings."""
     texts: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1.9), (0.0, -1.9))
+    """Where reference and value stand, (x, y) with y upwards."""
     power: bool = False
+    """Whether it names its net."""
     names: bool = False
+    """Whether pins show their names."""
     numbers: bool = False
+    """Whether pins show their numbers."""
 
     def pin(self, number: str) -> tuple[int, ShapePin]:
         """The unit (from 1) and the pin of this number."""
