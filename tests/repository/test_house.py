@@ -56,7 +56,6 @@ LAZY = {
 """Imports inside functions, outside the command line, each with its reason."""
 
 FIELDS_LEFT = (
-    "fidelity",
     "report",
     "jobs",
     "paper",
