@@ -56,7 +56,6 @@ LAZY = {
 """Imports inside functions, outside the command line, each with its reason."""
 
 FIELDS_LEFT = (
-    "report",
     "jobs",
     "paper",
 )
