@@ -56,7 +56,6 @@ LAZY = {
 """Imports inside functions, outside the command line, each with its reason."""
 
 FIELDS_LEFT = (
-    "jobs",
     "paper",
 )
 """Packages whose fields are not all described yet. It only ever gets shorter."""
