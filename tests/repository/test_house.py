@@ -55,11 +55,6 @@ LAZY = {
 }
 """Imports inside functions, outside the command line, each with its reason."""
 
-FIELDS_LEFT = (
-    "paper",
-)
-"""Packages whose fields are not all described yet. It only ever gets shorter."""
-
 
 @pytest.fixture(scope="module")
 def every() -> list[Import]:
@@ -221,8 +216,8 @@ def test_every_field_has_its_docstring(package: str) -> None:
             found, count = bare_fields(path.read_text("utf-8"))
             bare += [f"{module}:{field}" for field in found]
             total += count
-    assert total > 0 or package in {"cli"}
-    assert bool(bare) == (package in FIELDS_LEFT), bare
+    assert total > 0 or package == "cli"
+    assert bare == []
 
 
 def test_dynamics_and_bifurcations_stand_alone() -> None:
