@@ -65,7 +65,7 @@ class Attractor:
     """An attractor that was met."""
 
     number: int
-    """Its number, from 0."""
+    """Number of the attractor, from 0."""
     response: str
     """The response, as "n-p-q"."""
     symmetric: bool | None
@@ -83,7 +83,7 @@ class Basins:
     """Which start leads to which attractor."""
 
     plan: BasinPlan
-    """What was asked for."""
+    """The grid of starts that was asked for."""
     cells: tuple[MapCell, ...]
     """The grid row by row, each cell with the number of its attractor."""
     attractors: tuple[Attractor, ...]

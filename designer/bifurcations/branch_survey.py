@@ -26,7 +26,7 @@ class Survey:
     """Branches, and the bifurcation points on them."""
 
     parameter: str
-    """Name of the parameter."""
+    """Name of the parameter along the branches."""
     branches: tuple[Branch, ...]
     """The branches, in the order in which they were found."""
     parents: tuple[int, ...]

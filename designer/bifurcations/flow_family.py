@@ -21,7 +21,7 @@ class Family:
     """One flow for each value of a parameter."""
 
     parameter: str
-    """Its name."""
+    """Name of the parameter."""
     low: float
     """Lower end of the parameter's domain."""
     high: float

@@ -23,9 +23,9 @@ class MapCell:
     """What a grid point shows; the fields are those of ``Steady``."""
 
     i: int
-    """Row."""
+    """Row of the cell."""
     j: int
-    """Column."""
+    """Column of the cell."""
     status: OrbitStatus
     """How the search for a steady state ended."""
     n: int
@@ -96,7 +96,7 @@ class ParameterMap:
     """The steady states over two parameters."""
 
     plan: MapPlan
-    """What was asked for."""
+    """The grid of parameters that was asked for."""
     cells: tuple[MapCell, ...]
     """(rows · columns,) the steady states, row by row."""
 

@@ -87,13 +87,13 @@ class SweepStore:
     """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``."""
 
     root: Path
-    """The folder."""
+    """Folder that the blocks lie in."""
     parameter: str
     """Name of the swept parameter's column."""
     work: str
     """Hash of the plan."""
     provenance: Mapping[str, Any]
-    """Goes into every file."""
+    """Versions, seed and settings, which go into every file."""
     note: Note = quiet
     """Told of entries that are not taken."""
     vouch: Vouch = nobody
@@ -138,7 +138,7 @@ class GridStore:
     """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in ``root``."""
 
     root: Path
-    """The folder."""
+    """Folder that the rows lie in."""
     kind: str
     """"map" or "basins"."""
     x: str
@@ -152,7 +152,7 @@ class GridStore:
     work: str
     """Hash of the plan."""
     provenance: Mapping[str, Any]
-    """Goes into every file."""
+    """Versions, seed and settings, which go into every file."""
     note: Note = quiet
     """Told of entries that are not taken."""
     vouch: Vouch = nobody

@@ -118,7 +118,7 @@ class Sweep:
     """What a sweep showed."""
 
     plan: SweepPlan
-    """What was asked for."""
+    """What the sweep was asked for."""
     steps: Mapping[str, tuple[Steady, ...]]
     """For each track one ``Steady`` per value, in the order of ``plan.values``."""
 

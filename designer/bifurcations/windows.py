@@ -42,13 +42,13 @@ class BranchWindow:
     parameter: str
     """Name of the parameter."""
     response: str
-    """"n-p-q"."""
+    """The response that is stable, as "n-p-q"."""
     symmetric: bool
     """Whether the response is its own mirror image, by the branch it lies on."""
     low: WindowEnd
-    """Its lower end."""
+    """Lower end of the window."""
     high: WindowEnd
-    """Its upper end."""
+    """Upper end of the window."""
     branch: int
     """The number of the branch."""
 

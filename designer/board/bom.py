@@ -44,17 +44,17 @@ class Line:
     quantity: int
     """How many pieces."""
     designators: tuple[str, ...]
-    """Where they go."""
+    """Designators on the board, where the pieces go."""
     value: str
     """Value as people write it."""
     description: str
     """What it is, in words."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     rating: str
     """What it has to stand."""
     price_class: int

@@ -40,11 +40,11 @@ class LayoutColumn:
     """A column of a bill."""
 
     title: str
-    """Its heading."""
+    """Heading of the column."""
     field: str | None
     """One of ``FIELDS``; None for a column of one text."""
     text: str
-    """That text."""
+    """Text of every cell, where ``field`` is None."""
 
 
 @dataclass(frozen=True)

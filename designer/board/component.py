@@ -31,13 +31,13 @@ class Bought:
     """What is ordered."""
 
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
     """The maker's part number."""
     rating: str
     """What it has to stand."""
     price_class: int
-    """Price class."""
+    """Price class, from 1."""
     grade: float | None = None
     """Tolerance, a fraction, or None."""
     substitute: str = ""
@@ -62,7 +62,7 @@ class Component:
     quantity: float | None
     """Its value as a number [Ω, F, V], None where there is none."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     pins: tuple[Pin, ...]
     """Every pad with its net."""
     role: str

@@ -36,7 +36,7 @@ class FootprintShape:
     name: str
     """Name of the footprint."""
     pads: tuple[PadShape, ...]
-    """Its pads."""
+    """Pads of the footprint."""
     body: tuple[float, float]
     """Width and height of the part seen from above [mm]."""
     mark: bool = False

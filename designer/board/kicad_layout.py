@@ -39,7 +39,7 @@ class Item:
     value: str
     """The value that is shown."""
     shape: SymbolShape
-    """Its symbol."""
+    """Symbol that it is drawn with."""
     pins: Mapping[str, str]
     """Net by pin number, "" where none is."""
     stages: Mapping[int, str]
@@ -77,7 +77,7 @@ class NetLabel:
     """A net's name on the sheet."""
 
     net: str
-    """The net."""
+    """Name of the net."""
     at: Point
     """The point that it names."""
     left: bool
@@ -89,7 +89,7 @@ class Note:
     """A text on the sheet."""
 
     text: str
-    """The text."""
+    """The text that is written."""
     at: Point
     """Where it stands."""
     heading: bool = False
@@ -103,13 +103,13 @@ class LayoutCell:
     title: str
     """Title of the cell."""
     symbols: list[Placed] = field(default_factory=list)
-    """The units of symbols."""
+    """Units of symbols in the cell."""
     wires: list[tuple[Point, Point]] = field(default_factory=list)
     """Wires, horizontal or vertical, from point to point."""
     labels: list[NetLabel] = field(default_factory=list)
-    """Names of nets."""
+    """Names of nets in the cell."""
     notes: list[Note] = field(default_factory=list)
-    """The texts."""
+    """Texts of the cell."""
     open_pins: list[Point] = field(default_factory=list)
     """Points of the pins that nothing is connected to."""
     height: int = 0

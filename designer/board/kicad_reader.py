@@ -58,9 +58,9 @@ class PlacedFootprint:
     value: str
     """Its value as written."""
     pads: tuple[PlacedPad, ...]
-    """Its pads."""
+    """Pads of the footprint."""
     courtyard: bool
-    """Whether it has one."""
+    """Whether the footprint has a courtyard."""
     library: str
     """Library of the footprint; "" where none is written."""
     name: str

@@ -26,19 +26,19 @@ class ShapePin:
     """A pin of a symbol."""
 
     number: str
-    """Its number."""
+    """Number of the pin."""
     name: str
-    """Its name."""
+    """Name of the pin."""
     electrical: str
     """Its electrical type, in KiCad's words."""
     x: int
-    """Where a wire meets it, to the right."""
+    """Where a wire meets the pin, to the right, in units of the grid."""
     y: int
-    """Where a wire meets it, upwards."""
+    """Where a wire meets the pin, upwards, in units of the grid."""
     angle: int
     """Direction from there to the body [degrees]."""
     length: int
-    """Its length."""
+    """Length of the pin, in units of the grid."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class SymbolUnit:
     """One of the drawings that a symbol consists of."""
 
     pins: tuple[ShapePin, ...]
-    """The pins."""
+    """Pins of the unit."""
     lines: tuple[tuple[tuple[float, float], ...], ...]
     """Polylines of points (x, y)."""
     filled: bool = True
@@ -58,11 +58,11 @@ class SymbolShape:
     """A symbol."""
 
     name: str
-    """Its name."""
+    """Name of the symbol."""
     prefix: str
     """What its designators begin with."""
     units: tuple[SymbolUnit, ...]
-    """Its drawings."""
+    """Drawings of the symbol, one for each unit."""
     texts: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1.9), (0.0, -1.9))
     """Where reference and value stand, (x, y) with y upwards."""
     power: bool = False

@@ -36,11 +36,11 @@ class Pin:
     number: str
     """Number of its pad."""
     name: str
-    """Its name."""
+    """Name of the pin."""
     net: str
     """The net on it; "" where nothing may be connected."""
     electrical: Electrical = "passive"
-    """Its electrical type."""
+    """Electrical type, in KiCad's words."""
     unit: str = ""
     """The section of a package, ``SUPPLY_UNIT`` for its supply pins, "" for a part of one unit."""
 
@@ -54,7 +54,7 @@ class Package:
     sections: tuple[Section, ...]
     """Its sections that the circuit has, tied-off ones included."""
     opamp: OpAmp
-    """The op-amp."""
+    """The catalogue's entry of the op-amp."""
 
     @property
     def pins(self) -> tuple[Pin, ...]:

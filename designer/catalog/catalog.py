@@ -55,19 +55,19 @@ class Catalog:
     families: tuple[PartFamily, ...]
     """Resistors and capacitors that can be bought."""
     opamps: tuple[OpAmp, ...]
-    """The op-amps."""
+    """Op-amps that can be bought."""
     diodes: tuple[DiodeEntry, ...]
-    """The diodes."""
+    """Diodes that can be bought."""
     references: tuple[ReferenceEntry, ...]
-    """The shunt voltage references."""
+    """Shunt voltage references that can be bought."""
     hash: str
     """Hash of the content of all files, wherever they lie, layouts of bills among them."""
     folders: tuple[Path, ...]
     """The folders that were read, in order."""
     trimmers: tuple[TrimmerEntry, ...] = ()
-    """The trimming potentiometers."""
+    """Trimming potentiometers that can be bought."""
     headers: tuple[Header, ...] = ()
-    """The pin headers."""
+    """Pin headers that can be bought."""
     prices: tuple[Price, ...] = ()
     """What a part of each price class counts with."""
     mounting: Mounting = "mixed"

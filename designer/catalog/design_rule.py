@@ -80,7 +80,7 @@ class RuleOutcome:
     """A rule and what became of it."""
 
     rule: DesignRule
-    """The rule."""
+    """The rule that was looked at."""
     status: Status
     """Whether it passed, failed or was not run."""
     found: str

@@ -40,7 +40,7 @@ class Figure:
     max: float | None
     """Maximum; None where the sheet gives none."""
     source: str
-    """Where it stands."""
+    """Where in which data sheet the figure stands."""
     assumed: bool = False
     """Whether no data sheet gives it, or it could not be compared with one."""
 
@@ -75,9 +75,9 @@ class PartCase:
     """Another case that a part is sold in."""
 
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     manufacturer: str | None = None
     """The maker, where it is another."""
     pins: Mapping[str, str] | None = field(default=None, hash=False)
@@ -93,7 +93,7 @@ class Price:
     euro: float
     """Euro apiece at a hundred pieces."""
     source: str
-    """Where it comes from."""
+    """Where the price comes from."""
     assumed: bool
     """Whether it is an assumption."""
 
@@ -126,9 +126,9 @@ class OpAmp:
     name: str
     """Its name in the catalogue."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     pins: tuple[SectionPins, ...]
     """The sections, with their pin numbers."""
     supply_pins: tuple[str, str]
@@ -169,7 +169,7 @@ class OpAmp:
     price: int
     """Price class."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
     """Where the figures come from."""
     recovery: Figure | None = None
@@ -211,9 +211,9 @@ class DiodeEntry:
     name: str
     """Its name in the catalogue."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     forward_voltage: Figure
     """Forward voltage [V]."""
     reverse_current: Figure
@@ -227,7 +227,7 @@ class DiodeEntry:
     price: int
     """Price class."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
     """Where the figures come from."""
     pins: Mapping[str, str] = field(
@@ -245,9 +245,9 @@ class ReferenceEntry:
     name: str
     """Its name in the catalogue."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     voltage: float
     """The voltage that it keeps [V]."""
     grade: float
@@ -259,7 +259,7 @@ class ReferenceEntry:
     price: int
     """Price class."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
     """Where the figures come from."""
     impedance: Figure | None = None
@@ -290,25 +290,25 @@ class TrimmerEntry:
     name: str
     """Its name in the catalogue."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     value: float
     """Resistance of the track [Ω]."""
     grade: float
     """Tolerance, ± as a fraction."""
     rating: Rating
-    """What it stands."""
+    """Power and voltage that it stands."""
     pins: Mapping[str, str] = field(hash=False)
     """Pin numbers of its ends "low" and "high", and of its wiper."""
     price: int
     """Price class."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
     """Where the figures come from."""
     assumed: tuple[str, ...] = ()
-    """In words, what could not be compared with a data sheet."""
+    """What could not be compared with a data sheet, in words."""
     cases: tuple[PartCase, ...] = ()
     """Other cases that it is sold in."""
     adjustability: float = 0.0
@@ -322,13 +322,13 @@ class Header:
     name: str
     """Its name in the catalogue."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     part_number: str
     """What is ordered; ``{ways}`` and ``{ways:02}`` in it stand for the number of ways."""
     ways: tuple[int, int]
     """Least and largest number of ways."""
     rating: Rating
-    """What it stands."""
+    """Power and voltage that it stands."""
     price: int
     """Price class."""
     footprint: str
@@ -336,7 +336,7 @@ class Header:
     sources: tuple[str, ...]
     """Where the figures come from."""
     assumed: tuple[str, ...] = ()
-    """In words, what could not be compared with a data sheet."""
+    """What could not be compared with a data sheet, in words."""
 
     def number(self, ways: int) -> str:
         """The part number of a header of so many ways."""
@@ -385,9 +385,9 @@ class PartFamily:
     name: str
     """Its name in the catalogue."""
     kind: Kind
-    """What its parts are."""
+    """Kind of the parts."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     series: tuple[str, ...]
     """The E series of its values."""
     range: tuple[float, float]
@@ -397,9 +397,9 @@ class PartFamily:
     temperature_coefficient: float
     """Size of the relative change with temperature [1/K]."""
     rating: Rating
-    """What it stands."""
+    """Power and voltage that it stands."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     dielectric: str
     """What the parts are made of."""
     price: int
@@ -409,7 +409,7 @@ class PartFamily:
     sources: tuple[str, ...]
     """Where the figures come from."""
     assumed: tuple[str, ...]
-    """In words, what could not be compared with a data sheet."""
+    """What could not be compared with a data sheet, in words."""
     values: tuple[float, ...] = field(repr=False)
     """Values that can be bought [Ω or F], ascending."""
     drift: float | None = None
@@ -444,12 +444,12 @@ class PartChoice:
     value: float
     """Its value [Ω or F]."""
     part_number: str
-    """What is ordered."""
+    """The maker's part number, which is ordered."""
     manufacturer: str
-    """The maker's name."""
+    """Name of the maker."""
     footprint: str
-    """KiCad's, as "Library:Name"."""
+    """Footprint in KiCad, as "Library:Name"."""
     rating: Rating
-    """What it stands."""
+    """Power and voltage that it stands."""
     price: int
     """Price class."""

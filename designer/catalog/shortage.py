@@ -27,7 +27,7 @@ class Offer:
     bought."""
 
     kind: Kind
-    """What the parts are."""
+    """Kind of the parts."""
     grade: float
     """The grade that is asked for, a fraction."""
     families: tuple[PartFamily, ...]

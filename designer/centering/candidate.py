@@ -30,7 +30,7 @@ class Candidate:
     choice: DesignChoice
     """How the design is made."""
     design: Design
-    """The design."""
+    """The finished design."""
     found: tuple[ModelResponse, ...]
     """Its responses at their places, and what the model shows there."""
     scored: tuple[Scored, ...]
@@ -60,7 +60,7 @@ class Step:
     lever: str
     """Name of the lever."""
     setting: str
-    """Where it was put."""
+    """Setting that the lever was put to."""
     rank: tuple[float, float] | None
     """Rank of the design then; None where there is none, for the reason given."""
     kept: bool

@@ -54,7 +54,7 @@ class Refused:
     """A branch that cannot be built, and why."""
 
     upgrades: Upgrades
-    """What is changed."""
+    """Upgrades that the branch asks for."""
     why: str
     """Why it cannot be built."""
 

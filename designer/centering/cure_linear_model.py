@@ -50,7 +50,7 @@ class LinearModel:
     """A branch as the linear program sees it."""
 
     branch: CureBranch
-    """The branch."""
+    """The branch that is modelled."""
     parts: tuple[PartSlot, ...]
     """Its slots, part by part."""
     ways: tuple[tuple[ResponseWay, ...], ...]

@@ -106,7 +106,7 @@ class MeasuredYield:
     """A yield, and whether its 95 % interval says on which side of the target it is."""
 
     counts: Yield
-    """Counts of boards."""
+    """Counts of boards and of those that keep the response."""
     target: float
     """The yield that is wanted."""
 

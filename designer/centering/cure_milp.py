@@ -29,7 +29,7 @@ class Option:
     """One way of filling a slot."""
 
     name: str
-    """Its name."""
+    """Name of the option."""
     price: float
     """Price over that of the slot as it is."""
     trouble: float = 0.0
@@ -41,7 +41,7 @@ class Slot:
     """One thing that is decided."""
 
     name: str
-    """Its name."""
+    """Name of the slot."""
     options: tuple[Option, ...]
     """Its options; the first is the design as it is."""
 
@@ -51,7 +51,7 @@ class Demand:
     """A demand on a linear form: its variance stays below a limit."""
 
     name: str
-    """Its name."""
+    """Name of the demand."""
     room: float
     """Largest variance of the linear form."""
     variances: tuple[Array, ...]

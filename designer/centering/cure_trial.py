@@ -18,7 +18,7 @@ class Trial:
     branch: str
     """Name of the branch."""
     upgrades: Upgrades
-    """What is changed."""
+    """Upgrades that were chosen."""
     price: float
     """Price over the design as it is [euro]."""
     predicted: tuple[float, ...]

@@ -125,7 +125,7 @@ class Looker:
     """Studies of boards with the best parts that can be bought, of no question yet: single ones,
     then arrays."""
     jobs: int
-    """Workers."""
+    """Number of workers."""
     progress: Callable[[], None]
     """Called as the work goes on."""
     missed: Collection[int] = ()

@@ -27,7 +27,7 @@ class Certificate:
     lower_bound: float
     """No choice from this catalogue has a smaller ``max_error`` under the stated conditions."""
     proof: str
-    """How that is known."""
+    """How the lower bound is known."""
 
 
 @dataclass(frozen=True)

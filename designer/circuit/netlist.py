@@ -75,7 +75,7 @@ class Section:
     """One op-amp of a package."""
 
     name: str
-    """Such as "U1A", section A of package U1."""
+    """Name such as "U1A", section A of package U1."""
     inverting: str
     """Net of the inverting input."""
     noninverting: str
@@ -184,7 +184,7 @@ class Contact:
     """Position in contact: of a section 1 at its upper limit, -1 at its lower, 0 between; of a
     diode 1 while it conducts, else 0."""
     others: tuple[tuple[str, int], ...] = ()
-    """Further switches, with their positions while the stop carries."""
+    """Further switches, each with its position while the stop carries."""
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Term:
     inverted: bool
     """Whether the state's negative is needed."""
     quantity: Quantity
-    """The coefficient it realises."""
+    """The coefficient that it realises."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Condition:
     quantity: Quantity
     """The coefficient that is realised."""
     sign: int
-    """1 or -1."""
+    """Sign of the product, 1 or -1."""
     monomial: dict[str, int]
     """Exponent by part name."""
 

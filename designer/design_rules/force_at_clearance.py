@@ -28,9 +28,9 @@ class Forces:
     """Equivalent force, in volts of the generator, of one unit of each disturbance."""
 
     offset: Mapping[str, float]
-    """By section, per volt at its input."""
+    """Force by section, per volt at its input."""
     current: Mapping[str, float]
-    """By net, per ampere into it."""
+    """Force by net, per ampere into it."""
 
     def between(self, a: str, b: str) -> float:
         """Of one ampere that leaves net a and enters net b."""

@@ -58,7 +58,7 @@ class Violation:
     actual: float
     """What KiCad measured, in mm or a count."""
     where: str
-    """In KiCad's words, with the place on the board."""
+    """Place on the board, in KiCad's words."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ class Peak:
     """The largest value of something over all runs, and the run it happens in."""
 
     value: float
-    """The largest value."""
+    """The largest value over all runs."""
     run: str
     """Name of the run that it happens in."""
 

@@ -41,7 +41,7 @@ class ModeTables(NamedTuple):
     """What ``advance`` knows of the modes; first axis: mode index."""
 
     step: Float
-    """(m,) step h."""
+    """(m,) step length h."""
     propagator: Float
     """(m, N, N) propagator over one step."""
     taylor: Float

@@ -82,7 +82,7 @@ class Drive:
     amplitude: float = 1.0
     """Amplitude of the sine."""
     offset: float = 0.0
-    """Constant part."""
+    """Constant part of the drive."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.omega < np.inf):

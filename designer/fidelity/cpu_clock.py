@@ -27,7 +27,7 @@ class Entrant:
     """One that runs against the clock."""
 
     name: str
-    """Its name."""
+    """Name of the entrant."""
     periods: int
     """Drive periods of one run."""
     work: Callable[[], float]

@@ -27,7 +27,7 @@ class RungError:
     """One rung at one setting on one response."""
 
     label: ResponseLabel
-    """Which response."""
+    """The response that it is about."""
     rung: str
     """Name of the rung."""
     level: str
@@ -35,7 +35,7 @@ class RungError:
     settings: Mapping[str, Any]
     """Settings of the solver."""
     response: str
-    """n-p-q or status."""
+    """n-p-q or status that the rung shows."""
     reason: str
     """Why there is no answer, or ""."""
     seconds: float
@@ -59,9 +59,9 @@ class Truth:
     """What the board does, as computed at the finest steps."""
 
     label: ResponseLabel
-    """Which response."""
+    """The response that it is about."""
     response: str
-    """n-p-q or status."""
+    """n-p-q or status that the board shows."""
     sure: bool
     """Whether its two finest steps show the same."""
     error: float

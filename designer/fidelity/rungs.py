@@ -86,7 +86,7 @@ class RungAnswers:
     response: ModelResponse
     """The response, and what the model shows."""
     subject: GateSubject
-    """Its nominal circuit."""
+    """The nominal circuit at the response."""
     answers: tuple[RungAnswer, ...]
     """What each rung says of it."""
     settings: SolverSettings | None

@@ -49,9 +49,9 @@ class Cheapest:
     """
 
     question: str
-    """The question."""
+    """What is asked of a rung."""
     of: str
-    """The truth that the rung is measured against."""
+    """What the rung is measured against: the board, its equations, or ideal op-amps in ngspice."""
     label: ResponseLabel | None
     """Which response; None for all responses together."""
     rung: str | None

@@ -38,9 +38,9 @@ class LeftOut:
     """A response of which no boards were asked, and why."""
 
     label: ResponseLabel
-    """Which response."""
+    """The response that it is about."""
     reason: str
-    """Why there is no answer, or ""."""
+    """Why no boards were asked."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class BoardTrade:
     """One response on its boards; see ``Tally``."""
 
     label: ResponseLabel
-    """Which response."""
+    """The response that it is about."""
     boards: int
     """Boards that both engines decided."""
     ok: int

@@ -40,11 +40,11 @@ class Request:
     """The parameter that is swept; None for ω, the generator's frequency with ``circuit``, or x1
     with ``basins``."""
     low: float | str | None = None
-    """Where the parameter begins."""
+    """Least value of the swept parameter."""
     high: float | str | None = None
-    """Where the parameter ends."""
+    """Largest value of the swept parameter."""
     steps: int | None = None
-    """Number of its values."""
+    """Number of values of the swept parameter."""
     omega: float | None = None
     """Dimensionless frequency of the drive where it is not swept."""
     frequency: str | None = None

@@ -25,7 +25,7 @@ class ComparisonFiles:
     """What a comparison wrote."""
 
     file: dict[str, Any]
-    """The object of ``compare.json``."""
+    """The JSON object of ``compare.json``."""
 
 
 def make(made: Synthesis, progress: Progress) -> ComparisonFiles:

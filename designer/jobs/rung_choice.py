@@ -41,7 +41,7 @@ class RungChoice:
     rung: RungName
     """Which engine decides a study."""
     reason: str
-    """One line for people; "" where nothing was measured."""
+    """Why, in one line for people; "" where nothing was measured."""
 
 
 def choose(folder: Folder) -> RungChoice:

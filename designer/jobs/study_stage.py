@@ -202,7 +202,7 @@ class Help:
     """What a study is helped by."""
 
     jobs: int
-    """Workers."""
+    """Number of workers."""
     pool: SpicePool | None
     """Runs ngspice; None where it is not asked."""
     runner: Runner

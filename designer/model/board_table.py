@@ -112,6 +112,6 @@ class PartArray:
     name: str
     """Its reference on the board."""
     bought: PartChoice
-    """What is bought."""
+    """The array that is bought."""
     parts: tuple[str, ...]
     """Names of the parts whose places its elements take."""

@@ -32,9 +32,9 @@ class Uniform:
     """Every value between two limits is equally likely."""
 
     low: float
-    """Lower limit."""
+    """Lower limit of the values."""
     high: float
-    """Upper limit."""
+    """Upper limit of the values."""
 
     def ppf(self, u: Array) -> Array:
         return self.low + (self.high - self.low) * u
@@ -92,11 +92,11 @@ class Split:
     """
 
     low: float
-    """Lower limit."""
+    """Lower limit of the values."""
     middle: float
     """Half of the values lie below it."""
     high: float
-    """Upper limit."""
+    """Upper limit of the values."""
 
     def ppf(self, u: Array) -> Array:
         below = self.low + (self.middle - self.low) * 2.0 * u

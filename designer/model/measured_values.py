@@ -49,7 +49,7 @@ class MeasuredBoards:
     tolerances: Mapping[str, tuple[float, ...]]
     """(boards,) half-widths by quantity, in the same units."""
     content: bytes = field(repr=False)
-    """The whole file."""
+    """Content of the file, byte by byte."""
     source: Path | None = None
     """The file that it was read from."""
     lines: Mapping[str, int] = field(default_factory=dict)

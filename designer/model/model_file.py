@@ -77,7 +77,7 @@ class ModelFile:
     text: str = field(repr=False)
     """The file word for word."""
     source: Path | None = None
-    """Where it was read."""
+    """The file that it was read from; None where it was none."""
     spread: SpreadSpec = BENCH_1
     """How the boards of a study differ."""
     measured: MeasuredBoards | None = None

@@ -43,7 +43,7 @@ class CircuitExtent:
     """How much is done; the defaults are the report's."""
 
     p: tuple[int, ...] = tuple(OMEGA)
-    """The responses, by their p."""
+    """p of the responses that are compared."""
     circuits: tuple[str, ...] = CIRCUITS
     """Names of those of ``CIRCUITS`` that are compared."""
     patterns: int = offsets.PATTERNS
@@ -63,9 +63,9 @@ class PaperBench:
     found: tuple[ModelResponse, ...]
     """The paper's responses, and what the model shows."""
     extent: CircuitExtent
-    """How much is done."""
+    """How much of the report is done."""
     jobs: int
-    """Threads and workers."""
+    """Number of threads and workers."""
     progress: Progress
     """Told how far the work is."""
 

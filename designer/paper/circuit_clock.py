@@ -50,9 +50,9 @@ class Method:
     """What one method of integration costs, and its error."""
 
     name: str
-    """Its name."""
+    """Name of the method."""
     setting: str
-    """Its setting, as text."""
+    """Setting of the method, as text."""
     seconds: float
     """CPU time of a drive period, median of the rounds."""
     ratio: float

@@ -30,7 +30,7 @@ class NgspiceResponse:
     """One response in ngspice, with the settings that passed the gate."""
 
     response: str
-    """n-p-q or status."""
+    """n-p-q or status that ngspice shows."""
     passed: bool
     """Whether settings passed the gate."""
     reason: str

@@ -79,7 +79,7 @@ class SettledResponse:
     orbit: Orbit
     """The orbit that it settles on."""
     kept: bool
-    """Whether that is the wanted n-p-q."""
+    """Whether it settles on the wanted n-p-q."""
     error: float
     """RMS difference of x1 from the model's, over its peak, nan where the periods differ."""
 

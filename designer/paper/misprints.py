@@ -26,11 +26,11 @@ class Misprint:
     """A misprint of the paper, by docs/errata.md."""
 
     where: str
-    """Where it stands."""
+    """Where in the paper it stands."""
     printed: str
-    """What is printed."""
+    """What the paper prints."""
     right: str
-    """What is right."""
+    """What ought to be printed."""
     note: str = ""
     """How the print is read, where that is not plain."""
     build: Callable[[Catalog], ComparedCircuit] | None = None

@@ -74,9 +74,9 @@ class SpreadCase:
     plan: StudyPlan
     """What decides the samples, with the responses that the nominal circuit shows."""
     asked: tuple[int, ...]
-    """For each question its p."""
+    """p of the response of each question."""
     missing: dict[int, str]
-    """By p, what the nominal circuit shows instead."""
+    """What the nominal circuit shows instead of the wanted response, by p."""
 
     @property
     def name(self) -> str:

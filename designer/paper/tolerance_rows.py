@@ -20,17 +20,17 @@ class YieldRow:
     offsets: bool
     """Whether the op-amps have offsets."""
     expect: str
-    """"1-3-3"."""
+    """The wanted response, such as "1-3-3"."""
     omega: float
     """Dimensionless frequency."""
     kind: str
-    """One of ``KINDS``."""
+    """Kind of the yield, one of ``KINDS``."""
     there: bool
     """Whether the nominal circuit shows it; where it does not every count is 0."""
     ok: int
     """Boards that keep the response."""
     lost: int
-    """Boards that lose it."""
+    """Boards that lose the response."""
     grazing: int
     """Boards whose count of impacts is undecided."""
     failed: int

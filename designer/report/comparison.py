@@ -53,7 +53,7 @@ class Shown:
     expected: str | None
     """The wanted n-p-q; None where any is of interest."""
     orbit: Orbit
-    """What it settles on."""
+    """The orbit that the circuit settles on."""
     kept: bool
     """Whether that is the wanted response (where nothing is wanted, the model's)."""
 

@@ -101,6 +101,6 @@ class Layers:
     blame: Blame | None = None
     """The blame of every question."""
     maps: Sequence[YieldMap] = ()
-    """Yield maps."""
+    """Yield maps of the study."""
     status: BlameStatus | None = None
     """How much of the blame there is; None where nobody says."""

@@ -67,7 +67,7 @@ class GateResult:
     settings: SolverSettings
     """The settings that passed, or the finest that were tried."""
     passed: bool
-    """Whether any settings did."""
+    """Whether any settings passed."""
     difference: float
     """Largest strobe difference between the runs, of the peak."""
     read: Read | SimulationFailed

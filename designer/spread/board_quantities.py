@@ -25,7 +25,7 @@ class Quantity:
     part: str
     """Name of the part, section, reference or rail."""
     group: str
-    """The field of ``Boards``."""
+    """Name of the field of ``Boards`` that holds it."""
     nominal: float
     """Value on the nominal board, in ohm, farad, volt or ampere."""
     sigma: float

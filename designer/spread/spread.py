@@ -78,7 +78,7 @@ class Spread:
     saturation: float = SATURATION_SPREAD
     """Half-width of the output limits as a fraction."""
     reference: float = 1.0
-    """Half-width over the grade of each reference."""
+    """Half-width of each reference's voltage over its grade."""
     resistor_shape: Law = EVEN
     """Law of a resistor's deviation over the grade."""
     capacitor_shape: Law = EVEN
@@ -89,7 +89,7 @@ class Spread:
     """Gain-bandwidth product of each section [Hz]; None: the circuit's, which is the typical
     figure."""
     supply: float = 0.0
-    """Half-width as a fraction, each rail its own."""
+    """Half-width of the rails as a fraction, each rail its own."""
     grades: Mapping[str, float] = field(default_factory=dict)
     """Grades of the parts that have their own, fractions by part."""
     shapes: Mapping[str, Law] = field(default_factory=dict)
@@ -101,9 +101,9 @@ class Spread:
     ageing: Mapping[str, Law] = field(default_factory=dict)
     """Relative change by part."""
     groups: tuple[Group, ...] = ()
-    """Parts that track."""
+    """Groups of parts that vary together."""
     measured: MeasuredBoards | None = None
-    """A bench's list, which goes before anything drawn."""
+    """Measured values of a bench's list, which go before anything drawn."""
     asked: Mapping[str, float] = field(default_factory=dict)
     """The grade that was asked for, by part, where nobody sells the value at it; these parts are
     drawn at the better one in ``grades`` (``Catalog.part``)."""

@@ -74,9 +74,9 @@ class DeadZone:
     proved: bool
     """Whether the error is within 1e-6 of the bound, or of none."""
     proof: str
-    """How that is known."""
+    """How the bound is known."""
     solver: str
-    """What the solver said."""
+    """What the solver said of the search."""
     looked_at: int
     """Rows of tables that the search went through."""
     seconds: float

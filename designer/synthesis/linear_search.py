@@ -49,7 +49,7 @@ class LinearBlock:
     """The parts chosen, and what is known of them."""
 
     values: dict[str, float]
-    """The chosen values by part name [ohm, F]."""
+    """Chosen values by part name [ohm, F]."""
     error: float
     """The least that the largest of the ten errors can be made by the scales; with ``Wishes.slack``
     up to that much above ``least``."""
@@ -60,7 +60,7 @@ class LinearBlock:
     proved: bool
     """Whether ``least`` is within ``EXACT`` of ``bound``."""
     proof: str
-    """How that is known, in words."""
+    """How the bound is known, in words."""
     solver: str
     """The solver's word for the choice among equals."""
     cost: Cost

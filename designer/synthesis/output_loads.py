@@ -50,7 +50,7 @@ class Run:
     """One trajectory that a circuit must be able to follow."""
 
     name: str
-    """Such as "1.55" or "1.55 from rest"."""
+    """Name of the run, such as "1.55" or "1.55 from rest"."""
     drive: Drive
     """The generator's drive, in rad/s and volts."""
     start: Array

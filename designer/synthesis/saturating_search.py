@@ -234,7 +234,7 @@ class Least:
     """The least largest error of the tables."""
 
     error: float
-    """That error."""
+    """The least largest error."""
     u: float
     """The u = ln A-/R209 that has it."""
     bound: float

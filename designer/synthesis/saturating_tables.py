@@ -47,13 +47,13 @@ class SearchBox:
     """The ranges (low, high) that a search of the saturating stage looks at."""
 
     steep: tuple[float, float]
-    """Range of A+."""
+    """Least and largest A+."""
     linear: tuple[float, float]
-    """Range of A-."""
+    """Least and largest A-."""
     stop: tuple[float, float]
-    """Range of R50 [ohm]."""
+    """Least and largest R50 [ohm]."""
     shift: tuple[float, float]
-    """Range of c/Esat, one-sided only."""
+    """Least and largest c/Esat, one-sided only."""
     first: float
     """Least gain of U3B."""
     noise_gain: float
@@ -104,9 +104,9 @@ class SaturatingTables:
     second: ValueTable
     """Values of R202 and R203."""
     divider: ValueTable
-    """Values of the divider."""
+    """Values of R204, R205 and R208."""
     shift: ValueTable | None
-    """Values of the parts that shift a one-sided dead zone; None with both stops."""
+    """Values of R200, R211 and R212, for a one-sided dead zone; None with both stops."""
 
     @cached_property
     def u(self) -> Array:

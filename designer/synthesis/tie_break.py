@@ -49,7 +49,7 @@ class Shortfall:
     """There is no choice."""
 
     what: str
-    """What leaves none."""
+    """What leaves no choice."""
     whole: bool
     """Whether every choice was looked at."""
 

@@ -28,7 +28,7 @@ class TableRows:
     """One table of the program."""
 
     table: ValueTable
-    """Its values."""
+    """Values of the table."""
     error: Array
     """(rows,) error of each row."""
     key: Index
@@ -49,9 +49,9 @@ class ValueRule:
     weights: tuple[Array, ...]
     """Weight of each row, table by table."""
     low: float
-    """Least sum."""
+    """Least sum that keeps the rule."""
     high: float
-    """Largest sum."""
+    """Largest sum that keeps the rule."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class NearLimit:
     """What ends the response."""
 
     what: str
-    """What it is, in words."""
+    """What ends the response, in words."""
     distance: float
     """How many standard deviations away it is on the nominal board."""
 

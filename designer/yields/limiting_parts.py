@@ -51,7 +51,7 @@ class Limiting:
     """What limits one response."""
 
     mechanism: str
-    """One of ``MECHANISMS``."""
+    """What ends the response, one of ``MECHANISMS``."""
     border: str
     """Where the response ends, in words."""
     distance: float
@@ -59,7 +59,7 @@ class Limiting:
     shares: dict[str, float]
     """Shares of the border's variance, by what moves it; see ``shares``."""
     line: str
-    """All of it in one line."""
+    """All of this in one line."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain, for JSON."""

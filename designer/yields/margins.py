@@ -52,9 +52,9 @@ class Limit:
     """One way of losing the response."""
 
     what: str
-    """How it is lost, in words."""
+    """How the response is lost, in words."""
     kind: str
-    """See ``continued_orbit.Function``."""
+    """Kind of the function; see ``continued_orbit.Function``."""
     nominal: float
     """Its value on the nominal board [V for contact, miss, parting], where the linear function is
     positive."""

@@ -96,7 +96,7 @@ class Hearing:
     reason: str
     """Why; how long the way was where it was too long."""
     remedies: str
-    """Those that a run needed to converge, in order."""
+    """Remedies that a run needed to converge, in order."""
     periods: int
     """Drive periods left out before the run was judged."""
     symmetric: bool

@@ -27,9 +27,9 @@ class Index:
     part: str
     """Name of the part that it belongs to."""
     first: float
-    """First-order index."""
+    """First-order Sobol index."""
     total: float
-    """Total index."""
+    """Total Sobol index."""
 
 
 def sobol(

@@ -31,7 +31,7 @@ class Study:
     plan: StudyPlan
     """What decides the samples."""
     asked: tuple[int, ...]
-    """For each question of the plan, the index of its response."""
+    """Index of the response that each question of the plan asks for."""
     left_out: dict[int, str]
     """Why a response is no question, by index."""
     answers: tuple[Answer, ...]
@@ -55,7 +55,7 @@ class Study:
     maps: tuple[YieldMap, ...] = ()
     """Yield maps of questions; empty where none were asked for."""
     blame_wanted: bool = True
-    """Whether a blame was."""
+    """Whether a blame was asked for."""
 
     def answers_to(self, index: int) -> tuple[Answer, ...]:
         """The answers for response number ``index``, by sample."""

@@ -83,7 +83,7 @@ class Work:
     """Who does the work of a study, and where it goes."""
 
     jobs: int
-    """Workers."""
+    """Number of workers."""
     pool: SpicePool | None
     """Runs ngspice; None where it is not asked."""
     stores: Stores
@@ -93,7 +93,7 @@ class Work:
     said: Progress
     """Told how far the work is."""
     rung: RungName
-    """Rung of ngspice's op-amps."""
+    """Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample."""
     blame_budget: int = BUDGET
     """Steps that the blame may take."""
 

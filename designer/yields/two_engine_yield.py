@@ -80,7 +80,7 @@ class Rate:
     """A share of boards."""
 
     count: int
-    """Boards that count."""
+    """Boards that have the property."""
     of: int
     """Boards in all."""
 
@@ -96,17 +96,17 @@ class Stratum:
     name: str
     """Name of the stratum."""
     samples: int
-    """Boards in it, N_h."""
+    """Boards in the stratum, N_h."""
     asked: int
-    """Boards in it with an answer of ngspice, n_h."""
+    """Boards in the stratum with an answer of ngspice, n_h."""
     gained: int
     """Of ``asked``, boards that only ngspice calls ok."""
     lost: int
     """Of ``asked``, boards that only the exact rung calls ok."""
     could_gain: int
-    """Boards in it that the exact rung does not call ok."""
+    """Boards in the stratum that the exact rung does not call ok."""
     could_lose: int
-    """Boards in it that the exact rung calls ok."""
+    """Boards in the stratum that the exact rung calls ok."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Combined:
     """The yield by both engines."""
 
     estimate: float
-    """The yield."""
+    """Estimate of the yield."""
     low: float
     """Lower end of its 95 % interval."""
     high: float

@@ -88,7 +88,7 @@ class Yield:
     ok: int
     """Boards that keep the response."""
     lost: int
-    """Boards that lose it."""
+    """Boards that lose the response."""
     grazing: int
     """Boards whose count of impacts is undecided."""
     failed: int

@@ -58,9 +58,9 @@ class Axis:
     """An axis of a yield map."""
 
     name: str
-    """"omega", "b" or "grade" (a fraction, of resistors and capacitors)."""
+    """What is varied: "omega", "b" or "grade" (a fraction, of resistors and capacitors)."""
     values: tuple[float, ...]
-    """Its values."""
+    """Values of the setting along the axis."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class YieldMap:
     over: Over
     """What the settings differ in."""
     question: int
-    """Question of the plan."""
+    """Number of the question of the plan."""
     axes: tuple[Axis, ...]
     """The axes of the grid."""
     there: NDArray[np.bool_]
@@ -78,7 +78,7 @@ class YieldMap:
     ok: Counts
     """Boards that keep the response."""
     lost: Counts
-    """Boards that lose it."""
+    """Boards that lose the response."""
     grazing: Counts
     """Boards whose count of impacts is undecided."""
     failed: Counts
