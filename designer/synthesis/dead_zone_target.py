@@ -84,6 +84,7 @@ class DeadZone:
 
     @property
     def error(self) -> float:
+        """The largest size among the errors."""
         return max(abs(e) for e in self.errors.values())
 
     @property

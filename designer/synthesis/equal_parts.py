@@ -21,7 +21,7 @@ class Ties:
     tie: Mapping[str, str]
     """Group by part name; parts of one group are equal."""
     value: Mapping[str, float]
-    """Values that are given, by group [ohm]."""
+    """Values that are given, by part name [ohm]."""
 
 
 def ties_of(

@@ -86,6 +86,7 @@ class Prediction:
 
     @property
     def right(self) -> int:
+        """Verdicts that were foretold."""
         return self.ok + self.lost - self.missed - self.alarms
 
 
