@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Doubt:
-    """words : the reason, without what was measured: two machines say the same. figures : what was
-    measured, whose last digits they do not share; empty where there is none."""
+    """Why a result is in doubt."""
 
     words: str
+    """The reason, without what was measured: two machines say the same."""
     figures: str = ""
+    """What was measured, whose last digits they do not share; empty where there is none."""
 
     def __str__(self) -> str:
         return f"{self.words} ({self.figures})" if self.figures else self.words

@@ -55,12 +55,15 @@ _MAX_MANIFEST = 20_000_000
 
 @dataclass
 class ManifestStage:
-    """inputs : what decides the stage's files; equal inputs give equal files. kept : what the stage
-    found when it began and is to know again when it goes on; gone once it is complete."""
+    """A stage of the work, as the manifest records it."""
 
     inputs: dict[str, Any]
+    """What decides the stage's files; equal inputs give equal files."""
     complete: bool = False
+    """Whether all its files are written."""
     kept: dict[str, Any] = field(default_factory=dict)
+    """What the stage found when it began and is to know again when it goes on; gone once it is
+    complete."""
 
     @property
     def hash(self) -> str:
@@ -69,11 +72,14 @@ class ManifestStage:
 
 @dataclass
 class Manifest:
-    """stages by name; files: name → (stage, hash or None while unfinished)."""
+    """What a design folder's ``manifest.json`` says."""
 
     stages: dict[str, ManifestStage] = field(default_factory=dict)
+    """The stages by name."""
     files: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+    """(stage, hash or None while unfinished) by file name."""
     provenance: dict[str, Any] = field(default_factory=dict)
+    """Versions, seed and settings that the files were made with."""
 
     @property
     def complete(self) -> bool:

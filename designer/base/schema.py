@@ -34,11 +34,14 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Problem:
-    """What is wrong with one key of a field that is a table; "" for the field itself."""
+    """What is wrong with one key of a field that is a table."""
 
     key: str
+    """The key; "" for the field itself."""
     found: object
+    """The value that stands there."""
     expected: str
+    """What would be accepted, in words."""
 
 
 class FieldProblems(ValueError):
@@ -58,7 +61,9 @@ class Accepts:
     """
 
     expected: str
+    """What is accepted, in words."""
     check: Callable[[Any], Any]
+    """Returns the value that a field's content stands for."""
 
     def __get_pydantic_core_schema__(
         self, _source: object, _handler: GetCoreSchemaHandler

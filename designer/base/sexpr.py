@@ -32,23 +32,26 @@ _WRITTEN = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
 
 @dataclass(frozen=True)
 class Atom:
-    """A word; quoted : whether it stands in quotation marks. place : (line, column) from 1."""
+    """A word."""
 
     text: str
+    """The word, without quotation marks."""
     quoted: bool = False
+    """Whether it stands in quotation marks."""
     place: tuple[int, int] = field(default=(0, 0), compare=False, repr=False)
+    """(line, column) from 1 where it begins."""
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A list of atoms and lists; ``name`` is its first atom.
-
-    file, place : where it was read, for messages.
-    """
+    """A list of atoms and lists; ``name`` is its first atom."""
 
     items: tuple[Atom | Expression, ...]
+    """The atoms and lists, in order."""
     place: tuple[int, int] = field(default=(0, 0), compare=False, repr=False)
+    """(line, column) from 1 where it begins, for messages."""
     file: Path | None = field(default=None, compare=False, repr=False)
+    """The file that it was read from, for messages."""
 
     @property
     def name(self) -> str:

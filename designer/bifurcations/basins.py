@@ -22,19 +22,24 @@ SAME = 1e-5
 
 @dataclass(frozen=True)
 class BasinPlan:
-    """x, y : names of the two states that span the plane; xs, ys : their values, ascending.
-
-    start : (states,) the others as they are here; changes : the parameters.
-    """
+    """A grid of starts whose attractors are sought."""
 
     subject: Subject
+    """The system whose parameters change."""
     changes: dict[str, float]
+    """Values of parameters that differ from the subject's own, by name."""
     x: str
+    """Name of the state along the columns."""
     xs: Array
+    """(columns,) values of the state x, ascending."""
     y: str
+    """Name of the state along the rows."""
     ys: Array
+    """(rows,) values of the state y, ascending."""
     start: Array
+    """(states,) the starts; the two states of the plane are replaced."""
     course: Course = COURSE
+    """Periods of each run."""
 
     def as_dict(self) -> dict[str, Any]:
         """What decides the result."""
@@ -57,24 +62,32 @@ class BasinPlan:
 
 @dataclass(frozen=True)
 class Attractor:
-    """One that was met. twin : number of its mirror twin, or None. share : of the starts."""
+    """An attractor that was met."""
 
     number: int
+    """Number of the attractor, from 0."""
     response: str
+    """The response, as "n-p-q"."""
     symmetric: bool | None
+    """Whether the response is its own mirror image."""
     strobe: tuple[float, ...]
+    """A state of it at drive phase 0."""
     twin: int | None
+    """Number of its mirror twin, or None."""
     share: float
+    """Share of the starts."""
 
 
 @dataclass(frozen=True)
 class Basins:
-    """cells : row by row, each with the number of its attractor; attractors : most frequent first,
-    numbered from 0. Aperiodic ones are not told apart: they are one."""
+    """Which start leads to which attractor."""
 
     plan: BasinPlan
+    """The grid of starts that was asked for."""
     cells: tuple[MapCell, ...]
+    """The grid row by row, each cell with the number of its attractor."""
     attractors: tuple[Attractor, ...]
+    """Most frequent first, numbered from 0. Aperiodic ones are not told apart: they are one."""
 
 
 def run(

@@ -23,15 +23,16 @@ DEPTH = 2
 
 @dataclass(frozen=True)
 class Survey:
-    """Branches, and the bifurcation points on them; ``Bifurcation.branch`` numbers the branches.
-
-    parents : for each branch the number of the one it was switched to from, or -1.
-    """
+    """Branches, and the bifurcation points on them."""
 
     parameter: str
+    """Name of the parameter along the branches."""
     branches: tuple[Branch, ...]
+    """The branches, in the order in which they were found."""
     parents: tuple[int, ...]
+    """For each branch the number of the one it was switched to from, or -1."""
     points: tuple[Bifurcation, ...]
+    """Bifurcation points; ``Bifurcation.branch`` numbers the branches."""
 
     def on(self, branch: int) -> list[Bifurcation]:
         """The points on one branch, in its order."""

@@ -24,16 +24,16 @@ RISING = "rising"
 
 @dataclass(frozen=True)
 class TrackChange:
-    """What one track shows before and after a point.
-
-    track : "down" or "up", "rising" for fixed starts, or None where no track shows the change.
-    before, after : as in "1-1-1 symmetric"; after may be "". text : both, for people.
-    """
+    """What one track shows before and after a point."""
 
     track: str | None
+    """"down" or "up", "rising" for fixed starts, or None where no track shows the change."""
     before: str
+    """What the track shows before the point, such as "1-1-1 symmetric"."""
     after: str
+    """What the track shows after the point; may be ""."""
     text: str
+    """What the track shows before and after the point, for people."""
 
     def as_dict(self) -> dict[str, str | None]:
         """Plain, for JSON."""

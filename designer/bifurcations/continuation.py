@@ -58,11 +58,14 @@ class End(StrEnum):
 
 @dataclass(frozen=True)
 class BranchPoint:
-    """An orbit on a branch: value of the parameter, the orbit, and where on its curve it lies."""
+    """An orbit on a branch."""
 
     value: float
+    """Value of the parameter."""
     orbit: Orbit
+    """The orbit there."""
     solved: Solved
+    """Where on its curve it lies."""
 
     @property
     def stable(self) -> bool:
@@ -82,15 +85,14 @@ class BranchPoint:
 
 @dataclass(frozen=True)
 class Branch:
-    """Orbits that go over into one another, in order of arclength.
-
-    curve : what they solve. points : at least one. ends : why it stops at its first and at its
-    last point.
-    """
+    """Orbits that go over into one another, in order of arclength."""
 
     curve: Curve
+    """The curve that the orbits lie on."""
     points: tuple[BranchPoint, ...]
+    """The orbits, at least one."""
     ends: tuple[End, End]
+    """Why the branch stops at its first and at its last point."""
 
     @property
     def parameter(self) -> str:

@@ -13,13 +13,12 @@ TOUCH = 1e-9
 
 @dataclass(frozen=True)
 class Cascade:
-    """Windows that follow upon one another, each beginning where the one before ended.
-
-    down : towards less values of the parameter. The last one's end is where it stops.
-    """
+    """Windows that follow upon one another, each beginning where the one before ended."""
 
     steps: tuple[BranchWindow, ...]
+    """The windows, in order; the last one's end is where the cascade stops."""
     down: bool
+    """Whether it goes towards smaller values of the parameter."""
 
     @property
     def ends(self) -> tuple[WindowEnd, ...]:

@@ -18,15 +18,16 @@ KEPT = 8
 
 @dataclass(frozen=True)
 class Family:
-    """One flow for each value of a parameter.
-
-    parameter : its name. low, high : ends of its domain. build : makes the flow at a value.
-    """
+    """One flow for each value of a parameter."""
 
     parameter: str
+    """Name of the parameter."""
     low: float
+    """Lower end of the parameter's domain."""
     high: float
+    """Upper end of the parameter's domain."""
     build: Callable[[float], Flow]
+    """Makes the flow at a value."""
     _kept: dict[float, Flow] = field(default_factory=dict, repr=False, compare=False)
 
     def flow(self, value: float) -> Flow:

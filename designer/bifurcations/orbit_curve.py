@@ -37,19 +37,19 @@ their chord. It does not turn by more than ``continuation.TURN`` from one to the
 
 @dataclass(frozen=True)
 class Solved:
-    """A point of the curve.
-
-    y : (states + 1,) state and parameter. jacobian : (states, states) of the map. tangent :
-    (states + 1,) unit tangent in scaled units, oriented as it was asked for. iterations : spent.
-    residual : how far the map moves x, or y lies off its hyperplane, in scaled units; more than
-    ``CONVERGED`` where Newton's method stalled.
-    """
+    """A point of the curve."""
 
     y: Array
+    """(states + 1,) state and parameter."""
     jacobian: Array
+    """(states, states) Jacobian of the map."""
     tangent: Array
+    """(states + 1,) unit tangent in scaled units, oriented as it was asked for."""
     iterations: int
+    """Steps of Newton's method that were spent."""
     residual: float
+    """How far the map moves x, or y lies off its hyperplane, in scaled units; more than
+    ``CONVERGED`` where Newton's method stalled."""
 
     @property
     def value(self) -> float:
@@ -64,15 +64,16 @@ class Solved:
 
 @dataclass(frozen=True)
 class Curve:
-    """Orbits of period n of a family; symmetric : those that the half-period map finds.
-
-    scale : (states + 1,) what y is measured in.
-    """
+    """Periodic orbits of a family along its parameter."""
 
     family: Family
+    """The family of flows."""
     n: int
+    """Period of the orbits, in drive periods."""
     symmetric: bool
+    """Whether they are those that the half-period map finds."""
     scale: Array
+    """(states + 1,) what state and parameter are measured in."""
 
     @classmethod
     def through(cls, family: Family, x: Array, value: float, n: int, symmetric: bool) -> Curve:

@@ -20,22 +20,28 @@ COURSE = Course(settle=134, keep=16, patience=1000)
 
 @dataclass(frozen=True)
 class MapCell:
-    """What a grid point shows; the fields are those of ``Steady``.
-
-    i, j : row and column. strobe : a state of the motion at drive phase 0. attractor : its number
-    in a basin, 0 in a map.
-    """
+    """What a grid point shows; the fields are those of ``Steady``."""
 
     i: int
+    """Row of the cell."""
     j: int
+    """Column of the cell."""
     status: OrbitStatus
+    """How the search for a steady state ended."""
     n: int
+    """Least period in drive periods; 0 unless periodic."""
     p: int
+    """Impacts on the upper stop in n drive periods; 0 unless periodic."""
     q: int
+    """Impacts on the lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
+    """Whether the motion is its own mirror image; None unless periodic."""
     lyapunov: float
+    """Largest Lyapunov exponent per unit of the system's time."""
     strobe: tuple[float, ...]
+    """A state of the motion at drive phase 0."""
     attractor: int = 0
+    """Its number in a basin, 0 in a map."""
 
     @property
     def response(self) -> str:
@@ -57,18 +63,22 @@ class CellStore(Protocol):
 
 @dataclass(frozen=True)
 class MapPlan:
-    """x, y : names of the two parameters; xs (columns,), ys (rows,) : their values, ascending.
-
-    start : (states,) of every point.
-    """
+    """A grid of two parameters whose steady states are sought."""
 
     subject: Subject
+    """The system whose parameters change."""
     x: str
+    """Name of the parameter along the columns."""
     xs: Array
+    """(columns,) values of the parameter x, ascending."""
     y: str
+    """Name of the parameter along the rows."""
     ys: Array
+    """(rows,) values of the parameter y, ascending."""
     start: Array = field(default_factory=lambda: np.zeros(4))
+    """(states,) start of every point."""
     course: Course = COURSE
+    """Periods of each run."""
 
     def as_dict(self) -> dict[str, Any]:
         """What decides the result."""
@@ -83,10 +93,12 @@ class MapPlan:
 
 @dataclass(frozen=True)
 class ParameterMap:
-    """cells : (rows · columns,) row by row."""
+    """The steady states over two parameters."""
 
     plan: MapPlan
+    """The grid of parameters that was asked for."""
     cells: tuple[MapCell, ...]
+    """(rows · columns,) the steady states, row by row."""
 
     @property
     def counts(self) -> dict[str, int]:

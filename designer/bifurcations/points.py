@@ -47,16 +47,16 @@ class PointKind(StrEnum):
 
 @dataclass(frozen=True)
 class Birth:
-    """The orbits that leave a branch at a point: twins at a pitchfork, doubled at a doubling.
-
-    response, symmetric : of one of them. side : 1 where they lie above the point's value of the
-    parameter, -1 below. stable : whether they are stable there.
-    """
+    """The orbits that leave a branch at a point: twins at a pitchfork, doubled at a doubling."""
 
     response: str
+    """Response of one of them, as "n-p-q"."""
     symmetric: bool
+    """Whether one of them is its own mirror image."""
     side: int
+    """1 where they lie above the point's value of the parameter, -1 below."""
     stable: bool
+    """Whether they are stable there."""
 
     def as_dict(self) -> dict[str, object]:
         """Plain, for JSON."""
@@ -74,34 +74,37 @@ SIDES = {1: "above", -1: "below"}
 
 @dataclass(frozen=True)
 class Bifurcation:
-    """A bifurcation point.
-
-    parameter, value : its name and where. kind : see ``PointKind``. error : half the width of an
-    interval of the parameter that was seen to hold the point: the test function has different signs
-    (for grazing: the counts of impacts differ) at its ends. point : the orbit there. before,
-    after : the branch's responses right beside it, in the branch's own order; stable : whether
-    stable there. direction : 1 where the parameter rises along the branch, -1 where it falls, 0 at
-    a fold. side : of a fold, 1 where its orbits lie above the value, -1 below; else 0. symmetric :
-    whether the orbit is (without an exact mirror: to ``orbit.SYMMETRY_TOLERANCE``). position :
-    where along the branch: whole part, the number of the point before it. branch : number of the
-    branch among those it was found with. born : what leaves the branch here, where that was looked
-    for (``branch_switch.birth``).
-    """
+    """A bifurcation point."""
 
     parameter: str
+    """Name of the parameter."""
     value: float
+    """Value of the parameter at the point."""
     kind: PointKind
+    """Kind of the point; see ``PointKind``."""
     error: float
+    """Half the width of an interval of the parameter that was seen to hold the point: the test
+    function has different signs (for grazing: the counts of impacts differ) at its ends."""
     point: BranchPoint
+    """The orbit there."""
     before: str
+    """The branch's response right before it, in the branch's own order."""
     after: str
+    """The branch's response right after it, in the branch's own order."""
     stable: tuple[bool, bool]
+    """Whether the branch is stable right before and right after it."""
     direction: int
+    """1 where the parameter rises along the branch, -1 where it falls, 0 at a fold."""
     position: float
+    """Where along the branch: the whole part is the number of the point before it."""
     branch: int = 0
+    """Number of the branch among those it was found with."""
     side: int = 0
+    """Side of a fold, 1 where its orbits lie above the value, -1 below; else 0."""
     symmetric: bool = False
+    """Whether the orbit is symmetric (without an exact mirror: to ``orbit.SYMMETRY_TOLERANCE``)."""
     born: Birth | None = None
+    """What leaves the branch here, where that was looked for (``branch_switch.birth``)."""
 
     @property
     def response(self) -> str:

@@ -84,18 +84,20 @@ def _rows(
 
 @dataclass(frozen=True)
 class SweepStore:
-    """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``.
-
-    parameter : name of the swept parameter's column. work : hash of the plan. provenance : goes
-    into every file. note, vouch : as of ``KeyedStore``.
-    """
+    """Blocks of one sweep: ``sweep.parquet/TRACK-000000.parquet`` in ``root``."""
 
     root: Path
+    """Folder that the blocks lie in."""
     parameter: str
+    """Name of the swept parameter's column."""
     work: str
+    """Hash of the plan."""
     provenance: Mapping[str, Any]
+    """Versions, seed and settings, which go into every file."""
     note: Note = quiet
+    """Told of entries that are not taken."""
     vouch: Vouch = nobody
+    """Asked about entries without a seal."""
 
     @staticmethod
     def name(track: str, block: int) -> str:
@@ -133,22 +135,28 @@ class SweepStore:
 
 @dataclass(frozen=True)
 class GridStore:
-    """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in ``root``.
-
-    kind : "map" or "basins". x, y : names of the axes' columns; xs, ys : their values. note,
-    vouch : as of ``KeyedStore``.
-    """
+    """Rows of one map or basin: ``KIND.parquet/row-000000.parquet`` in ``root``."""
 
     root: Path
+    """Folder that the rows lie in."""
     kind: str
+    """"map" or "basins"."""
     x: str
+    """Name of the column of values along a row."""
     xs: Array
+    """Values along a row."""
     y: str
+    """Name of the column of values from row to row."""
     ys: Array
+    """Values from row to row."""
     work: str
+    """Hash of the plan."""
     provenance: Mapping[str, Any]
+    """Versions, seed and settings, which go into every file."""
     note: Note = quiet
+    """Told of entries that are not taken."""
     vouch: Vouch = nobody
+    """Asked about entries without a seal."""
 
     @staticmethod
     def name(kind: str, row: int) -> str:

@@ -41,18 +41,20 @@ class Store(Protocol):
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What is swept.
-
-    subject, parameter : what changes. values : (N,) ascending. tracks : "down", "up", or "start
-    K" for row K of starts (K, states). course : periods of each step.
-    """
+    """What is swept."""
 
     subject: Subject
+    """The system whose parameter changes."""
     parameter: str
+    """Name of the parameter that changes."""
     values: Array
+    """(N,) values of the parameter, ascending."""
     tracks: tuple[str, ...] = (DOWN,)
+    """"down", "up", or "start K" for row K of ``starts``."""
     starts: Array = field(default_factory=lambda: np.zeros((1, 4)))
+    """(K, states) starts of the tracks that begin anew at each value."""
     course: Course = field(default_factory=Course)
+    """Periods of each step."""
 
     @property
     def followed(self) -> bool:
@@ -84,18 +86,20 @@ class SweepPlan:
 
 @dataclass(frozen=True)
 class Window:
-    """Neighbouring steps that show one response.
-
-    low, high : parameter at the first and the last of them; steps : how many. track : on which
-    track; "starts" where several starts are taken together.
-    """
+    """Neighbouring steps that show one response."""
 
     low: float
+    """The parameter at the first of them."""
     high: float
+    """The parameter at the last of them."""
     response: str
+    """The response, as "n-p-q"."""
     symmetric: bool | None
+    """Whether the response is its own mirror image; None where it is not periodic."""
     steps: int
+    """How many they are."""
     track: str
+    """The track they lie on; "starts" where several starts are taken together."""
 
     def as_dict(self) -> dict[str, Any]:
         """By the keys of the contract."""
@@ -111,10 +115,12 @@ class Window:
 
 @dataclass(frozen=True)
 class Sweep:
-    """steps : for each track one ``Steady`` per value, in the order of ``plan.values``."""
+    """What a sweep showed."""
 
     plan: SweepPlan
+    """What the sweep was asked for."""
     steps: Mapping[str, tuple[Steady, ...]]
+    """For each track one ``Steady`` per value, in the order of ``plan.values``."""
 
     @property
     def windows(self) -> list[Window]:

@@ -21,33 +21,36 @@ NOT_LOCATED = "not located"
 
 @dataclass(frozen=True)
 class WindowEnd:
-    """An end of a window.
-
-    value, error : of the parameter. why : the bifurcation's kind, or why the branch stops there.
-    point : the bifurcation, if it is one. orbit : at the end, or the last one before it.
-    """
+    """An end of a window."""
 
     value: float
+    """Value of the parameter."""
     error: float
+    """Half the width of the interval of the parameter that holds the end."""
     why: str
+    """The bifurcation's kind, or why the branch stops there."""
     point: Bifurcation | None
+    """The bifurcation, if it is one."""
     orbit: Orbit
+    """The orbit at the end, or the last one before it."""
 
 
 @dataclass(frozen=True)
 class BranchWindow:
-    """A stretch of a branch on which a response is stable.
-
-    response : "n-p-q". symmetric : by the branch it lies on. low, high : its ends. branch : the
-    number of the branch.
-    """
+    """A stretch of a branch on which a response is stable."""
 
     parameter: str
+    """Name of the parameter."""
     response: str
+    """The response that is stable, as "n-p-q"."""
     symmetric: bool
+    """Whether the response is its own mirror image, by the branch it lies on."""
     low: WindowEnd
+    """Lower end of the window."""
     high: WindowEnd
+    """Upper end of the window."""
     branch: int
+    """The number of the branch."""
 
     @property
     def width(self) -> float:

@@ -39,19 +39,30 @@ KINDS = (
 
 @dataclass(frozen=True)
 class Line:
-    """quantity pieces of one part; designators name where they go."""
+    """A line of the bill: pieces of one part."""
 
     quantity: int
+    """How many pieces."""
     designators: tuple[str, ...]
+    """Designators on the board, where the pieces go."""
     value: str
+    """Value as people write it."""
     description: str
+    """What it is, in words."""
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """The maker's part number, which is ordered."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     rating: str
+    """What it has to stand."""
     price_class: int
+    """Price class, from 1."""
     grade: str
+    """Tolerance, as text."""
     substitute: str = ""
+    """Another maker's part number, with the maker in front, or ""."""
 
     def cells(self) -> dict[str, str]:
         row = {name: str(getattr(self, name)) for name in COLUMNS}

@@ -37,20 +37,26 @@ _MAX_BYTES = 100_000
 
 @dataclass(frozen=True)
 class LayoutColumn:
-    """title : its heading. field : of ``FIELDS``; None for a column of one text."""
+    """A column of a bill."""
 
     title: str
+    """Heading of the column."""
     field: str | None
+    """One of ``FIELDS``; None for a column of one text."""
     text: str
+    """Text of every cell, where ``field`` is None."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A bill's columns; ``separator`` stands between designators."""
+    """The columns of a bill."""
 
     name: str
+    """Name of the layout."""
     separator: str
+    """What stands between designators."""
     columns: tuple[LayoutColumn, ...]
+    """The columns, in order."""
 
     @property
     def file(self) -> str:

@@ -28,45 +28,57 @@ from designer.model.board_table import BoardChoice
 
 @dataclass(frozen=True)
 class Bought:
-    """What is ordered: grade is a fraction or None; substitute : another maker's part number, with
-    the maker in front, or ""; dielectric : what it is made of, or ""; note : what a buyer has to
-    know beside, or ""."""
+    """What is ordered."""
 
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """The maker's part number."""
     rating: str
+    """What it has to stand."""
     price_class: int
+    """Price class, from 1."""
     grade: float | None = None
+    """Tolerance, a fraction, or None."""
     substitute: str = ""
+    """Another maker's part number, with the maker in front, or ""."""
     dielectric: str = ""
+    """What it is made of, or ""."""
     note: str = ""
+    """What a buyer has to know beside, or ""."""
 
 
 @dataclass(frozen=True)
 class Component:
-    """One physical part.
-
-    kind : "resistor", "capacitor", "op-amp", "diode", "reference", "connector", "test point",
-    "trimmer". value : as people write it. quantity : the same as a number [Ω, F, V], None where
-    there is none. footprint : KiCad's, Library:Name. pins : every pad with its net. role : the
-    terms that it realises. stage : ``circuit.stage_title``. near : reference of the component that
-    it has to stand at, or "". parts : names of the circuit's parts that it is. bought : None for
-    what is no part to order, such as a pad.
-    """
+    """One physical part."""
 
     reference: str
+    """Its designator on the board."""
     kind: str
+    """"resistor", "capacitor", "op-amp", "diode", "reference", "connector", "test point",
+    "trimmer"."""
     value: str
+    """Its value, as people write it."""
     quantity: float | None
+    """Its value as a number [Ω, F, V], None where there is none."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     pins: tuple[Pin, ...]
+    """Every pad with its net."""
     role: str
+    """The terms that it realises."""
     stage: str
+    """Its stage, see ``circuit.stage_title``."""
     views: View
+    """Where it stands: simulated, on the board, bought."""
     description: str
+    """What it is, in words."""
     bought: Bought | None
+    """What is ordered; None for what is no part to order, such as a pad."""
     near: str = ""
+    """Reference of the component that it has to stand at, or ""."""
     parts: tuple[str, ...] = ()
+    """Names of the circuit's parts that it is."""
 
     @property
     def fitted(self) -> bool:

@@ -35,11 +35,14 @@ TwoPin = Resistor | Capacitor | Diode | Reference | SupplyCapacitor
 
 @dataclass(frozen=True)
 class Chain:
-    """Parts from net ``start`` to net ``end``."""
+    """Parts in series between two nets."""
 
     start: str
+    """The net where they begin."""
     end: str
+    """The net where they end."""
     parts: tuple[TwoPin, ...]
+    """The parts, in order."""
 
     @property
     def turned(self) -> Chain:
@@ -61,23 +64,32 @@ class Chain:
 
 @dataclass(frozen=True)
 class Amplifier:
-    """A cell around one section. series, shunts : from its output on, and from there to ground."""
+    """A cell around one section."""
 
     section: Section
+    """The section."""
     title: str
+    """Title of the cell."""
     inputs: tuple[Chain, ...]
+    """Chains to the summing node."""
     feedback: tuple[Chain, ...]
+    """Chains from the output to the summing node."""
     series: Chain | None
+    """Chain from the output on; None where there is none."""
     shunts: tuple[Chain, ...]
+    """Chains from the end of ``series`` to ground."""
 
 
 @dataclass(frozen=True)
 class CellRows:
-    """A cell of rows: each a chain, or a line of text. at : pads that carry a net."""
+    """A cell of rows."""
 
     title: str
+    """Title of the cell."""
     rows: tuple[Chain | str, ...]
+    """The rows: each a chain, or a line of text."""
     at: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Pads that carry a net."""
 
 
 Cell = Amplifier | CellRows

@@ -11,32 +11,38 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class PadShape:
-    """A pad of width by height at (x, y). drill : of its hole [mm], 0 on the surface.
-
-    first : whether it is drawn square, as pin 1 of a row of holes is.
-    """
+    """A pad of a footprint."""
 
     number: str
+    """Number of the pad."""
     x: float
+    """Place of its middle to the right [mm]."""
     y: float
+    """Place of its middle downwards [mm]."""
     width: float
+    """Width [mm]."""
     height: float
+    """Height [mm]."""
     drill: float = 0.0
+    """Diameter of its hole [mm], 0 on the surface."""
     first: bool = False
+    """Whether it is drawn square, as pin 1 of a row of holes is."""
 
 
 @dataclass(frozen=True)
 class FootprintShape:
-    """body : width and height of the part seen from above. mark : whether pin 1 is marked.
-
-    soldered : False for a bare pad, which nothing is soldered to.
-    """
+    """A footprint, with the part that stands on it."""
 
     name: str
+    """Name of the footprint."""
     pads: tuple[PadShape, ...]
+    """Pads of the footprint."""
     body: tuple[float, float]
+    """Width and height of the part seen from above [mm]."""
     mark: bool = False
+    """Whether pin 1 is marked."""
     soldered: bool = True
+    """Whether it is soldered; False for a bare pad, which nothing is soldered to."""
 
     @property
     def through_hole(self) -> bool:

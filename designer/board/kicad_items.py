@@ -23,18 +23,22 @@ SIMULATION = "simulation"
 
 @dataclass(frozen=True)
 class Entry:
-    """An item of the sheet with its fields, and where it stands besides the sheet.
-
-    component : None for sources, flags and power symbols.
-    """
+    """An item of the sheet with its fields, and where it stands besides the sheet."""
 
     item: Item
+    """The item with its symbol."""
     fields: Fields
+    """The fields, by name."""
     component: Component | None = None
+    """The component; None for sources, flags and power symbols."""
     bought: bool = False
+    """Whether it stands on the bill."""
     placed: bool = False
+    """Whether it stands on the board."""
     simulated: bool = False
+    """Whether it stands in the simulation."""
     fitted: bool = True
+    """Whether it is soldered to the board."""
 
 
 def entries(

@@ -32,16 +32,18 @@ MARGIN, TITLE_BLOCK = 16.0, 36.0
 
 @dataclass(frozen=True)
 class Item:
-    """Something with a symbol. pins : net by pin number, "" where none is.
-
-    stage : of each unit, by its number; one stage of a part of one unit.
-    """
+    """Something with a symbol."""
 
     reference: str
+    """Its designator."""
     value: str
+    """The value that is shown."""
     shape: SymbolShape
+    """Symbol that it is drawn with."""
     pins: Mapping[str, str]
+    """Net by pin number, "" where none is."""
     stages: Mapping[int, str]
+    """Stage of each unit, by its number; one stage of a part of one unit."""
 
     def ends(self) -> tuple[str, ...]:
         """Nets of its pins."""
@@ -50,13 +52,18 @@ class Item:
 
 @dataclass(frozen=True)
 class Placed:
-    """A unit of a symbol at (x, y), turned by angle [degrees]."""
+    """A unit of a symbol on the sheet."""
 
     item: Item
+    """Whose symbol it is."""
     unit: int
+    """Number of the unit."""
     x: int
+    """Place to the right, in units of the grid."""
     y: int
+    """Place downwards, in units of the grid."""
     angle: int = 0
+    """How far it is turned [degrees]."""
 
     def point(self, number: str) -> Point:
         """Where a pin is."""
@@ -67,33 +74,46 @@ class Placed:
 
 @dataclass(frozen=True)
 class NetLabel:
-    """A net's name at a point; left : whether it is written to the left of it."""
+    """A net's name on the sheet."""
 
     net: str
+    """Name of the net."""
     at: Point
+    """The point that it names."""
     left: bool
+    """Whether it is written to the left of it."""
 
 
 @dataclass(frozen=True)
 class Note:
-    """A text; heading : the title of a cell, larger."""
+    """A text on the sheet."""
 
     text: str
+    """The text that is written."""
     at: Point
+    """Where it stands."""
     heading: bool = False
+    """Whether it is the title of a cell, which is larger."""
 
 
 @dataclass
 class LayoutCell:
-    """What stands together. wires : horizontal or vertical, from point to point."""
+    """What stands together."""
 
     title: str
+    """Title of the cell."""
     symbols: list[Placed] = field(default_factory=list)
+    """Units of symbols in the cell."""
     wires: list[tuple[Point, Point]] = field(default_factory=list)
+    """Wires, horizontal or vertical, from point to point."""
     labels: list[NetLabel] = field(default_factory=list)
+    """Names of nets in the cell."""
     notes: list[Note] = field(default_factory=list)
+    """Texts of the cell."""
     open_pins: list[Point] = field(default_factory=list)
+    """Points of the pins that nothing is connected to."""
     height: int = 0
+    """Height, in units of the grid."""
 
     def moved(self, x: int, y: int) -> LayoutCell:
         """The cell elsewhere."""
@@ -129,10 +149,12 @@ class LayoutCell:
 
 @dataclass(frozen=True)
 class Sheet:
-    """The whole drawing. paper : its size."""
+    """The whole drawing."""
 
     paper: str
+    """Size of the paper, as in ``PAPERS``."""
     cells: tuple[LayoutCell, ...]
+    """The cells, at their places."""
 
     @property
     def symbols(self) -> tuple[Placed, ...]:

@@ -32,13 +32,18 @@ ORIGIN = (25.0, 25.0)
 
 @dataclass(frozen=True)
 class PlacedComponent:
-    """A component at (x, y), turned by angle [degrees]."""
+    """A component on the board."""
 
     component: Component
+    """The component."""
     footprint: FootprintShape
+    """The footprint, with its pads."""
     x: float = 0.0
+    """Place to the right [mm]."""
     y: float = 0.0
+    """Place downwards [mm]."""
     angle: int = 0
+    """How far it is turned [degrees]."""
 
     @property
     def box(self) -> PlacedBox:
@@ -66,10 +71,16 @@ class PlacedComponent:
 
 @dataclass(frozen=True)
 class PlacedBox:
+    """An upright rectangle on the board."""
+
     left: float
+    """Its left edge [mm]."""
     top: float
+    """Its upper edge [mm]."""
     right: float
+    """Its right edge [mm]."""
     bottom: float
+    """Its lower edge [mm]."""
 
     @property
     def width(self) -> float:
@@ -82,10 +93,12 @@ class PlacedBox:
 
 @dataclass(frozen=True)
 class Placement:
-    """Every component with a footprint; outline : of the board."""
+    """Where everything stands on the board."""
 
     spots: tuple[PlacedComponent, ...]
+    """Every component with a footprint."""
     outline: PlacedBox
+    """Outline of the board."""
 
 
 def place(circuit: Circuit, components: Sequence[Component]) -> Placement:

@@ -24,16 +24,18 @@ from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
 
 @dataclass(frozen=True)
 class Project:
-    """What a project is made from.
-
-    title : the model file's. rules : text of the ``.kicad_dru``.
-    """
+    """What a project is made from."""
 
     title: str
+    """Title of the model file."""
     circuit: Circuit
+    """The circuit."""
     components: tuple[Component, ...]
+    """The components of the board."""
     run: FirstRun
+    """What the simulation of the project shows."""
     rules: str
+    """Text of the ``.kicad_dru``."""
 
     @property
     def name(self) -> str:

@@ -36,34 +36,39 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class PlacedPad:
-    """net : the circuit's name of it, "" where none is connected. at : on the board [mm].
-
-    corners : of the copper, or of the rectangle around it, in order [mm]; a circle's are many, and
-    a shape that is not read has none.
-    """
+    """A pad as it stands on a board."""
 
     number: str
+    """Number of the pad."""
     net: str
+    """The circuit's name of its net, "" where none is connected."""
     at: Point
+    """Place on the board [mm]."""
     corners: tuple[Point, ...]
+    """Corners of the copper, or of the rectangle around it, in order [mm]; a circle's are many, and
+    a shape that is not read has none."""
 
 
 @dataclass(frozen=True)
 class PlacedFootprint:
-    """reference : its designator. value : as written. courtyard : whether it has one.
-
-    library, name : of the footprint; library is "" where none is written. part_number : the field
-    ``MPN``, None where there is none. fitted : False where it is marked DNP.
-    """
+    """A footprint as it stands on a board."""
 
     reference: str
+    """Its designator."""
     value: str
+    """Its value as written."""
     pads: tuple[PlacedPad, ...]
+    """Pads of the footprint."""
     courtyard: bool
+    """Whether the footprint has a courtyard."""
     library: str
+    """Library of the footprint; "" where none is written."""
     name: str
+    """Name of the footprint."""
     part_number: str | None
+    """The field ``MPN``, None where there is none."""
     fitted: bool
+    """Whether it is fitted; False where it is marked DNP."""
 
     @property
     def wired(self) -> bool:
@@ -73,27 +78,34 @@ class PlacedFootprint:
 
 @dataclass(frozen=True)
 class Track:
-    """A piece of track [mm]."""
+    """A straight piece of track."""
 
     net: str
+    """The circuit's name of its net."""
     width: float
+    """Width [mm]."""
     length: float
+    """Length [mm]."""
 
 
 @dataclass(frozen=True)
 class BoardFile:
-    """path : where it was read. text : as it stands there. vias, zones : the net of each.
-
-    outline : the board's edge.
-    """
+    """A board file, as it was read."""
 
     path: Path
+    """The file that it was read from."""
     text: str
+    """The file's text."""
     footprints: tuple[PlacedFootprint, ...]
+    """The footprints."""
     tracks: tuple[Track, ...]
+    """The pieces of track."""
     vias: tuple[str, ...]
+    """Net of each via."""
     zones: tuple[str, ...]
+    """Net of each zone."""
     outline: Outline
+    """The board's edge."""
 
     def footprint(self, reference: str) -> PlacedFootprint | None:
         """That of one component."""

@@ -43,20 +43,23 @@ NONE: Mapping[str, Override] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class CustomRule:
-    """A rule in KiCad's words. id : of the rule that it says. limit [mm], or a count.
-
-    constraint : its type; least : whether the limit is from below; condition : "" for everything.
-    nets : KiCad's names of the nets that it speaks of, none for every net. usual : width [mm] that
-    KiCad's router takes under this rule, None where the rule says nothing of it.
-    """
+    """A rule in KiCad's words."""
 
     id: str
+    """Id of the rule that it says."""
     constraint: str
+    """Type of its constraint."""
     limit: float
+    """The limit [mm], or a count."""
     least: bool
+    """Whether the limit is from below."""
     condition: str = ""
+    """What it holds for; "" for everything."""
     nets: tuple[str, ...] = ()
+    """KiCad's names of the nets that it speaks of, none for every net."""
     usual: float | None = None
+    """Width that KiCad's router takes under this rule [mm]; None where the rule says nothing of
+    it."""
 
     @property
     def expression(self) -> Expression:

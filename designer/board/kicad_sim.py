@@ -26,9 +26,13 @@ class Source:
     """A voltage source that only the simulation has, from ``net`` to ground."""
 
     name: str
+    """Its designator."""
     net: str
+    """The net that it drives."""
     value: str
+    """The value that is shown."""
     fields: Fields
+    """Its fields for the simulation, by name."""
 
 
 def sources(circuit: Circuit, run: FirstRun) -> tuple[Source, ...]:

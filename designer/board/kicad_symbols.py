@@ -23,41 +23,54 @@ REACH = 3
 
 @dataclass(frozen=True)
 class ShapePin:
-    """x, y : where a wire meets it, y upwards; angle : from there to the body [degrees]."""
+    """A pin of a symbol."""
 
     number: str
+    """Number of the pin."""
     name: str
+    """Name of the pin."""
     electrical: str
+    """Its electrical type, in KiCad's words."""
     x: int
+    """Where a wire meets the pin, to the right, in units of the grid."""
     y: int
+    """Where a wire meets the pin, upwards, in units of the grid."""
     angle: int
+    """Direction from there to the body [degrees]."""
     length: int
+    """Length of the pin, in units of the grid."""
 
 
 @dataclass(frozen=True)
 class SymbolUnit:
-    """One of the drawings that a symbol consists of. lines : polylines of (x, y)."""
+    """One of the drawings that a symbol consists of."""
 
     pins: tuple[ShapePin, ...]
+    """Pins of the unit."""
     lines: tuple[tuple[tuple[float, float], ...], ...]
+    """Polylines of points (x, y)."""
     filled: bool = True
+    """Whether the drawing is filled."""
 
 
 @dataclass(frozen=True)
 class SymbolShape:
-    """A symbol: prefix : of its references. power : whether it names its net.
-
-    texts : where reference and value stand, (x, y) with y upwards. names : whether pins show
-    names; numbers, their numbers.
-    """
+    """A symbol."""
 
     name: str
+    """Name of the symbol."""
     prefix: str
+    """What its designators begin with."""
     units: tuple[SymbolUnit, ...]
+    """Drawings of the symbol, one for each unit."""
     texts: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1.9), (0.0, -1.9))
+    """Where reference and value stand, (x, y) with y upwards."""
     power: bool = False
+    """Whether it names its net."""
     names: bool = False
+    """Whether pins show their names."""
     numbers: bool = False
+    """Whether pins show their numbers."""
 
     def pin(self, number: str) -> tuple[int, ShapePin]:
         """The unit (from 1) and the pin of this number."""

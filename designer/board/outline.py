@@ -27,13 +27,12 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Outline:
-    """sides : the edge as straight pieces, cut-outs among them [mm], shape (n, 2, 2).
-
-    ends : of the lines, arcs and curves that others continue [mm].
-    """
+    """The edge of a board."""
 
     sides: Array
+    """(n, 2, 2) the edge as straight pieces, cut-outs among them [mm]."""
     ends: tuple[Point, ...] = ()
+    """Ends of the lines, arcs and curves, which others continue [mm]."""
 
     @property
     def open_at(self) -> Point | None:

@@ -31,23 +31,30 @@ SUPPLY_UNIT = "P"
 
 @dataclass(frozen=True)
 class Pin:
-    """number : of the pad. net : "" where nothing may be connected. unit : the section of a
-    package, ``SUPPLY_UNIT`` for its supply pins, "" for a part of one unit."""
+    """A pin of a component."""
 
     number: str
+    """Number of its pad."""
     name: str
+    """Name of the pin."""
     net: str
+    """The net on it; "" where nothing may be connected."""
     electrical: Electrical = "passive"
+    """Electrical type, in KiCad's words."""
     unit: str = ""
+    """The section of a package, ``SUPPLY_UNIT`` for its supply pins, "" for a part of one unit."""
 
 
 @dataclass(frozen=True)
 class Package:
-    """An op-amp package: its sections that the circuit has, tied-off ones included."""
+    """An op-amp package."""
 
     name: str
+    """Its designator, such as "U1"."""
     sections: tuple[Section, ...]
+    """Its sections that the circuit has, tied-off ones included."""
     opamp: OpAmp
+    """The catalogue's entry of the op-amp."""
 
     @property
     def pins(self) -> tuple[Pin, ...]:

@@ -50,24 +50,30 @@ _CasedT = TypeVar("_CasedT", OpAmp, DiodeEntry, ReferenceEntry, TrimmerEntry)
 
 @dataclass(frozen=True)
 class Catalog:
-    """Everything that the folders hold; earlier entries come from earlier folders.
-
-    ``hash`` is of the content of all files, wherever they lie, layouts of bills among them.
-    mounting : the cases that a board takes; what is sold in no such case is no choice. refused :
-    names of the families that a model file does not let parts be bought from.
-    """
+    """Everything that the folders hold; earlier entries come from earlier folders."""
 
     families: tuple[PartFamily, ...]
+    """Resistors and capacitors that can be bought."""
     opamps: tuple[OpAmp, ...]
+    """Op-amps that can be bought."""
     diodes: tuple[DiodeEntry, ...]
+    """Diodes that can be bought."""
     references: tuple[ReferenceEntry, ...]
+    """Shunt voltage references that can be bought."""
     hash: str
+    """Hash of the content of all files, wherever they lie, layouts of bills among them."""
     folders: tuple[Path, ...]
+    """The folders that were read, in order."""
     trimmers: tuple[TrimmerEntry, ...] = ()
+    """Trimming potentiometers that can be bought."""
     headers: tuple[Header, ...] = ()
+    """Pin headers that can be bought."""
     prices: tuple[Price, ...] = ()
+    """What a part of each price class counts with."""
     mounting: Mounting = "mixed"
+    """The cases that a board takes; what is sold in no such case is no choice."""
     refused: frozenset[str] = frozenset()
+    """Names of the families that a model file does not let parts be bought from."""
 
     def mounted(self, mounting: Mounting) -> Catalog:
         """The same catalogue for a board that takes these cases."""

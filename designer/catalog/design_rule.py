@@ -20,23 +20,26 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class DesignRule:
-    """One rule, without the function that looks at it.
-
-    id : its name, in rules.json and in ``[rules.<id>]``. unit : of the limit; "" for a ratio or a
-    count. limit : the number, or None where a data sheet or a table decides; ``limit_is`` then says
-    which. least : whether the limit is from below. source : where the limit comes from. do : what
-    helps where the rule fails.
-    """
+    """One rule, without the function that looks at it."""
 
     id: str
+    """Its name, in rules.json and in ``[rules.<id>]``."""
     scope: Scope
+    """What the rule looks at."""
     title: str
+    """What the rule asks for, in a line."""
     unit: str
+    """Unit of the limit; "" for a ratio or a count."""
     limit: float | None
+    """The number, or None where a data sheet or a table decides; ``limit_is`` then says which."""
     limit_is: str
+    """What decides the limit where it is no number."""
     least: bool
+    """Whether the limit is from below."""
     source: str
+    """Where the limit comes from."""
     do: str
+    """What helps where the rule fails."""
 
     def keeps(self, value: float, limit: float) -> bool:
         """Whether a value is on the right side of a limit; nan is on neither."""
@@ -50,15 +53,16 @@ class DesignRule:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a rule found: the worst value, where it is, and the limit that holds there.
-
-    limit : None takes the rule's own. more : what else a reader should know.
-    """
+    """What a rule found: the worst value, where it is, and the limit that holds there."""
 
     value: float
+    """The worst value, in the rule's unit."""
     where: str = ""
+    """The part, net or section that has it."""
     limit: float | None = None
+    """The limit that holds here; None takes the rule's own."""
     more: str = ""
+    """What else a reader should know."""
 
 
 @dataclass(frozen=True)
@@ -66,24 +70,31 @@ class Override:
     """``[rules.<id>]`` of a model file: another limit, and why."""
 
     limit: float
+    """The limit that holds instead of the rule's own, in the rule's unit."""
     reason: str
+    """Why, in the user's words."""
 
 
 @dataclass(frozen=True)
 class RuleOutcome:
-    """A rule and what became of it. value, limit : nan where it was not run.
-
-    override : the limit is the model file's; ``usual`` then holds the one it replaces.
-    """
+    """A rule and what became of it."""
 
     rule: DesignRule
+    """The rule that was looked at."""
     status: Status
+    """Whether it passed, failed or was not run."""
     found: str
+    """What was found, in words."""
     value: float = float("nan")
+    """The worst value that was found; nan where the rule was not run."""
     limit: float = float("nan")
+    """The limit that held; nan where the rule was not run."""
     where: str = ""
+    """The part, net or section that has the worst value."""
     override: Override | None = None
+    """The model file's limit, where that held."""
     usual: float = field(default=float("nan"))
+    """The limit that ``override`` replaces; nan where there is none."""
 
     def as_dict(self) -> dict[str, Any]:
         """By the keys of docs/contract.md, and more."""

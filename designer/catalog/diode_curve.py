@@ -42,20 +42,24 @@ THERMAL = 0.025852
 
 @dataclass(frozen=True)
 class DiodeModel:
-    """name : in the catalogue. saturation_current [A], emission, resistance [ohm]: the curve.
-
-    capacitance [F] at 0 V; transit [s]; reverse_voltage [V]. assumed : whether the forward
-    voltage was, and not read from a sheet.
-    """
+    """The curve of a diode, and the figures of its simulation model."""
 
     name: str
+    """Its name in the catalogue."""
     saturation_current: float
+    """Saturation current [A]."""
     emission: float
+    """Emission coefficient."""
     resistance: float
+    """Series resistance [ohm]."""
     capacitance: float
+    """Junction capacitance at 0 V [F]."""
     transit: float
+    """Transit time [s]."""
     reverse_voltage: float
+    """Breakdown voltage [V]."""
     assumed: bool
+    """Whether the forward voltage was assumed, and not read from a data sheet."""
 
     def forward(self, current: float) -> float:
         """Voltage [V] at a forward current [A]."""

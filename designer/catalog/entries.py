@@ -31,16 +31,18 @@ ASSUMED_IMPEDANCE = 1.0
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a data sheet: minimum, typical, maximum, where it stands, or that it is assumed.
-
-    ``assumed`` marks what no data sheet gives, or what could not be compared with it.
-    """
+    """A figure of a data sheet."""
 
     min: float | None
+    """Minimum; None where the sheet gives none."""
     typ: float | None
+    """Typical; None where the sheet gives none."""
     max: float | None
+    """Maximum; None where the sheet gives none."""
     source: str
+    """Where in which data sheet the figure stands."""
     assumed: bool = False
+    """Whether no data sheet gives it, or it could not be compared with one."""
 
     @property
     def nominal(self) -> float:
@@ -60,31 +62,40 @@ def mounting_of(footprint: str) -> Literal["smd", "tht"]:
 
 @dataclass(frozen=True)
 class Rating:
-    """What a part stands: power [W], voltage [V]; None where it does not apply."""
+    """What a part stands."""
 
     power: float | None
+    """Power [W]; None where it does not apply."""
     voltage: float | None
+    """Voltage [V]; None where it does not apply."""
 
 
 @dataclass(frozen=True)
 class PartCase:
-    """Another case that a part is sold in; pins : as of the part, where they differ."""
+    """Another case that a part is sold in."""
 
     part_number: str
+    """The maker's part number, which is ordered."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     manufacturer: str | None = None
+    """The maker, where it is another."""
     pins: Mapping[str, str] | None = field(default=None, hash=False)
+    """Pin numbers by name as of the part, where they differ."""
 
 
 @dataclass(frozen=True)
 class Price:
-    """What a part of a price class counts with where prices are added: euro apiece at a hundred
-    pieces."""
+    """What a part of a price class counts with where prices are added."""
 
     name: str
+    """Number of the price class, as text."""
     euro: float
+    """Euro apiece at a hundred pieces."""
     source: str
+    """Where the price comes from."""
     assumed: bool
+    """Whether it is an assumption."""
 
     @property
     def price_class(self) -> int:
@@ -96,63 +107,88 @@ class SectionPins:
     """One amplifier of a package, with its pin numbers."""
 
     name: str
+    """Letter of the section, such as "A"."""
     inverting: str
+    """Pin number of the inverting input."""
     noninverting: str
+    """Pin number of the non-inverting input."""
     output: str
+    """Pin number of the output."""
 
 
 @dataclass(frozen=True)
 class OpAmp:
     """An op-amp package. Voltages and currents are those at a supply of ± ``rated_supply``.
 
-    supply [V] per rail; swing (into 10 kΩ), saturation [V] about ground; offset [V]; bias [A]; gain
-    [V/V]; gbw [Hz]; slew [V/s]; output_current [A], short circuit; output_resistance [Ω], open
-    loop; common_mode [V], its lower and upper end as min and max; supply_current [A] per section;
-    noise [V/√Hz] at 1 kHz;
-    What only the finer simulation models use may be missing: recovery [s] from saturation after a
-    hard overdrive is reversed; phase_margin [degrees] at unity gain; swing_2k [V] into 2 kΩ;
-    noise_corner [Hz], of the 1/f noise; phase_reversal, whether the output goes high when an input
-    falls below the common-mode range. spice : a vendor's model, used instead of ours on the finest
-    rung.
-    input_current [A] : absolute maximum into an input, None where no sheet gives it. cases : others
-    that it is sold in, with the same pins.
-    ``offset_sigma`` and ``offset_limit`` [V]: the normal distribution that a tolerance study draws
-    offsets from, and where it is cut. ``supply_pins``: positive, negative.
+    What only the finer simulation models use may be missing.
     """
 
     name: str
+    """Its name in the catalogue."""
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """The maker's part number, which is ordered."""
     pins: tuple[SectionPins, ...]
+    """The sections, with their pin numbers."""
     supply_pins: tuple[str, str]
+    """Pin numbers of the positive and the negative supply."""
     rated_supply: float
+    """Supply per rail that the figures are given at [V]."""
     supply: Figure
+    """Supply voltage per rail [V]."""
     swing: Figure
+    """Output swing into 10 kΩ, about ground [V]."""
     saturation: Figure
+    """Output limit, about ground [V]."""
     offset: Figure
+    """Input offset voltage [V]."""
     bias: Figure
+    """Input bias current [A]."""
     gain: Figure
+    """Open-loop gain [V/V]."""
     gbw: Figure
+    """Gain-bandwidth product [Hz]."""
     slew: Figure
+    """Slew rate [V/s]."""
     output_current: Figure
+    """Short-circuit output current [A]."""
     output_resistance: Figure
+    """Open-loop output resistance [Ω]."""
     common_mode: Figure
+    """Input common-mode range [V], its lower and upper end as min and max."""
     supply_current: Figure
+    """Supply current per section [A]."""
     noise: Figure
+    """Input voltage noise at 1 kHz [V/√Hz]."""
     offset_sigma: float
+    """Standard deviation of the normal distribution that a tolerance study draws offsets from
+    [V]."""
     offset_limit: float
+    """Where that distribution is cut, ± [V]."""
     price: int
+    """Price class."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
+    """Where the figures come from."""
     recovery: Figure | None = None
+    """Recovery from saturation after a hard overdrive is reversed [s]."""
     phase_margin: Figure | None = None
+    """Phase margin at unity gain [degrees]."""
     swing_2k: Figure | None = None
+    """Output swing into 2 kΩ [V]."""
     noise_corner: Figure | None = None
+    """Corner frequency of the 1/f noise [Hz]."""
     phase_reversal: bool = False
+    """Whether the output goes high when an input falls below the common-mode range."""
     spice: VendorModel | None = None
+    """A vendor's model, used instead of ours on the finest rung."""
     # What no simulation knows of stays out of repr, which is part of what a study is known by.
     input_current: Figure | None = field(default=None, repr=False)
+    """Absolute maximum of the current into an input [A]; None where no sheet gives it."""
     cases: tuple[PartCase, ...] = field(default=(), repr=False)
+    """Other cases that it is sold in, with the same pins."""
 
     @property
     def sections(self) -> int:
@@ -170,49 +206,71 @@ class OpAmp:
 
 @dataclass(frozen=True)
 class DiodeEntry:
-    """A diode: forward_voltage [V], reverse_current [A], capacitance [F], recovery [s].
-
-    pins : name to number of the footprint's pad; KiCad's have the cathode at 1.
-    """
+    """A diode."""
 
     name: str
+    """Its name in the catalogue."""
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """The maker's part number, which is ordered."""
     forward_voltage: Figure
+    """Forward voltage [V]."""
     reverse_current: Figure
+    """Reverse current [A]."""
     capacitance: Figure
+    """Capacitance at 0 V [F]."""
     recovery: Figure
+    """Reverse recovery time [s]."""
     reverse_voltage: Figure
+    """Largest reverse voltage [V]."""
     price: int
+    """Price class."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
+    """Where the figures come from."""
     pins: Mapping[str, str] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )
+    """Number of the footprint's pad by name; KiCad's have the cathode at 1."""
     cases: tuple[PartCase, ...] = ()
+    """Other cases that it is sold in."""
 
 
 @dataclass(frozen=True)
 class ReferenceEntry:
-    """A shunt voltage reference: voltage [V], grade (fraction), current [A] it regulates in,
-    dynamic impedance [Ω], which may be missing. pins : name to number; a name that is neither
-    cathode nor anode is not connected."""
+    """A shunt voltage reference."""
 
     name: str
+    """Its name in the catalogue."""
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """The maker's part number, which is ordered."""
     voltage: float
+    """The voltage that it keeps [V]."""
     grade: float
+    """Tolerance of the voltage, ± as a fraction."""
     temperature_coefficient: float
+    """Size of the voltage's relative change with temperature [1/K]."""
     current: Figure
+    """The currents that it regulates in [A]."""
     price: int
+    """Price class."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
+    """Where the figures come from."""
     impedance: Figure | None = None
+    """Dynamic impedance [Ω]; None where it is not known."""
     pins: Mapping[str, str] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )
+    """Number of the footprint's pad by name; a name that is neither cathode nor anode is not
+    connected."""
     cases: tuple[PartCase, ...] = ()
+    """Other cases that it is sold in."""
 
     @property
     def least_current(self) -> float:
@@ -227,40 +285,58 @@ class ReferenceEntry:
 
 @dataclass(frozen=True)
 class TrimmerEntry:
-    """A trimming potentiometer of ``value`` [Ω]; pins : of its ends low and high, and the wiper.
-
-    adjustability : how finely it can be set as a divider, ± as a fraction of the voltage across it.
-    """
+    """A trimming potentiometer."""
 
     name: str
+    """Its name in the catalogue."""
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """The maker's part number, which is ordered."""
     value: float
+    """Resistance of the track [Ω]."""
     grade: float
+    """Tolerance, ± as a fraction."""
     rating: Rating
+    """Power and voltage that it stands."""
     pins: Mapping[str, str] = field(hash=False)
+    """Pin numbers of its ends "low" and "high", and of its wiper."""
     price: int
+    """Price class."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     sources: tuple[str, ...]
+    """Where the figures come from."""
     assumed: tuple[str, ...] = ()
+    """What could not be compared with a data sheet, in words."""
     cases: tuple[PartCase, ...] = ()
+    """Other cases that it is sold in."""
     adjustability: float = 0.0
+    """How finely it can be set as a divider, ± as a fraction of the voltage across it."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """Pin headers of one to many ways; ``{ways}`` and ``{ways:02}`` stand in the part number and
-    the footprint for the number of ways."""
+    """Pin headers of one to many ways."""
 
     name: str
+    """Its name in the catalogue."""
     manufacturer: str
+    """Name of the maker."""
     part_number: str
+    """What is ordered; ``{ways}`` and ``{ways:02}`` in it stand for the number of ways."""
     ways: tuple[int, int]
+    """Least and largest number of ways."""
     rating: Rating
+    """Power and voltage that it stands."""
     price: int
+    """Price class."""
     footprint: str
+    """KiCad's; ``{ways}`` and ``{ways:02}`` in it stand for the number of ways."""
     sources: tuple[str, ...]
+    """Where the figures come from."""
     assumed: tuple[str, ...] = ()
+    """What could not be compared with a data sheet, in words."""
 
     def number(self, ways: int) -> str:
         """The part number of a header of so many ways."""
@@ -277,12 +353,14 @@ AGAIN = "{value}"
 
 @dataclass(frozen=True)
 class PartNumber:
-    """A rule: prefix, the value in a named code (``units.VALUE_CODES``), suffix; in the suffix
-    ``{value}`` stands for the value once more."""
+    """The rule of a family's part numbers: prefix, value, suffix."""
 
     prefix: str
+    """What stands before the value."""
     code: str
+    """Name of the code that the value is written in (``units.VALUE_CODES``)."""
     suffix: str
+    """What stands after the value; ``{value}`` in it stands for the value once more."""
 
     def of(self, value: float) -> str:
         """The part number of a value; ValueError for a value that the code cannot spell."""
@@ -302,34 +380,48 @@ class PartNumber:
 
 @dataclass(frozen=True)
 class PartFamily:
-    """Parts of one kind, grade and case that differ in their value.
-
-    ``values`` [Ω or F] are those that can be bought, ascending; temperature_coefficient [1/K] is a
-    magnitude; ``assumed`` says in words what could not be compared with a data sheet. drift : most
-    that a value changes in the data sheet's endurance test, a fraction; None where not known.
-    use : "supply" for families that no signal goes through, "array" for several parts of one value
-    in one case: elements of them, whose values differ by ``matching`` at most, a fraction.
-    """
+    """Parts of one kind, grade and case that differ in their value."""
 
     name: str
+    """Its name in the catalogue."""
     kind: Kind
+    """Kind of the parts."""
     manufacturer: str
+    """Name of the maker."""
     series: tuple[str, ...]
+    """The E series of its values."""
     range: tuple[float, float]
+    """Least and largest value [Ω or F]."""
     grade: float
+    """Tolerance, ± as a fraction."""
     temperature_coefficient: float
+    """Size of the relative change with temperature [1/K]."""
     rating: Rating
+    """Power and voltage that it stands."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     dielectric: str
+    """What the parts are made of."""
     price: int
+    """Price class."""
     part_number: PartNumber
+    """The rule of its part numbers."""
     sources: tuple[str, ...]
+    """Where the figures come from."""
     assumed: tuple[str, ...]
+    """What could not be compared with a data sheet, in words."""
     values: tuple[float, ...] = field(repr=False)
+    """Values that can be bought [Ω or F], ascending."""
     drift: float | None = None
+    """Most that a value changes in the data sheet's endurance test, a fraction; None where not
+    known."""
     use: Use = "signal"
+    """"supply" for families that no signal goes through, "array" for several parts of one value in
+    one case; "signal" for all others."""
     elements: int = 1
+    """Parts in one case."""
     matching: float | None = None
+    """Most that the values of an array's elements differ by, a fraction."""
 
     @property
     def share(self) -> float:
@@ -348,9 +440,16 @@ class PartChoice:
     """A part that can be bought: a value of a family."""
 
     family: PartFamily
+    """The family that it belongs to."""
     value: float
+    """Its value [Ω or F]."""
     part_number: str
+    """The maker's part number, which is ordered."""
     manufacturer: str
+    """Name of the maker."""
     footprint: str
+    """Footprint in KiCad, as "Library:Name"."""
     rating: Rating
+    """Power and voltage that it stands."""
     price: int
+    """Price class."""

@@ -28,14 +28,14 @@ LAYOUTS = "bom-layouts"
 
 @dataclass(frozen=True)
 class Contents:
-    """What the folders hold; an entry of the same sort and name in an earlier one counts.
-
-    entries : earlier folders first. hash : of the content of all files, wherever they lie.
-    """
+    """What the folders hold; an entry of the same sort and name in an earlier one counts."""
 
     entries: tuple[Entry, ...]
+    """What the files hold, earlier folders first."""
     hash: str
+    """Hash of the content of all files, wherever they lie."""
     folders: tuple[Path, ...]
+    """The folders that were read, in order."""
 
 
 def read_folders(extra: Path | None = None) -> Contents:

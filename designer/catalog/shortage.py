@@ -23,17 +23,19 @@ MOST = 5
 
 @dataclass(frozen=True)
 class Offer:
-    """The families of one kind at a grade or better, and what keeps some of them from being bought.
-
-    families : all of them. mounting : the cases that the board takes. refused : names of those that
-    the model file forbids.
-    """
+    """The families of one kind at a grade or better, and what keeps some of them from being
+    bought."""
 
     kind: Kind
+    """Kind of the parts."""
     grade: float
+    """The grade that is asked for, a fraction."""
     families: tuple[PartFamily, ...]
+    """All families of the kind."""
     mounting: Mounting
+    """The cases that the board takes."""
     refused: frozenset[str]
+    """Names of the families that the model file forbids."""
 
     @property
     def unit(self) -> str:

@@ -44,14 +44,18 @@ _PARAMETER = re.compile(r"\S+\s*=\s*(\{[^}]*\}|'[^']*'|\S+)|\bparams:", re.IGNOR
 
 @dataclass(frozen=True)
 class VendorModel:
-    """file : where it was read. subckt : its name in a deck. pins : those of ``PINS`` in its
-    order. lines : the subcircuits, safe and one statement a line. content : the file."""
+    """A vendor's SPICE model, checked to be safe."""
 
     file: str
+    """Name of the file that it was read from."""
     subckt: str
+    """Its name in a deck."""
     pins: tuple[str, ...]
+    """Pins of its subcircuit, by the names of ``PINS``, in that subcircuit's order."""
     lines: tuple[str, ...]
+    """The subcircuits, safe and one statement a line."""
     content: bytes = field(repr=False)
+    """The whole file."""
 
     def wrapped(self) -> list[str]:
         """The subcircuit ``opamp``: the vendor's, with an offset in series with its input.

@@ -25,15 +25,16 @@ GAIN = 1e-3
 
 @dataclass(frozen=True)
 class Candidate:
-    """A design with its responses at their places, and what boards of it showed.
-
-    scored : by response.
-    """
+    """A design with its responses at their places, and what boards of it showed."""
 
     choice: DesignChoice
+    """How the design is made."""
     design: Design
+    """The finished design."""
     found: tuple[ModelResponse, ...]
+    """Its responses at their places, and what the model shows there."""
     scored: tuple[Scored, ...]
+    """By response, its place with what boards showed there."""
 
     @property
     def distances(self) -> tuple[float, ...]:
@@ -54,60 +55,75 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Step:
-    """A lever that was tried. setting : where it was put. rank : of the design then; None where
-    there is none, for the reason given. kept : whether it stayed there."""
+    """A lever that was tried."""
 
     lever: str
+    """Name of the lever."""
     setting: str
+    """Setting that the lever was put to."""
     rank: tuple[float, float] | None
+    """Rank of the design then; None where there is none, for the reason given."""
     kept: bool
+    """Whether the lever stayed there."""
     reason: str = ""
+    """Why there is no design."""
 
 
 @dataclass(frozen=True)
 class Contribution:
-    """What a lever is worth. alone : rank of the match design with this lever moved; without : of
-    the final design with it moved back; None where there is no such design. by : who moved it:
-    the ``exact`` circuit's boards, or ``ngspice``, whose reason no exact distance shows."""
+    """What a lever is worth."""
 
     lever: str
+    """Name of the lever."""
     start: str
+    """Its setting in the match design."""
     final: str
+    """Its setting in the final design."""
     alone: tuple[float, float] | None
+    """Rank of the match design with this lever moved; None where there is no such design."""
     without: tuple[float, float] | None
+    """Rank of the final design with this lever moved back; None where there is no such design."""
     by: str = "exact"
+    """Who moved it: the ``exact`` circuit's boards, or ``ngspice``, whose reason no exact distance
+    shows."""
 
 
 @dataclass(frozen=True)
 class Listened:
-    """What ngspice said of a design, by response. frequency : at ω = 1 [Hz]. kept : whether this
-    design was taken."""
+    """What ngspice said of a design."""
 
     frequency: float
+    """Frequency at ω = 1 [Hz]."""
     agreements: tuple[Agreement, ...]
+    """By response, how many boards both engines agree on."""
     kept: bool
+    """Whether this design was taken."""
 
 
 @dataclass(frozen=True)
 class Searched:
-    """What a search found.
-
-    made : the design with its resolved model file. start : the match design with every response
-    in the middle of its widest stretch. final : what was found, as it was predicted. heard : of
-    ngspice, about it and slower ones; empty where none was asked.
-    candidates : designs; places : that were asked.
-    """
+    """What a search found."""
 
     made: Synthesis
+    """The design with its resolved model file."""
     start: Candidate | None
+    """The match design with every response in the middle of its widest stretch."""
     final: Candidate
+    """The design that was found, as it was predicted."""
     steps: tuple[Step, ...]
+    """The levers that were tried, in order."""
     contributions: tuple[Contribution, ...]
+    """What each lever that moved is worth."""
     heard: tuple[Listened, ...]
+    """What ngspice said about the final design and slower ones; empty where it was not asked."""
     windows: tuple[tuple[Stretch, ...], ...]
+    """By response, the stretches where it is shown."""
     candidates: int
+    """Designs that were made."""
     places: int
+    """Places that boards were asked at."""
     seed: int
+    """Seed of the boards."""
 
 
 def better(rank: tuple[float, float], than: tuple[float, float]) -> bool:

@@ -31,11 +31,14 @@ def kind_named(name: str) -> str | None:
 
 @dataclass(frozen=True)
 class CureBranch:
-    """made : its design. extra : price over the design that is cured [euro]."""
+    """A design with other upgrades, of which the linear program chooses."""
 
     upgrades: Upgrades
+    """The upgrades that need a new design."""
     made: Synthesis
+    """The design with its model."""
     extra: float
+    """Price over the design that is cured [euro]."""
 
     @property
     def name(self) -> str:
@@ -51,7 +54,9 @@ class Refused:
     """A branch that cannot be built, and why."""
 
     upgrades: Upgrades
+    """Upgrades that the branch asks for."""
     why: str
+    """Why it cannot be built."""
 
 
 def better_opamps(now: OpAmp, supply: float, catalog: Catalog) -> tuple[OpAmp, ...]:

@@ -47,17 +47,23 @@ STREAM = "cure:"
 
 @dataclass(frozen=True)
 class LinearModel:
-    """branch, its slots part by part, the ways of each response, and the standard deviation of each
-    quantity by name under option j of its slot, over that as it is: ratios[j]. matched : by slot
-    and option of an array, the covariance (n, n) of its elements, in the same units."""
+    """A branch as the linear program sees it."""
 
     branch: CureBranch
+    """The branch that is modelled."""
     parts: tuple[PartSlot, ...]
+    """Its slots, part by part."""
     ways: tuple[tuple[ResponseWay, ...], ...]
+    """The ways of showing each response."""
     ratios: tuple[Mapping[str, float], ...]
+    """By number of the option, standard deviation of each quantity by name under that option of its
+    slot, over that as it is."""
     trim: float
+    """Half-width of the band of the DC offset, over the amplitude."""
     seed: int
+    """Seed of the boards."""
     matched: Mapping[tuple[int, int], Array] = field(default_factory=dict)
+    """By slot and option of an array, the covariance (n, n) of its elements, in the same units."""
     _drawn: dict[tuple[int, ...], Boards] = field(default_factory=dict, repr=False, compare=False)
 
     @property

@@ -106,7 +106,9 @@ class MeasuredYield:
     """A yield, and whether its 95 % interval says on which side of the target it is."""
 
     counts: Yield
+    """Counts of boards and of those that keep the response."""
     target: float
+    """The yield that is wanted."""
 
     @property
     def rate(self) -> float:

@@ -26,34 +26,39 @@ TIE = 1e-5
 
 @dataclass(frozen=True)
 class Option:
-    """One way of filling a slot. price : over that of the slot as it is. trouble : what it asks of
-    people rather than of the purse; it decides where the price is the same."""
+    """One way of filling a slot."""
 
     name: str
+    """Name of the option."""
     price: float
+    """Price over that of the slot as it is."""
     trouble: float = 0.0
+    """What it asks of people rather than of the purse; it decides where the price is the same."""
 
 
 @dataclass(frozen=True)
 class Slot:
-    """One thing that is decided; the first option is the design as it is."""
+    """One thing that is decided."""
 
     name: str
+    """Name of the slot."""
     options: tuple[Option, ...]
+    """Its options; the first is the design as it is."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """A linear form has at most ``room`` of variance.
-
-    variances : by slot, (options,) what each option contributes. when : (slot, option) by their
-    numbers: the demand holds only while that option is taken; None: always.
-    """
+    """A demand on a linear form: its variance stays below a limit."""
 
     name: str
+    """Name of the demand."""
     room: float
+    """Largest variance of the linear form."""
     variances: tuple[Array, ...]
+    """By slot, (options,) what each option contributes."""
     when: tuple[int, int] | None = None
+    """(slot, option) by their numbers: the demand holds only while that option is taken; None:
+    always."""
 
     def variance(self, pick: Sequence[int]) -> float:
         """Of the form under this choice."""
@@ -71,7 +76,9 @@ class CureProgram:
     """What is to be chosen, and what the choice must keep."""
 
     slots: tuple[Slot, ...]
+    """What is decided."""
     demands: tuple[Demand, ...]
+    """What the choice must keep."""
 
     def price(self, pick: Sequence[int]) -> float:
         """Sum of the options' prices."""

@@ -25,19 +25,20 @@ CHANGED = 0.01
 
 @dataclass(frozen=True)
 class PartSlot:
-    """One part, all references together, parts that an array may hold, or the board's trimmer.
-
-    slot : its options. parts : those whose value it decides. grades, models : of each option, the
-    first as it is; grades of a part, models of the references, families of an array. trim : the
-    trimmer that the second option fits. network : parts whose places an array may take.
-    """
+    """One part, all references together, parts that an array may hold, or the board's trimmer."""
 
     slot: Slot
+    """The slot, with its options."""
     parts: tuple[str, ...]
+    """Parts whose value it decides."""
     grades: tuple[float, ...] = ()
+    """Grades of each option, the first as it is: grade of a part, a fraction."""
     models: tuple[str, ...] = ()
+    """Models of each option, the first as it is: model of the references, or family of an array."""
     trim: DcTrim | None = None
+    """The trimmer that the second option fits."""
     network: tuple[str, ...] = ()
+    """Parts whose places an array may take."""
 
 
 def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:

@@ -13,17 +13,20 @@ from designer.check.synthesis_result import Synthesis
 
 @dataclass(frozen=True)
 class Trial:
-    """A choice of upgrades, what was promised and what fresh boards show.
-
-    price : over the design as it is [euro]. predicted, measured : by response.
-    """
+    """A choice of upgrades, what was promised and what fresh boards show."""
 
     branch: str
+    """Name of the branch."""
     upgrades: Upgrades
+    """Upgrades that were chosen."""
     price: float
+    """Price over the design as it is [euro]."""
     predicted: tuple[float, ...]
+    """Yield that was predicted, by response."""
     measured: tuple[MeasuredYield, ...]
+    """Yield that fresh boards show, by response."""
     target: float
+    """Yield that is wanted of every response."""
 
     @property
     def worst(self) -> MeasuredYield:
@@ -37,25 +40,30 @@ class Trial:
 
 @dataclass(frozen=True)
 class Cure:
-    """What was found.
-
-    before : the design as it is. rounds : each choice against its measurement, the last the
-    answer's where ``reached``. limits : by response, what stands in the way or comes first. front :
-    trials by price. refused : branches that cannot be built. pictures : of the branches that were
-    looked at.
-    """
+    """What was found."""
 
     base: Synthesis
+    """The design as it is."""
     target: float
+    """Yield that is wanted of every response."""
     budget: float | None
+    """Largest price that is allowed [euro]; None for none."""
     before: Trial
+    """What boards of the design as it is show."""
     rounds: tuple[Trial, ...]
+    """Each choice against its measurement, the last the answer's where ``reached``."""
     reached: bool
+    """Whether every response has the yield that is wanted."""
     why: str
+    """Why the search for upgrades ended."""
     limits: tuple[str, ...]
+    """By response, what stands in the way or comes first."""
     front: tuple[Trial, ...]
+    """Trials by price."""
     refused: tuple[Refused, ...] = ()
+    """Branches that cannot be built."""
     pictures: tuple[LinearModel, ...] = field(default=(), repr=False)
+    """Pictures of the branches that were looked at."""
 
     @property
     def best(self) -> Trial:

@@ -38,35 +38,42 @@ class WindowPlace:
     """Where in its window a response is shown, in the model's units."""
 
     omega: float
+    """Dimensionless frequency."""
     b: float
+    """Dimensionless clearance."""
 
 
 @dataclass(frozen=True)
 class PartNetwork:
-    """Parts that are bought as one array. family : of the catalogue's arrays."""
+    """Parts that are bought as one array."""
 
     family: str
+    """Family of the catalogue's arrays."""
     parts: tuple[str, ...]
+    """Names of the parts."""
 
 
 @dataclass(frozen=True)
 class Upgrades:
-    """What is changed; None and empty: as it is.
-
-    grades : fractions by part. places : by number of the response. trim : half-width of the band of
-    the generator's DC offset over its amplitude, within which each board is trimmed. trimmer :
-    whether the board's own is fitted, and set on each board. networks : arrays in the places of
-    parts.
-    """
+    """What is changed; None and empty: as it is."""
 
     opamp: str | None = None
+    """Name of another op-amp."""
     dead_zone: str | None = None
+    """Kind of another dead-zone stage."""
     reference: str | None = None
+    """Name of another voltage reference."""
     grades: Mapping[str, float] = field(default_factory=dict)
+    """Grades by part, fractions."""
     places: Mapping[int, WindowPlace] = field(default_factory=dict)
+    """Other places, by number of the response."""
     trim: float | None = None
+    """Half-width of the band of the generator's DC offset over its amplitude, within which each
+    board is trimmed."""
     trimmer: bool = False
+    """Whether the board's own trimmer is fitted, and set on each board."""
     networks: tuple[PartNetwork, ...] = ()
+    """Arrays in the places of parts."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; responses are counted from 1."""

@@ -41,22 +41,25 @@ RARE = 1e-3
 
 @dataclass(frozen=True)
 class ResponseWay:
-    """One way of showing a response.
-
-    response : its number. kind : "as it is", "omega", "b", "trim" or "trimmer". place : another
-    than stated. margin : None where there is no picture of it. rate : share of boards that show the
-    response, parts as they are; 1 without a margin: no board of ``SAMPLES`` was lost. most : that
-    share with the best parts, at most; hopeless : it is too small for the target.
-    """
+    """One way of showing a response."""
 
     response: int
+    """Number of the response."""
     kind: str
+    """"as it is", "omega", "b", "trim" or "trimmer"."""
     question: Question
+    """What every board is asked."""
     place: WindowPlace | None = None
+    """The place, where it is another than stated."""
     margin: Margin | None = None
+    """Margin of the response; None where there is no picture of it."""
     rate: float = float("nan")
+    """Share of boards that show the response, parts as they are; 1 without a margin: no board of
+    ``SAMPLES`` was lost."""
     most: float = 1.0
+    """Share of boards that show the response with the best parts, at most."""
     hopeless: bool = False
+    """Whether ``most`` is too small for the target."""
 
     @property
     def certain(self) -> bool:
@@ -104,23 +107,30 @@ def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
 
 @dataclass(frozen=True)
 class Looker:
-    """Looks for the ways of a branch's responses.
-
-    target : yield wanted. trim : half-width of the DC offset's band. best : studies of boards with
-    the best parts that can be bought, of no question yet: single ones, then arrays. missed :
-    responses that are known to miss the target as they are, whatever the look at few boards says.
-    """
+    """Looks for the ways of a branch's responses."""
 
     branch: CureBranch
+    """The branch."""
     target: float
+    """Yield that is wanted of every response."""
     seed: int
+    """Seed of the boards."""
     book: Book
+    """Keeps what has been computed."""
     trim: float
+    """Half-width of the band of the DC offset, over the amplitude."""
     without: frozenset[str]
+    """Kinds of upgrades that are not wanted."""
     best: tuple[StudyPlan, ...]
+    """Studies of boards with the best parts that can be bought, of no question yet: single ones,
+    then arrays."""
     jobs: int
+    """Number of workers."""
     progress: Callable[[], None]
+    """Called as the work goes on."""
     missed: Collection[int] = ()
+    """Responses that are known to miss the target as they are, whatever the look at few boards
+    says."""
 
     @property
     def plan(self) -> StudyPlan:

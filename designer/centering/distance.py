@@ -45,11 +45,14 @@ FARTHEST = 20.0
 
 @dataclass(frozen=True)
 class Counts:
-    """For each stretch: boards that were asked, and those that show the response."""
+    """What boards showed at several stretches of the spread."""
 
     stretches: tuple[float, ...]
+    """Factors that the spread is stretched by."""
     asked: tuple[int, ...]
+    """For each stretch, boards that were asked."""
     ok: tuple[int, ...]
+    """For each stretch, boards that show the response."""
 
     @property
     def distance(self) -> float:
@@ -77,9 +80,13 @@ class Stand:
     """A place on the nominal board of a design: the orbit there, which boards start from."""
 
     spec: Response
+    """The wanted response."""
     place: ResponsePlace
+    """Where it is asked for."""
     drive: Drive
+    """The generator's drive there."""
     orbit: Orbit
+    """The nominal board's orbit, which boards start from."""
 
 
 class Stretched:

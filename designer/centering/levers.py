@@ -26,12 +26,16 @@ NOISE_GAINS = (30.0, 6.0)
 
 @dataclass(frozen=True)
 class DesignChoice:
-    """How a design is made. frequency : band for ω = 1 [Hz]. aims : inside its conditions."""
+    """How a design is made."""
 
     opamp: str
+    """Name of the op-amp."""
     dead_zone: DeadZone
+    """Kind of the dead-zone stage."""
     frequency: tuple[float, float]
+    """Band for the frequency of ω = 1 [Hz]."""
     aims: Aims = NO_AIMS
+    """What is aimed at inside the side conditions."""
 
     @classmethod
     def of(cls, spec: CircuitSpec) -> DesignChoice:

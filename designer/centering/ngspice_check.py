@@ -38,14 +38,16 @@ REFINEMENTS = 1
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of ``LISTENED`` boards of one response: those that show it on the exact circuit, those of
-    them that show it in ngspice as well, and those without an answer: too long a way to be asked,
-    runs that failed, step sizes of which one shows it, a contact that cannot be counted, a numerics
-    gate that does not pass."""
+    """How many of ``LISTENED`` boards of one response both engines agree on."""
 
     exact: int
+    """Boards that show it on the exact circuit."""
     ngspice: int
+    """Of these, boards that show it in ngspice as well."""
     unanswered: int = 0
+    """Boards of these without an answer: too long a way to be asked, runs that failed,
+    step sizes of which one shows it, a contact that cannot be counted, a numerics gate that does
+    not pass."""
 
     def __str__(self) -> str:
         open_ = f" ({self.unanswered} without an answer)" if self.unanswered else ""

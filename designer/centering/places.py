@@ -32,11 +32,14 @@ MOST = 12
 
 @dataclass(frozen=True)
 class Scored:
-    """A place with what boards showed there; stand None: the nominal board shows it not."""
+    """A place with what boards showed there."""
 
     place: ResponsePlace
+    """Where the response is asked for."""
     stand: Stand | None
+    """The nominal board's orbit there; None where it does not show the response."""
     counts: Counts
+    """What boards showed there."""
 
     @property
     def distance(self) -> float:
@@ -45,10 +48,12 @@ class Scored:
 
 @dataclass(frozen=True)
 class PlaceRange:
-    """How far a place may go. omega, b : closed ranges; equal ends where it is not open."""
+    """How far a place may go."""
 
     omega: tuple[float, float]
+    """Closed range of the frequency; equal ends where it is not open."""
     b: tuple[float, float]
+    """Closed range of the clearance; equal ends where it is not open."""
 
 
 def room_of(spec: Response, b: float, omega: tuple[float, float]) -> PlaceRange:

@@ -34,11 +34,14 @@ COURSE = Course(settle=300, keep=10, patience=300)
 
 @dataclass(frozen=True)
 class ResponsePlace:
-    """Where a response is asked for. start : (4,) a strobe of its orbit, in model units."""
+    """Where a response is asked for."""
 
     omega: float
+    """Dimensionless frequency."""
     b: float
+    """Dimensionless clearance."""
     start: Array
+    """(4,) a strobe of its orbit, in model units."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class Stretch:
     """Neighbouring places at one clearance that show one response, by ascending ω."""
 
     places: tuple[ResponsePlace, ...]
+    """The places."""
 
     @property
     def b(self) -> float:

@@ -41,19 +41,20 @@ from designer.synthesis.parts_choice import check_choices, synthesise
 
 @dataclass(frozen=True)
 class CheckedResponse:
-    """A wanted response on all three engines, for the nominal circuit.
-
-    circuit : orbit of the exact circuit rung, in volts and seconds. gate : ngspice's settings and
-    its run; None where ngspice was not asked. design, flow : what was checked, and its circuit's
-    flow at this response; without them nothing is measured of the exact answers' trust.
-    """
+    """A wanted response on all three engines, for the nominal circuit."""
 
     model: ModelResponse
+    """The response, and what the model shows."""
     circuit: Orbit
+    """Orbit of the exact circuit rung, in volts and seconds."""
     excitation: Excitation
+    """The generator's setting."""
     gate: GateResult | None
+    """Settings of ngspice and its run; None where ngspice was not asked."""
     design: Design | None = None
+    """The design that was checked; None where nothing is measured of the exact answers' trust."""
     flow: Flow | None = None
+    """Flow of the design's circuit at this response; None as ``design`` is."""
 
     @cached_property
     def model_trust(self) -> Trust:

@@ -39,35 +39,34 @@ ALIKE = 1e-3
 
 @dataclass(frozen=True)
 class Basin:
-    """An attractor, and how many starts end on it.
-
-    orbit : the one of two mirror twins that was met first. count : starts that end on it or on
-    its twin. twins : those of them that end on the twin; None where it is its own or none is told
-    apart (aperiodic motions are all one).
-    """
+    """An attractor, and how many starts end on it."""
 
     orbit: Orbit
+    """The attractor; of two mirror twins the one that was met first."""
     count: int
+    """Starts that end on it or on its twin."""
     twins: int | None
+    """How many of these starts end on the twin; None where it is its own or none is told apart
+    (aperiodic motions are all one)."""
 
 
 @dataclass(frozen=True)
 class Coexistence:
-    """Where the starts in a box end.
-
-    starts : how many were run; asked : how many were asked for: more where all starts together
-    would have taken more than ``step_budget.STARTS`` steps. seed : that they were drawn with.
-    box : (states,) half-widths, of every state at drive phase 0, in model units. basins : the
-    known attractors first, then those met, in order. not_settled : starts for which no attractor
-    was seen.
-    """
+    """Where the starts in a box end."""
 
     starts: int
+    """How many starts were run."""
     asked: int
+    """How many starts were asked for: more where all together would have taken more than
+    ``step_budget.STARTS`` steps."""
     seed: int
+    """Seed that the starts were drawn with."""
     box: Array
+    """(states,) half-widths, of every state at drive phase 0, in model units."""
     basins: tuple[Basin, ...]
+    """The known attractors first, then those met, in order."""
     not_settled: int
+    """Starts for which no attractor was seen."""
 
     def as_dict(self) -> dict[str, Any]:
         """By the keys of the contract."""

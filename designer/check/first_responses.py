@@ -19,12 +19,16 @@ PERIODS = 20
 
 @dataclass(frozen=True)
 class FirstRun:
-    """stop_time [s]. initial : (states,) capacitor voltages at t = 0; None for discharged ones."""
+    """The run that a deck shows."""
 
     excitation: Excitation
+    """The generator's setting."""
     settings: SolverSettings
+    """Settings of ngspice."""
     stop_time: float
+    """End of the run [s]."""
     initial: Array | None
+    """(states,) capacitor voltages at t = 0; None for discharged ones."""
 
 
 def first_run(made: Synthesis, checked: CheckedResponse | None = None) -> FirstRun:

@@ -55,29 +55,36 @@ NEAR_TWIN = 0.02
 
 @dataclass(frozen=True)
 class Simulated:
-    """A response on one engine, in model units whatever the engine.
-
-    twins : mirror twin of the orbit and of each of ``others``; None where an orbit is its own
-    twin, or there is no mirror, or the engine was not asked (ngspice). b : the clearance; sides :
-    the stops there are. settings : of the engine for this response. traces : where asked, the
-    orbit and its twin over their periods, each from its start. trust : of the orbit. coexistence :
-    what share of the starts in a box goes to the orbit, to each of ``others`` and to none; its
-    orbits are in the flow's own units. None where the engine was not asked (ngspice).
-    """
+    """A response on one engine, in model units whatever the engine."""
 
     omega: float
+    """Dimensionless frequency."""
     expected: str | None
+    """The wanted n-p-q; None where any is of interest."""
     found: bool
+    """Whether the wanted response was found."""
     orbit: Orbit
+    """The orbit in model units."""
     others: tuple[Orbit, ...]
+    """Further attractors that were met, in model units."""
     seconds: float
+    """Wall time [s]."""
     twins: tuple[Orbit | None, ...] = ()
+    """Mirror twin of the orbit and of each of ``others``; None where an orbit is its own twin, or
+    there is no mirror, or the engine was not asked (ngspice)."""
     b: float = float("nan")
+    """The clearance."""
     sides: tuple[int, ...] = ()
+    """The stops that there are: 1 upper, -1 lower."""
     settings: dict[str, Any] = field(default_factory=dict)
+    """Settings of the engine for this response."""
     traces: tuple[Trace, ...] = ()
+    """Where asked, the orbit and its twin over their periods, each from its start."""
     trust: Trust = field(default_factory=Trust)
+    """What is known of the orbit's error."""
     coexistence: Coexistence | None = None
+    """What share of the starts in a box goes to the orbit, to each of ``others`` and to none; its
+    orbits are in the flow's own units. None where the engine was not asked (ngspice)."""
 
     @property
     def twin(self) -> Orbit | None:

@@ -20,10 +20,15 @@ class Synthesis:
     """A model file, what its model shows, and the parts chosen for it."""
 
     modelfile: ModelFile
+    """The model file."""
     catalog: Catalog
+    """The catalogue that parts were chosen from."""
     found: tuple[ModelResponse, ...]
+    """What its model shows of the wanted responses."""
     design: Design
+    """The parts chosen for it."""
     seconds: float = 0.0
+    """Wall time [s]."""
 
 
 def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesis:

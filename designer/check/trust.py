@@ -40,20 +40,21 @@ WORDS = "not to be trusted here"
 
 @dataclass(frozen=True)
 class Trust:
-    """What is known of a result's error.
-
-    rounding : largest difference of a lap's end between the ways to compute it; magnification :
-    ‖Φ‖ of the lap; error : bound of the state's error, multiplier_error : of the largest
-    multiplier's modulus. States in units of their peaks; nan where nothing was measured. doubts :
-    why the result is not to be trusted. answered : whether there is a result.
-    """
+    """What is known of a result's error. States are in units of their peaks."""
 
     rounding: float = math.nan
+    """Largest difference of a lap's end between the ways to compute it; nan where nothing was
+    measured."""
     magnification: float = math.nan
+    """‖Φ‖ of the lap; nan where nothing was measured."""
     error: float = math.nan
+    """Bound of the state's error; nan where nothing was measured."""
     multiplier_error: float = math.nan
+    """Bound of the error of the largest multiplier's modulus; nan where nothing was measured."""
     doubts: tuple[Doubt, ...] = ()
+    """Why the result is not to be trusted."""
     answered: bool = False
+    """Whether there is a result."""
 
     @property
     def trusted(self) -> bool | None:

@@ -27,23 +27,31 @@ _BY_NAME = (
 
 @dataclass(frozen=True)
 class Boards:
-    """N boards of a circuit; every mapping is from a name to an array (N,).
-
-    What they hold is told at ``circuit.netlist.Board``; low, high : its rails.
-    inverse_gain : (N,).
-    """
+    """N boards of a circuit; every mapping is from a name to an array (N,), see
+    ``netlist.Board``."""
 
     circuit: Circuit
+    """The circuit."""
     values: Mapping[str, Array]
+    """Ohm or farad by part."""
     offset: Mapping[str, Array]
+    """Input offset [V] by section."""
     low: Mapping[str, Array]
+    """Lower output limit [V] by section."""
     high: Mapping[str, Array]
+    """Upper output limit [V] by section."""
     bias: Mapping[str, Array]
+    """Current into each input [A] by section."""
     reference: Mapping[str, Array]
+    """Volts by reference."""
     drop: Mapping[str, Array]
+    """Forward voltage [V] by diode, while it conducts."""
     supply: Mapping[str, Array]
+    """Volts by rail."""
     gain_bandwidth: Mapping[str, Array]
+    """Gain-bandwidth product [Hz] by section."""
     inverse_gain: Array
+    """(N,) 1/open-loop gain."""
 
     def __len__(self) -> int:
         return len(self.inverse_gain)

@@ -13,18 +13,22 @@ from designer.base.views import View
 
 @dataclass(frozen=True)
 class SupplyCapacitor:
-    """Capacitance [F] between the rails or a rail and ground; ``plus`` is the higher net.
-
-    package : the op-amp package at whose supply pin it stands; "" for the board's bulk.
-    """
+    """A capacitor between the rails, or between a rail and ground."""
 
     name: str
+    """Its name in the circuit."""
     plus: str
+    """The higher net."""
     minus: str
+    """The lower net."""
     value: float
+    """Capacitance [F]."""
     role: str
+    """What it is for, in words."""
     package: str = ""
+    """The op-amp package at whose supply pin it stands; "" for the board's bulk."""
     views: View = View.FITTED
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -33,12 +37,16 @@ class SupplyCapacitor:
 
 @dataclass(frozen=True)
 class Connector:
-    """A pin header: ways are the nets of pins 1, 2, …"""
+    """A pin header."""
 
     name: str
+    """Its name in the circuit."""
     ways: tuple[str, ...]
+    """Nets of pins 1, 2, …."""
     role: str
+    """What it is for, in words."""
     views: View = View.FITTED
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -52,9 +60,13 @@ class TestPoint:
     __test__ = False  # no test class, whatever its name begins with
 
     name: str
+    """Its name in the circuit."""
     net: str
+    """The net that it carries."""
     role: str
+    """What it is for, in words."""
     views: View = View.BOARD
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -63,15 +75,22 @@ class TestPoint:
 
 @dataclass(frozen=True)
 class Trimmer:
-    """A trimming potentiometer of ``value`` [ohm] between two nets, with its wiper's."""
+    """A trimming potentiometer."""
 
     name: str
+    """Its name in the circuit."""
     low: str
+    """Net of the track's lower end."""
     wiper: str
+    """Net of the wiper."""
     high: str
+    """Net of the track's upper end."""
     value: float
+    """Resistance of the track [ohm]."""
     role: str
+    """What it is for, in words."""
     views: View = View.FITTED
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:

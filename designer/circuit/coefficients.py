@@ -27,17 +27,16 @@ bound as proved, and a condition that costs less as one that does not bind."""
 
 @dataclass(frozen=True)
 class Scales:
-    """How circuit and model correspond: v_i = volts[i] · x_i, T = seconds · t.
-
-    seconds : circuit seconds per unit of model time. volts : (states,) volts per unit of each
-    model state (x1, dx1/dt, …). threshold : magnitude of v1 at the upper stop, or at the only one
-    [V]; threshold_lower : at the lower stop. nan where there is none.
-    """
+    """How circuit and model correspond: v_i = volts[i] · x_i, T = seconds · t."""
 
     seconds: float
+    """Circuit seconds per unit of model time."""
     volts: Array
+    """(states,) volts per unit of each model state (x1, dx1/dt, …)."""
     threshold: float
+    """Magnitude of v1 at the upper stop, or at the only one [V]."""
     threshold_lower: float = float("nan")
+    """Magnitude of v1 at the lower stop [V]. nan where there is none."""
 
     @property
     def offcentre(self) -> float:
@@ -59,15 +58,16 @@ class CutShort(ArithmeticError):
 
 @dataclass(frozen=True)
 class CoefficientErrors:
-    """errors : ln(realised/wanted) by coefficient, at the best scales; max_error : the largest.
-
-    drive_gain : model force per generator volt, for the driven masses (0 where not driven).
-    """
+    """How far the circuit's coefficients lie from the model's."""
 
     errors: dict[str, float]
+    """ln(realised/wanted) by coefficient, at the best scales."""
     max_error: float
+    """The largest size among the errors."""
     scales: Scales
+    """How circuit and model correspond, with the least ``max_error``."""
     drive_gain: Array
+    """Model force per generator volt, for the driven masses (0 where not driven)."""
 
 
 def coefficient_errors(

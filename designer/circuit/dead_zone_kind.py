@@ -17,15 +17,16 @@ DIODE, REFERENCE = "1N4148", "LM4040C50"
 
 @dataclass(frozen=True)
 class Zone:
-    """kind : "saturation", the paper's stage that clips, or "rectifier", whose dead zone is flat.
-
-    sides : the stops that exist. diode, reference : of the rectifier; None for the other.
-    """
+    """The stage that makes the dead zone."""
 
     kind: Kind = "saturation"
+    """"saturation", the paper's stage that clips, or "rectifier", whose dead zone is flat."""
     sides: Sides = "both"
+    """The stops that exist."""
     diode: DiodeEntry | None = None
+    """The rectifier's diode; None for the other kind."""
     reference: ReferenceEntry | None = None
+    """The rectifier's reference; None for the other kind."""
 
     @property
     def positions(self) -> tuple[int, ...]:

@@ -20,29 +20,32 @@ TOLERANCE = 2e-3
 
 @dataclass(frozen=True)
 class Certificate:
-    """status : "optimal" or "bound"; lower_bound : no choice from this catalogue has a smaller
-    max_error under the stated conditions; proof : how that is known."""
+    """What is proved of a choice of parts."""
 
     status: str
+    """"optimal" or "bound"."""
     lower_bound: float
+    """No choice from this catalogue has a smaller ``max_error`` under the stated conditions."""
     proof: str
+    """How the lower bound is known."""
 
 
 @dataclass(frozen=True)
 class ConditionCheck:
-    """A side condition on the finished circuit, as verified outside the search.
-
-    name : of the condition, as in a model file. quantity : what is limited, with its unit, such as
-    "swing_v". limit, found : its bound and its value. where : the part or section that has it.
-    least : whether the bound is from below.
-    """
+    """A side condition on the finished circuit, as verified outside the search."""
 
     name: str
+    """Name of the condition, as in a model file."""
     quantity: str
+    """What is limited, with its unit, such as "swing_v"."""
     limit: float
+    """The bound."""
     found: float
+    """The quantity's value on the finished circuit."""
     where: str = ""
+    """The part or section that has it."""
     least: bool = False
+    """Whether the bound is from below."""
 
     @property
     def excess(self) -> float:
@@ -63,23 +66,27 @@ class ConditionCheck:
 
 @dataclass(frozen=True)
 class Design:
-    """A finished choice of parts.
-
-    errors are of the reduced circuit. conditions : side conditions that were kept, by name, with
-    their values. solver : what the solver said of each stage. seconds : wall time. checks : the
-    conditions as verified on the finished circuit. binding : the max_error that the design would
-    have without a condition, for those that cost some.
-    """
+    """A finished choice of parts."""
 
     model: Dimensionless
+    """The wanted model."""
     circuit: Circuit
+    """The circuit that was chosen."""
     errors: CoefficientErrors
+    """Errors of the reduced circuit's coefficients."""
     certificate: Certificate
+    """What is proved of the choice."""
     conditions: dict[str, float]
+    """Side conditions that were kept, by name, with their values."""
     solver: dict[str, str]
+    """What the solver said of each stage."""
     seconds: float
+    """Wall time [s]."""
     checks: tuple[ConditionCheck, ...] = ()
+    """The conditions as verified on the finished circuit."""
     binding: Mapping[str, float] = field(default_factory=dict)
+    """The ``max_error`` that the design would have without a condition, for those that cost
+    some."""
 
     @property
     def composites(self) -> dict[str, Composite]:
@@ -107,13 +114,18 @@ class Design:
 
 @dataclass(frozen=True)
 class GeneratorSetting:
-    """The generator for one response: Hz, volts peak into a high impedance, volts of offset."""
+    """The generator's setting for one response."""
 
     omega: float
+    """Dimensionless frequency."""
     expect: str | None
+    """The wanted n-p-q; None where any is of interest."""
     frequency_hz: float
+    """Frequency [Hz]."""
     amplitude_v_peak: float
+    """Peak amplitude into a high impedance [V]."""
     offset_v: float = 0.0
+    """DC offset [V]."""
 
 
 def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[GeneratorSetting, ...]:

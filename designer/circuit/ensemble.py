@@ -43,11 +43,12 @@ RULES = np.array(
 
 @dataclass(frozen=True)
 class SettledBoard:
-    """An orbit with the displacement (n · POINTS,) over its n drive periods; empty where none was
-    drawn."""
+    """The steady response of a board."""
 
     orbit: Orbit
+    """The orbit."""
     trace: Array
+    """(n · POINTS,) displacement over the orbit's n drive periods; empty where none was drawn."""
 
 
 class Ensemble:

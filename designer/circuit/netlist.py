@@ -28,14 +28,20 @@ POSITIVE, NEGATIVE = "vcc", "vee"
 
 @dataclass(frozen=True)
 class Resistor:
-    """Resistance [ohm] between nets a and b."""
+    """A resistor."""
 
     name: str
+    """Its name in the circuit."""
     a: str
+    """Net of one end."""
     b: str
+    """Net of the other end."""
     value: float
+    """Resistance [ohm]."""
     role: str
+    """What it is for, in words."""
     views: View = View.EVERYWHERE
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -44,14 +50,20 @@ class Resistor:
 
 @dataclass(frozen=True)
 class Capacitor:
-    """Capacitance [F]; its voltage, a state of the circuit, is v(plus) - v(minus)."""
+    """A capacitor; its voltage, v(plus) - v(minus), is a state of the circuit."""
 
     name: str
+    """Its name in the circuit."""
     plus: str
+    """Net of the end where its voltage counts as positive."""
     minus: str
+    """Net of the other end."""
     value: float
+    """Capacitance [F]."""
     role: str
+    """What it is for, in words."""
     views: View = View.EVERYWHERE
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -60,18 +72,22 @@ class Capacitor:
 
 @dataclass(frozen=True)
 class Section:
-    """One op-amp of a package: name "U1A" is section A of package U1.
-
-    limits : whether it is meant to reach its output limits (the dead-zone stage).
-    """
+    """One op-amp of a package."""
 
     name: str
+    """Name such as "U1A", section A of package U1."""
     inverting: str
+    """Net of the inverting input."""
     noninverting: str
+    """Net of the non-inverting input."""
     output: str
+    """Net of the output."""
     role: str
+    """What it is for, in words."""
     limits: bool = False
+    """Whether it is meant to reach its output limits (the dead-zone stage)."""
     views: View = View.EVERYWHERE
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def package(self) -> str:
@@ -84,15 +100,22 @@ class Section:
 
 @dataclass(frozen=True)
 class Diode:
-    """A diode: model is its curve; rest : whether it conducts with everything at rest."""
+    """A diode."""
 
     name: str
+    """Its name in the circuit."""
     anode: str
+    """Net of the anode."""
     cathode: str
+    """Net of the cathode."""
     model: DiodeModel
+    """Its curve."""
     rest: bool
+    """Whether it conducts with everything at rest."""
     role: str
+    """What it is for, in words."""
     views: View = View.EVERYWHERE
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -101,22 +124,28 @@ class Diode:
 
 @dataclass(frozen=True)
 class Reference:
-    """A shunt reference that keeps v(cathode) - v(anode) at ``volts``, within ± grade.
-
-    model : its name in the catalogue. least : current [A] that it needs; impedance [ohm],
-    dynamic; without them it is a source.
-    """
+    """A shunt reference; without ``least`` and ``impedance`` it is a source."""
 
     name: str
+    """Its name in the circuit."""
     cathode: str
+    """Net of the cathode."""
     anode: str
+    """Net of the anode."""
     volts: float
+    """The voltage that it keeps, v(cathode) - v(anode) [V]."""
     grade: float
+    """Tolerance of the voltage, ± as a fraction."""
     model: str
+    """Its name in the catalogue."""
     role: str
+    """What it is for, in words."""
     least: float = 0.0
+    """Current that it needs [A]."""
     impedance: float = 0.0
+    """Dynamic impedance [ohm]."""
     views: View = View.EVERYWHERE
+    """Where it stands: simulated, on the board, bought."""
 
     @property
     def nets(self) -> tuple[str, ...]:
@@ -125,11 +154,14 @@ class Reference:
 
 @dataclass(frozen=True)
 class Supply:
-    """A rail of the power supply: ``volts`` from ``net`` to ground."""
+    """A rail of the power supply."""
 
     name: str
+    """Its name in the circuit."""
     net: str
+    """The net that it holds."""
     volts: float
+    """Voltage of the net to ground [V]."""
 
 
 @dataclass(frozen=True)
@@ -137,34 +169,36 @@ class Generator:
     """The signal generator: a voltage source from ``net`` to ground."""
 
     name: str
+    """Its name in the circuit."""
     net: str
+    """The net that it drives."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """How one side of a stop shows: ``switch``, an op-amp section or a diode, leaves its rest
-    position for ``position`` where contact begins.
-
-    A section's position is 1 at its upper limit, -1 at its lower, 0 between; a diode's is 1 while
-    it conducts, else 0. others : further switches, with their positions while the stop carries.
-    """
+    """How one side of a stop shows: a switch leaves its rest position where contact begins."""
 
     switch: str
+    """Name of the op-amp section or the diode."""
     position: int
+    """Position in contact: of a section 1 at its upper limit, -1 at its lower, 0 between; of a
+    diode 1 while it conducts, else 0."""
     others: tuple[tuple[str, int], ...] = ()
+    """Further switches, each with its position while the stop carries."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """How a clearance shows in the circuit; a side that does not exist is None.
-
-    state : name of the capacitor whose voltage is the displacement.
-    """
+    """How a clearance shows in the circuit."""
 
     clearance: str
+    """Its name."""
     state: str
+    """Name of the capacitor whose voltage is the displacement."""
     upper: Contact | None
+    """How the upper stop shows; None where there is none."""
     lower: Contact | None
+    """How the lower stop shows; None where there is none."""
 
     @property
     def contacts(self) -> tuple[tuple[int, Contact], ...]:
@@ -187,28 +221,32 @@ Fitting = Part | SupplyCapacitor | Connector | TestPoint | Trimmer
 
 @dataclass(frozen=True)
 class Circuit:
-    """Parts and nets, with what the op-amps are and where the states stand.
-
-    states : capacitor names in the order of the state equations.
-    state_nets : nets that carry the states, in the same order.
-    opamp : name of the op-amp in the catalogue; gain : its open-loop gain; bias : input current
-    [A]; supply, saturation : rails and output limits, ± volts. figures : the catalogue's entry of
-    the op-amp, for models above the ideal one.
-    fittings : parts of the board and the bill that are not simulated (``board.board_parts``).
-    """
+    """Parts and nets, with what the op-amps are and where the states stand."""
 
     parts: tuple[Part, ...]
+    """The parts that are simulated."""
     generator: Generator
+    """The signal generator."""
     states: tuple[str, ...]
+    """Capacitor names in the order of the state equations."""
     state_nets: tuple[str, ...]
+    """Nets that carry the states, in the same order."""
     stops: tuple[Stop, ...]
+    """How the clearances show."""
     opamp: str
+    """Name of the op-amp in the catalogue."""
     gain: float
+    """Its open-loop gain."""
     bias: float
+    """Input current [A]."""
     supply: float
+    """Voltage of the rails, ± [V]."""
     saturation: float
+    """Output limits of the op-amps, ± [V]."""
     figures: OpAmp | None = None
+    """The catalogue's entry of the op-amp, for models above the ideal one."""
     fittings: tuple[Fitting, ...] = ()
+    """Parts of the board and the bill that are not simulated (``board.board_parts``)."""
 
     def __post_init__(self) -> None:
         names = [p.name for p in (*self.parts, *self.fittings)]
@@ -310,23 +348,27 @@ class Circuit:
 class Board:
     """One copy of a circuit with its actual values: what a Monte Carlo sample is.
 
-    values : ohm or farad by part name. offset : input offset [V] by section; rails : (low, high)
-    output limits [V] by section. inverse_gain : 1/open-loop gain, 0 for ideal op-amps. bias :
-    current into each input [A] by section. reference : volts by name of the reference; drop :
-    forward voltage [V] by name of the diode, while it conducts. supply : volts of the rails by
-    name; gain_bandwidth : [Hz] by section, which ngspice's models with a bandwidth use. What is
-    missing has no offset and no bias, and the circuit's own supply and bandwidth.
+    What is missing has no offset and no bias, and the circuit's own supply and bandwidth.
     """
 
     values: Mapping[str, float]
+    """Ohm or farad by part name."""
     offset: Mapping[str, float] = field(default_factory=dict)
+    """Input offset [V] by section."""
     rails: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """(low, high) output limits [V] by section."""
     inverse_gain: float = 0.0
+    """1/open-loop gain, 0 for ideal op-amps."""
     bias: Mapping[str, float] = field(default_factory=dict)
+    """Current into each input [A] by section."""
     reference: Mapping[str, float] = field(default_factory=dict)
+    """Volts by name of the reference."""
     drop: Mapping[str, float] = field(default_factory=dict)
+    """Forward voltage [V] by name of the diode, while it conducts."""
     supply: Mapping[str, float] = field(default_factory=dict)
+    """Volts of the rails by name."""
     gain_bandwidth: Mapping[str, float] = field(default_factory=dict)
+    """Gain-bandwidth product [Hz] by section, which ngspice's models with a bandwidth use."""
 
     @property
     def mirror_symmetric(self) -> bool:
@@ -354,15 +396,18 @@ def nominal_board(circuit: Circuit, *, ideal: bool = False) -> Board:
 
 @dataclass(frozen=True)
 class Excitation:
-    """The generator's setting: frequency [Hz], amplitude [V peak], offset [V].
+    """The generator's setting.
 
     The generator starts at phase π: the force enters the inverting integrators with its sign
     turned, so that the model's sin(ωt) and the circuit agree.
     """
 
     frequency: float
+    """Frequency [Hz]."""
     amplitude: float
+    """Peak amplitude [V]."""
     offset: float = 0.0
+    """DC offset [V]."""
 
     @property
     def drive(self) -> Drive:

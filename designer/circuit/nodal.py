@@ -25,27 +25,26 @@ from designer.dynamics.piecewise_linear import ModeKey
 
 @dataclass(frozen=True)
 class Solution:
-    """Linear functions of (states, generator, 1), each a row of length n + 2.
-
-    voltage : by net; current : into each state capacitor and through each diode, by name; output :
-    out of each op-amp section's output, by name [A].
-    """
+    """Linear functions of (states, generator, 1), each a row of length n + 2."""
 
     voltage: dict[str, Array]
+    """Row of each net's voltage [V]."""
     current: dict[str, Array]
+    """Row of the current [A] into each state capacitor and through each diode, by name."""
     output: dict[str, Array]
+    """Row of the current [A] out of each op-amp section's output, by name."""
 
 
 @dataclass(frozen=True)
 class Exit:
-    """A way out of a mode: row (..., n + 2) over (states, generator, 1), positive past it.
-
-    target : key of the mode beyond; clearance : whose contact begins or ends, or -1.
-    """
+    """A way out of a mode."""
 
     row: Array
+    """(..., n + 2) row over (states, generator, 1), positive past it."""
     target: ModeKey
+    """Key of the mode beyond."""
     clearance: int
+    """Index of the clearance whose contact begins or ends, or -1."""
 
 
 def stacked(boards: Boards) -> Board:

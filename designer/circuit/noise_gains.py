@@ -13,11 +13,14 @@ from designer.circuit.netlist import GROUND, Circuit, Resistor, Section
 
 @dataclass(frozen=True)
 class Conductance:
-    """Conductance [S] between two nets."""
+    """A conductance between two nets."""
 
     a: str
+    """One net."""
     b: str
+    """The other net."""
     siemens: float
+    """Conductance [S]."""
 
     def other(self, net: str) -> str:
         return self.b if net == self.a else self.a
@@ -44,19 +47,19 @@ def branches(circuit: Circuit) -> tuple[Conductance, ...]:
 
 @dataclass(frozen=True)
 class SectionStage:
-    """One section with what is connected to it.
-
-    load : of its output, every resistor there taken to ground [ohm]; infinite without one.
-    integrates : whether a capacitor closes its loop. gain : noise gain of a ratio stage; for an
-    integrator 1. corner : of an integrator, the frequency [Hz] that its noise gain times frequency
-    exceeds the frequency by; 0 for a ratio stage.
-    """
+    """One section with what is connected to it."""
 
     section: Section
+    """The section."""
     load: float
+    """Load of its output, every resistor there taken to ground [ohm]; infinite without one."""
     integrates: bool
+    """Whether a capacitor closes its loop."""
     gain: float
+    """Noise gain of a ratio stage; for an integrator 1."""
     corner: float
+    """Frequency [Hz] of an integrator by which its noise gain times frequency exceeds the
+    frequency; 0 for a ratio stage."""
 
     def bandwidth(self, frequency: float) -> float:
         """Noise gain times frequency [Hz], both at this frequency [Hz]."""

@@ -43,10 +43,12 @@ SHOWN_PERIODS = 30
 
 @dataclass(frozen=True)
 class Trace:
-    """One engine's orbit over its n periods in model units: time (k,), states (k, 4)."""
+    """One engine's orbit over its n periods in model units."""
 
     time: Array
+    """(k,) times."""
     states: Array
+    """(k, 4) states."""
 
 
 def nominal_reduction(design: Design) -> Reduction:

@@ -68,17 +68,18 @@ PRINTED_FREQUENCY = 357.419
 
 @dataclass(frozen=True)
 class ComparedCircuit:
-    """A circuit with its generator's settings, to be compared.
-
-    name : a short one. what : one sentence. frequency [Hz] at ω = 1; amplitude [V peak] at the
-    model's b.
-    """
+    """A circuit with its generator's settings, to be compared."""
 
     name: str
+    """A short name."""
     what: str
+    """What it is, in one sentence."""
     circuit: Circuit
+    """The circuit."""
     frequency: float
+    """Generator's frequency at ω = 1 [Hz]."""
     amplitude: float
+    """Generator's amplitude at the model's b [V peak]."""
 
 
 def is_the_papers(model: Dimensionless) -> bool:

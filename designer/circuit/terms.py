@@ -21,28 +21,32 @@ Quantity = tuple[Literal["mass", "damping", "stiffness", "force"], int, int]
 
 @dataclass(frozen=True)
 class Term:
-    """One input resistor of one integrator.
-
-    resistor, capacitor : part names. state : index of the integrator's state (x1, x1', x2, …).
-    source : index of the state fed in, or None for the generator. inverted : whether the state's
-    negative is needed. quantity : the coefficient it realises.
-    """
+    """One input resistor of one integrator."""
 
     resistor: str
+    """Name of the resistor."""
     capacitor: str
+    """Name of the integrator's capacitor."""
     state: int
+    """Index of the integrator's state (x1, x1', x2, …)."""
     source: int | None
+    """Index of the state fed in, or None for the generator."""
     inverted: bool
+    """Whether the state's negative is needed."""
     quantity: Quantity
+    """The coefficient that it realises."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """quantity = sign · Π part**exponent (· V_M for a force)."""
+    """A matching condition: quantity = sign · Π part**exponent (· V_M for a force)."""
 
     quantity: Quantity
+    """The coefficient that is realised."""
     sign: int
+    """Sign of the product, 1 or -1."""
     monomial: dict[str, int]
+    """Exponent by part name."""
 
 
 def _sign(value: Any) -> int:

@@ -25,13 +25,12 @@ BOLTZMANN, KELVIN = 1.380649e-23, 298.15
 
 @dataclass(frozen=True)
 class Forces:
-    """Equivalent force, in volts of the generator, of one unit of each disturbance.
-
-    offset : by section, per volt at its input; current : by net, per ampere into it.
-    """
+    """Equivalent force, in volts of the generator, of one unit of each disturbance."""
 
     offset: Mapping[str, float]
+    """Force by section, per volt at its input."""
     current: Mapping[str, float]
+    """Force by net, per ampere into it."""
 
     def between(self, a: str, b: str) -> float:
         """Of one ampere that leaves net a and enters net b."""

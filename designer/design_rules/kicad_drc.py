@@ -51,27 +51,30 @@ _NET = re.compile(r"\[([^\]]*)\]")
 
 @dataclass(frozen=True)
 class Violation:
-    """rule : id of the custom rule. actual : what KiCad measured, in mm or a count. where : in
-    KiCad's words, with the place on the board."""
+    """A place on the board where a rule is broken."""
 
     rule: str
+    """Id of the custom rule."""
     actual: float
+    """What KiCad measured, in mm or a count."""
     where: str
+    """Place on the board, in KiCad's words."""
 
 
 @dataclass(frozen=True)
 class DesignRuleCheck:
-    """version : KiCad's. misunderstood : rules that KiCad does not report when they are broken.
-
-    unconnected : nets of the circuit that are not all routed, and how many connections are open on
-    each. shorts : where copper of two nets touches, in KiCad's words.
-    """
+    """What KiCad says of a board."""
 
     version: str
+    """Version of KiCad."""
     violations: tuple[Violation, ...]
+    """The places where rules are broken."""
     misunderstood: frozenset[str]
+    """Rules that KiCad does not report when they are broken."""
     unconnected: Mapping[str, int]
+    """Nets of the circuit that are not all routed, and how many connections are open on each."""
     shorts: tuple[str, ...] = ()
+    """Places where copper of two nets touches, in KiCad's words."""
 
 
 class CheckFailed(Exception):

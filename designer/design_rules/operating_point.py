@@ -28,24 +28,31 @@ class Peak:
     """The largest value of something over all runs, and the run it happens in."""
 
     value: float
+    """The largest value over all runs."""
     run: str
+    """Name of the run that it happens in."""
 
 
 @dataclass
 class Operating:
-    """By name of the net or part. high, low [V] of nets; slew [V/s] of sections' outputs; across
-    [V], largest magnitude over each capacitor and resistor; power [W] of each resistor, the mean
-    over a run; source [A] out of each section's output. left_out : runs without an answer.
-    """
+    """What a circuit's nets and parts have to bear, by name of the net or part."""
 
     high: dict[str, Peak] = field(default_factory=dict)
+    """Highest voltage of each net [V]."""
     low: dict[str, Peak] = field(default_factory=dict)
+    """Lowest voltage of each net [V]."""
     slew: dict[str, Peak] = field(default_factory=dict)
+    """Largest slope of each section's output [V/s]."""
     across: dict[str, Peak] = field(default_factory=dict)
+    """Largest magnitude of the voltage over each capacitor and resistor [V]."""
     power: dict[str, Peak] = field(default_factory=dict)
+    """Power of each resistor, the mean over a run [W]."""
     source: dict[str, Peak] = field(default_factory=dict)
+    """Largest current out of each section's output [A]."""
     runs: list[str] = field(default_factory=list)
+    """Names of the runs."""
     left_out: dict[str, str] = field(default_factory=dict)
+    """Runs without an answer."""
 
 
 def operating(reduction: Reduction, runs: Sequence[Run], left_out: dict[str, str]) -> Operating:

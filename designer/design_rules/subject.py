@@ -27,14 +27,17 @@ from designer.synthesis.output_loads import Run
 
 @dataclass(frozen=True)
 class RuleSubject:
-    """A design, the circuit with its fittings, and the components of its board.
+    """What the rules look at.
 
     What takes time is computed when a rule first asks for it, and then kept.
     """
 
     made: Synthesis
+    """The design, with its model."""
     circuit: Circuit
+    """The circuit with its fittings."""
     components: Sequence[Component]
+    """The components of its board."""
 
     @property
     def design(self) -> Design:

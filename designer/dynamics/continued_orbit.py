@@ -31,40 +31,44 @@ _STABILITY = {"doubling": "period doubling", "torus": "a torus", "fold": "a fold
 
 @dataclass(frozen=True)
 class Extreme:
-    """stop : (clearance, side). top : whether it is a maximum. time : in drive periods. value : of
-    the displacement past the stop [V]."""
+    """An extreme of the displacement past a stop."""
 
     stop: tuple[int, int]
+    """(clearance, side) of the stop."""
     top: bool
+    """Whether it is a maximum."""
     time: float
+    """Time in drive periods."""
     value: float
+    """Value of the displacement past the stop [V]."""
 
 
 @dataclass(frozen=True)
 class ContinuedOrbit:
-    """An orbit of ``periods`` drive periods: its extremes and functions of its multipliers.
-
-    start : (states,) at a strobe.
-    """
+    """An orbit of ``periods`` drive periods: its extremes and functions of its multipliers."""
 
     extremes: tuple[Extreme, ...]
+    """The extremes of the displacement past each stop."""
     stability: dict[str, float]
+    """Functions of the multipliers by kind; positive while the orbit is stable."""
     periods: int
+    """Drive periods until the orbit closes."""
     start: Array
+    """(states,) start at a strobe."""
 
 
 @dataclass(frozen=True)
 class Function:
-    """One way of losing the response, as found on a reference orbit.
-
-    kind : "contact", "miss", "parting", "doubling", "torus" or "fold"; place : its number among
-    those at the same stop, of how many; value : on the reference orbit, positive.
-    """
+    """One way of losing the response, as found on a reference orbit."""
 
     kind: str
+    """"contact", "miss", "parting", "doubling", "torus" or "fold"."""
     value: float
+    """Value on the reference orbit, positive."""
     extreme: Extreme | None = None
+    """The extreme that it is the value of; None where it is one of the multipliers."""
     place: tuple[int, int] = (0, 0)
+    """Number of the extreme among those at the same stop, and how many these are."""
 
     @property
     def what(self) -> str:

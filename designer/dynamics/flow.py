@@ -57,39 +57,44 @@ class FlowStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Impacts:
-    """Entries into contact in order of time.
-
-    time : (k,); clearance, side : (k,) ints, side 1 upper and -1 lower; state : (k, n).
-    """
+    """Entries into contact in order of time."""
 
     time: Array
+    """(k,) times of the entries."""
     clearance: kernel.Int
+    """(k,) ints, index of the clearance."""
     side: kernel.Int
+    """(k,) ints, 1 at the upper and -1 at the lower stop."""
     state: Array
+    """(k, n) states at the entries."""
 
 
 @dataclass(frozen=True)
 class FlowResult:
-    """What happened over ``periods`` drive periods.
-
-    strobes : (periods · points + 1, n) states at the start and after each stretch.
-    counts : (periods · points, clearances, 2) impacts on the lower and the upper stop.
-    end : state (n,) and mode reached. tangent : (n, k) tangent vectors carried along, or None.
-    Where measured: impacts; extremes (n, 2) of each state; penetration, the smallest of all
-    contacts; miss, the nearest approach to a stop without contact (inf where there is none).
-    """
+    """What happened over ``periods`` drive periods."""
 
     status: FlowStatus
+    """How the run ended."""
     strobes: Array
+    """(periods · points + 1, n) states at the start and after each stretch."""
     counts: kernel.Int
+    """(periods · points, clearances, 2) impacts on the lower and the upper stop."""
     mode: ModeKey
+    """Key of the mode that was reached."""
     tangent: Array | None
+    """(n, k) tangent vectors carried along, or None."""
     impacts: Impacts
+    """Entries into contact, where they were measured."""
     extremes: Array
+    """(n, 2) least and greatest value of each state, where they were measured."""
     penetration: float
+    """The smallest of all contacts' greatest penetrations."""
     miss: float
+    """The nearest approach to a stop without contact; inf where there is none."""
     tangencies: int
+    """Undecided tangencies to a stop."""
     clipped_time: float
+    """Time spent in modes where an element that ought to be linear is at its limit."""
 
 
 class Flow:

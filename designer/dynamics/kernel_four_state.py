@@ -83,34 +83,43 @@ IMPACTS = 512
 
 
 class Modes(NamedTuple):
-    """The working modes of N boards: K modes, the first holds at rest.
-
-    A : (N, K, 4, 4); B, d : (N, K, 4); guard : (N, K, G, 6) rows over (states, drive, 1); past :
-    (N, K, 6) displacement past the stop in contact. Of the circuit: target : (K, G) working mode
-    or -1; begins : (K, G) 1 where contact begins or ends there; guards, side : (K,).
-    """
+    """The working modes of N boards: K modes, the first holds at rest."""
 
     A: Float
+    """(N, K, 4, 4) state matrices."""
     B: Float
+    """(N, K, 4) input vectors."""
     d: Float
+    """(N, K, 4) constant terms."""
     guard: Float
+    """(N, K, G, 6) rows over (states, drive, 1), positive past the guard."""
     past: Float
+    """(N, K, 6) row of the displacement past the stop in contact."""
     target: Int
+    """(K, G) working mode beyond a guard of the circuit, or -1."""
     begins: Int
+    """(K, G) 1 where contact begins or ends at a guard of the circuit."""
     guards: Int
+    """(K,) how many guards a mode has."""
     side: Int
+    """(K,) side of the stop in contact: 1 upper, -1 lower, 0 none."""
 
 
 class RunTrail(NamedTuple):
-    """What a measured run writes: extremes (4, 2); graze (3,) smallest penetration, nearest miss,
-    tangencies; when (k,), at (k, 4), stop (k,) of the impacts; met (1,) how many."""
+    """What a measured run writes; k is the most impacts that are kept."""
 
     extremes: Float
+    """(4, 2) least and greatest value of each state."""
     graze: Float
+    """(3,) smallest penetration, nearest miss, undecided tangencies."""
     when: Float
+    """(k,) times of the impacts."""
     at: Float
+    """(k, 4) states at the impacts."""
     stop: Int
+    """(k,) stops of the impacts."""
     met: Int
+    """(1,) how many impacts there were."""
 
 
 # -------------------------------------------------------------------------------------------------
@@ -844,28 +853,32 @@ def advance(
 
 
 class Answers(NamedTuple):
-    """What ``respond_all`` writes for each of E questions.
-
-    whole : (E, 7) ints: FOUND or ASK, n, p, q, drive periods spent, mode at the start, impacts.
-    real : (E, 32): start (4), monodromy (16), extremes (8), penetration, miss, asymmetry, 1.0 where
-    a tangency is undecided. when, speed, stop : (E, IMPACTS) of the impacts over two laps; trace
-    : (E, LONGEST · POINTS) the displacement over n drive periods.
-    """
+    """What ``respond_all`` writes for each of E questions."""
 
     whole: Int
+    """(E, 7) ints: FOUND or ASK, n, p, q, drive periods spent, mode at the start, impacts."""
     real: Float
+    """(E, 32): start (4), monodromy (16), extremes (8), penetration, miss, asymmetry, 1.0 where a
+    tangency is undecided."""
     when: Float
+    """(E, IMPACTS) times of the impacts over two laps."""
     speed: Float
+    """(E, IMPACTS) velocities at the impacts over two laps."""
     stop: Int
+    """(E, IMPACTS) stops of the impacts over two laps."""
     trace: Float
+    """(E, LONGEST · POINTS) the displacement over n drive periods."""
 
 
 class Ways(NamedTuple):
-    """The drive's sine and cosine (k, 2) at the start of each of one, 32 and POINTS stretches."""
+    """The drive's sine and cosine at the start of each stretch of a period."""
 
     one: Float
+    """(1, 2) at the start of the one stretch."""
     few: Float
+    """(32, 2) of 32 stretches."""
     many: Float
+    """(POINTS, 2) of POINTS stretches."""
 
 
 ASK, FOUND = 0, 1

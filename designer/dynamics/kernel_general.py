@@ -38,45 +38,51 @@ TANGENCY = 1e-13
 
 
 class ModeTables(NamedTuple):
-    """What ``advance`` knows of the modes; first axis: mode index.
-
-    step : (m,) h; propagator : (m, N, N); taylor : (m, ORDER + 1, N, N) with (M h)^k/k!;
-    guard : (m, g, ORDER + 1, N) Taylor rows; chord : (m, g, N) majorant of |g''| h²/8;
-    guards : (m,) how many; target : (m, g) mode index, -1 while unknown; clearance : (m, g);
-    depth : (m, c, ORDER + 1, N) Taylor rows of the displacement past the stop that is touched;
-    side : (m, c); clipped : (m,).
-    """
+    """What ``advance`` knows of the modes; first axis: mode index."""
 
     step: Float
+    """(m,) step length h."""
     propagator: Float
+    """(m, N, N) propagator over one step."""
     taylor: Float
+    """(m, ORDER + 1, N, N) Taylor terms (M h)^k/k! of the propagator."""
     guard: Float
+    """(m, g, ORDER + 1, N) Taylor rows of the guards."""
     chord: Float
+    """(m, g, N) majorant of |g''| h²/8."""
     guards: Int
+    """(m,) how many guards a mode has."""
     target: Int
+    """(m, g) mode index, -1 while unknown."""
     clearance: Int
+    """(m, g) clearance whose contact begins or ends at a guard, or -1."""
     depth: Float
+    """(m, c, ORDER + 1, N) Taylor rows of the displacement past the stop that is touched."""
     side: Int
+    """(m, c) side of each clearance: -1 lower stop, 0 open, 1 upper stop."""
     clipped: Int
+    """(m,) whether an element that ought to be linear is at its limit."""
 
 
 class Log(NamedTuple):
-    """What ``advance`` writes.
-
-    strobes : (stretches + 1, n); impacts : (stretches, c, 2), lower then upper;
-    when : (capacity,) and at : (capacity, n) time and state of each impact; stop : (capacity, 2)
-    its clearance and side; extremes : (n, 2) least and greatest of each state; graze : (3,)
-    smallest penetration, nearest miss, undecided tangencies; clipped : (1,) time spent clipped.
-    """
+    """What ``advance`` writes."""
 
     strobes: Float
+    """(stretches + 1, n) states at the start and after each stretch."""
     impacts: Int
+    """(stretches, c, 2) impacts in each stretch, lower stop, then upper."""
     when: Float
+    """(capacity,) time of each impact."""
     at: Float
+    """(capacity, n) state at each impact."""
     stop: Int
+    """(capacity, 2) clearance and side of each impact."""
     extremes: Float
+    """(n, 2) least and greatest value of each state."""
     graze: Float
+    """(3,) smallest penetration, nearest miss, undecided tangencies."""
     clipped: Float
+    """(1,) time spent clipped."""
 
 
 @compiled

@@ -74,9 +74,10 @@ ROOM = 84
 
 
 class ModalTables(NamedTuple):
-    """data : (3 · WIDTH,), mode 0 open, 1 upper contact, 2 lower contact; see the columns above."""
+    """What the modal kernel knows of the three modes."""
 
     data: Float
+    """(3 · WIDTH,) values; mode 0 open, 1 upper contact, 2 lower contact; see the columns above."""
 
 
 # ``m & 3`` and the like tell the compiler that an index is not negative: no wrap-around.

@@ -108,15 +108,16 @@ def _displacement(modes: dict[int, Mode], drive: Drive) -> tuple[Array, float, A
 
 @dataclass(frozen=True)
 class Oscillators:
-    """A mode's homogeneous motion: g = G x, x = back g, with y'' + p y' + q y = 0 twice in g.
-
-    factors : (p, q) of each; rate : largest modulus of an eigenvalue.
-    """
+    """A mode's homogeneous motion: g = G x, x = back g, with y'' + p y' + q y = 0 twice in g."""
 
     factors: list[tuple[float, float]]
+    """(p, q) factors of each pair of modal coordinates."""
     G: Array
+    """Matrix of the change to the modal coordinates, g = G x."""
     back: Array
+    """Matrix of the change to the states, x = back g."""
     rate: float
+    """Largest modulus of an eigenvalue."""
 
 
 def oscillators_of(A: Array) -> Oscillators | None:

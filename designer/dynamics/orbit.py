@@ -37,41 +37,42 @@ ANSWERS = frozenset(
 
 @dataclass(frozen=True)
 class Orbit:
-    """A steady response.
-
-    Parameters
-    ----------
-    status : see ``OrbitStatus``; n, p, q are 0 unless it is periodic, grazing or clipped.
-    n, p, q : least period in drive periods, impacts on the upper and on the lower stop in n.
-    start : (states,) state at a strobe of the orbit; mode : key of the mode that holds there.
-    extremes : (states, 2) least and greatest value of each state, refined.
-    impact_times, impact_velocities, impact_sides : (k,) over n periods, in order; velocity of the
-        moving state at entry; side 1 upper, -1 lower.
-    asymmetry : max |x(t + nT/2) + x(t)| over the peak of each state, worst state (n odd; else nan).
-    multipliers : (states,) Floquet multipliers, complex; empty where the engine has none.
-    lyapunov : largest exponent per unit of the system's time (nan where unknown).
-    penetration, miss : smallest penetration and nearest miss, in units of the moving state.
-    reason : why, where status is failed, not settled or diverged.
-    periods : drive periods that the search cost.
-    """
+    """A steady response."""
 
     status: OrbitStatus
+    """How the search for the response ended."""
     n: int = 0
+    """Least period in drive periods; 0 unless periodic, grazing or clipped."""
     p: int = 0
+    """Impacts on the upper stop in n drive periods."""
     q: int = 0
+    """Impacts on the lower stop in n drive periods."""
     start: Array = field(default_factory=lambda: np.zeros(0))
+    """(states,) state at a strobe of the orbit."""
     mode: tuple[int, ...] = ()
+    """Key of the mode that holds at ``start``."""
     extremes: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    """(states, 2) least and greatest value of each state, refined."""
     impact_times: Array = field(default_factory=lambda: np.zeros(0))
+    """(k,) times of the impacts over n periods, in order."""
     impact_velocities: Array = field(default_factory=lambda: np.zeros(0))
+    """(k,) velocity of the moving state at entry into contact."""
     impact_sides: Array = field(default_factory=lambda: np.zeros(0))
+    """(k,) side of each impact: 1 upper, -1 lower."""
     asymmetry: float = float("nan")
+    """Max |x(t + nT/2) + x(t)| over the peak of each state, worst state (n odd; else nan)."""
     multipliers: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    """(states,) Floquet multipliers, complex; empty where the engine has none."""
     lyapunov: float = float("nan")
+    """Largest exponent per unit of the system's time (nan where unknown)."""
     penetration: float = float("inf")
+    """Smallest penetration of all contacts, in units of the moving state."""
     miss: float = float("inf")
+    """Nearest approach to a stop without contact, in units of the moving state."""
     reason: str = ""
+    """Why, where the status is failed, not settled or diverged."""
     periods: int = 0
+    """Drive periods that the search cost."""
 
     @property
     def symmetric(self) -> bool | None:

@@ -35,41 +35,42 @@ ModeKey = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Guard:
-    """One way out of a mode.
-
-    C : (n,), D, e : the linear function C·x + D·u + e, negative while the mode lasts.
-    target : key of the mode that is entered when it becomes positive.
-    clearance : index of the clearance whose contact begins or ends here, or -1. Such guards are
-        scaled to displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop.
-    """
+    """One way out of a mode: the linear function C·x + D·u + e becomes positive there."""
 
     C: Array
+    """(n,) coefficients of the state."""
     D: float
+    """Coefficient of the drive."""
     e: float
+    """Constant term."""
     target: ModeKey
+    """Key of the mode that is entered when it becomes positive."""
     clearance: int = -1
+    """Index of the clearance whose contact begins or ends here, or -1. Such guards are scaled to
+    displacement; where contact begins, -(C·x + D·u + e) is the distance to the stop."""
 
 
 @dataclass(frozen=True)
 class Mode:
-    """The linear system that holds while no guard is positive.
-
-    A : (n, n); B, d : (n,); guards : ways out.
-    sides : for each clearance -1, 0 or 1: in contact with the lower stop, open, with the upper.
-    clipped : an element that ought to be linear is at its limit.
-    """
+    """The linear system x' = A x + B u + d that holds while no guard is positive."""
 
     A: Array
+    """(n, n) state matrix."""
     B: Array
+    """(n,) input vector."""
     d: Array
+    """(n,) constant term."""
     guards: tuple[Guard, ...]
+    """Ways out of the mode."""
     sides: tuple[int, ...]
+    """For each clearance -1, 0 or 1: in contact with the lower stop, open, with the upper."""
     clipped: bool = False
+    """Whether an element that ought to be linear is at its limit."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """u(t) = amplitude · sin(omega · t) + offset; omega in rad per unit of the system's time.
+    """The drive u(t) = amplitude · sin(omega · t) + offset.
 
     Raises
     ------
@@ -77,8 +78,11 @@ class Drive:
     """
 
     omega: float
+    """Angular frequency, in rad per unit of the system's time."""
     amplitude: float = 1.0
+    """Amplitude of the sine."""
     offset: float = 0.0
+    """Constant part of the drive."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.omega < np.inf):
@@ -94,27 +98,23 @@ class Drive:
 
 @dataclass
 class PiecewiseLinearSystem:
-    """Named states and a rule that builds the mode for a key.
-
-    Parameters
-    ----------
-    states : names of the n states.
-    build : called once for each key that is entered; raises KeyError for a key that cannot be.
-    start : key of the mode that holds near x = 0.
-    clearances : names of the clearances, in the order of ``Mode.sides``.
-    displacement : index of the state that moves in each clearance.
-    mirror : (n, n) M with x → M x, u → -u a symmetry of the system, or None.
-    working : keys of the modes that a board as it should be moves between, ``start`` first; the
-        fast path of circuits tabulates them.
-    """
+    """Named states and a rule that builds the mode for a key."""
 
     states: tuple[str, ...]
+    """Names of the n states."""
     build: Callable[[ModeKey], Mode]
+    """Called once for each key that is entered; raises KeyError for a key that cannot be."""
     start: ModeKey
+    """Key of the mode that holds near x = 0."""
     clearances: tuple[str, ...]
+    """Names of the clearances, in the order of ``Mode.sides``."""
     displacement: tuple[int, ...]
+    """Index of the state that moves in each clearance."""
     mirror: Array | None = None
+    """(n, n) M with x → M x, u → -u a symmetry of the system, or None."""
     working: tuple[ModeKey, ...] = ()
+    """Keys of the modes that a board as it should be moves between, ``start`` first; the fast path
+    of circuits tabulates them."""
     _modes: dict[ModeKey, Mode] = field(default_factory=dict, repr=False)
 
     @property

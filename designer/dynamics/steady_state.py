@@ -43,11 +43,14 @@ _STOPPED = {
 
 @dataclass(frozen=True)
 class Course:
-    """Drive periods: left out, kept and shown, and added at most where the motion is undecided."""
+    """How many drive periods a run towards a steady state takes."""
 
     settle: int = 500
+    """Drive periods that are left out at the start."""
     keep: int = 30
+    """Drive periods that are kept and shown."""
     patience: int = 4000
+    """Drive periods that are added at most while the motion is undecided."""
 
     @property
     def tangents(self) -> int:
@@ -57,30 +60,33 @@ class Course:
 
 @dataclass(frozen=True)
 class Steady:
-    """What a start leads to.
-
-    status : periodic, aperiodic, not settled or diverged; of a board also clipped (an op-amp is at
-    its limit). Never grazing: a count within rounding of a tangency is given as it was run.
-    n, p, q : 0 unless periodic. symmetric : None unless periodic. lyapunov : largest exponent per
-    unit of the system's time; of a periodic motion, by its multipliers. radius : largest modulus
-    of the multipliers (nan unless periodic). start : (states,) a strobe of the orbit, or where
-    the motion was left. end : (states,) strobe at the end of what is shown. minima : (keep,) least
-    first displacement in each period kept. velocities : (k,) of it where contact with the upper
-    stop begins, in those periods. periods : run in all.
-    """
+    """What a start leads to."""
 
     status: OrbitStatus
+    """Periodic, aperiodic, not settled or diverged; of a board also clipped (an op-amp is at its
+    limit). Never grazing: a count within rounding of a tangency is given as it was run."""
     n: int
+    """Least period in drive periods; 0 unless periodic."""
     p: int
+    """Impacts on the upper stop in n drive periods; 0 unless periodic."""
     q: int
+    """Impacts on the lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
+    """Whether the motion is its own mirror image; None unless periodic."""
     lyapunov: float
+    """Largest exponent per unit of the system's time; of a periodic motion, by its multipliers."""
     radius: float
+    """Largest modulus of the multipliers (nan unless periodic)."""
     start: Array
+    """(states,) a strobe of the orbit, or where the motion was left."""
     end: Array
+    """(states,) strobe at the end of what is shown."""
     minima: Array
+    """(keep,) least first displacement in each period kept."""
     velocities: Array
+    """(k,) first velocity where contact with the upper stop begins, in those periods."""
     periods: int
+    """Drive periods that were run in all."""
 
     @property
     def response(self) -> str:
@@ -92,12 +98,14 @@ class Steady:
 
 @dataclass(frozen=True)
 class DrivenSystem:
-    """A system under a drive: how to make its flow, its drive's period, the fast path's tables
-    (None: by the flow)."""
+    """A system under a drive."""
 
     flow: Callable[[], Flow]
+    """Makes the system's flow."""
     period: float
+    """Period of the drive, in the system's time."""
     tables: ModalTables | None = None
+    """Tables of the fast path; None where steady states are found by the flow."""
 
     def steady(self, x: Array, course: Course) -> Steady:
         """What the start x (states,) leads to.

@@ -19,14 +19,12 @@ STARTS = 20_000_000
 
 @dataclass
 class Budget:
-    """Work that a computation may take.
-
-    left : steps that are left; below 0 where the last run of a fast path took more. spent : steps
-    that were taken.
-    """
+    """Work that a computation may take."""
 
     left: float = RUN
+    """Steps that may still be taken; below 0 where the last run of a fast path took more."""
     spent: float = 0.0
+    """Steps that were taken."""
 
     def take(self, steps: float) -> None:
         """Count these."""

@@ -24,11 +24,14 @@ LEAST = 0.02
 
 @dataclass(frozen=True)
 class Entrant:
-    """work : CPU seconds [s] of one run of ``periods`` drive periods; nan where it failed."""
+    """One that runs against the clock."""
 
     name: str
+    """Name of the entrant."""
     periods: int
+    """Drive periods of one run."""
     work: Callable[[], float]
+    """Runs once and returns the CPU seconds that it took; nan where it failed."""
 
 
 def here(name: str, run: Callable[[int], object], periods: int) -> Entrant:

@@ -10,12 +10,16 @@ from designer.model.find_responses import ModelResponse
 
 @dataclass(frozen=True)
 class ResponseLabel:
-    """number : in the order of the model file, from 1. expected : n-p-q, None where nothing was."""
+    """Which wanted response of the model file."""
 
     number: int
+    """Number in the order of the model file, from 1."""
     omega: float
+    """Dimensionless frequency."""
     b: float
+    """Dimensionless clearance."""
     expected: str | None
+    """The wanted n-p-q; None where any was."""
 
     @classmethod
     def of(cls, number: int, response: ModelResponse) -> ResponseLabel:

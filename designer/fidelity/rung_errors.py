@@ -24,43 +24,54 @@ BOARD, EQUATIONS = "board", "equations"
 
 @dataclass(frozen=True)
 class RungError:
-    """One rung at one setting on one response.
-
-    response : n-p-q or status. seconds : CPU time of a drive period. gate : whether ngspice's
-    setting passed the numerics gate; None of what ngspice does not compute.
-    right : whether its n-p-q is the truth's (either twin), by truth. error : RMS difference of x1
-    over its peak; velocity : largest relative difference of an impact's velocity; both by truth,
-    nan where they do not apply. numerical : error against the exact flow of the rung's own
-    equations, or where there is none its own finest run; nan for what it is measured against.
-    """
+    """One rung at one setting on one response."""
 
     label: ResponseLabel
+    """The response that it is about."""
     rung: str
+    """Name of the rung."""
     level: str
+    """Name of the setting, alike for all responses."""
     settings: Mapping[str, Any]
+    """Settings of the solver."""
     response: str
+    """n-p-q or status that the rung shows."""
     reason: str
+    """Why there is no answer, or ""."""
     seconds: float
+    """CPU time of a drive period."""
     gate: bool | None
+    """Whether ngspice's setting passed the numerics gate; None of what ngspice does not compute."""
     right: Mapping[str, bool]
+    """Whether its n-p-q is the truth's (either twin), by truth."""
     error: Mapping[str, float]
+    """RMS difference of x1 over its peak, by truth; nan where it does not apply."""
     velocity: Mapping[str, float]
+    """Largest relative difference of an impact's velocity, by truth; nan where it does not
+    apply."""
     numerical: float
+    """Error against the exact flow of the rung's own equations, or where there is none its own
+    finest run; nan for what it is measured against."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """The board's. response : n-p-q or status. sure : whether its two finest steps show the same.
-    error, velocity : what they differ by. periodic : whether it has a period, impacts : and any
-    impacts in it, by truth."""
+    """What the board does, as computed at the finest steps."""
 
     label: ResponseLabel
+    """The response that it is about."""
     response: str
+    """n-p-q or status that the board shows."""
     sure: bool
+    """Whether its two finest steps show the same."""
     error: float
+    """RMS difference of x1 between its two finest steps, over its peak."""
     velocity: float
+    """Largest relative difference of an impact's velocity between its two finest steps."""
     periodic: Mapping[str, bool]
+    """Whether the motion has a period, by truth."""
     impacts: Mapping[str, bool]
+    """Whether it has a period and any impacts in it, by truth."""
 
 
 def compare(

@@ -22,12 +22,15 @@ PAPERS_STEP = 0.005
 
 @dataclass(frozen=True)
 class Rates:
-    """numbers (11,) : coefficients of x1, x1', x2, x2' in x1'', the same in x2'', the drive in
-    both, and the stop's stiffness over the first mass. low, high : where the stops are."""
+    """The numbers of the equations of motion."""
 
     numbers: Array
+    """(11,) coefficients of x1, x1', x2, x2' in x1'', the same in x2'', the drive in both, and the
+    stop's stiffness over the first mass."""
     low: float
+    """Place of the lower stop; -inf where there is none."""
     high: float
+    """Place of the upper stop; inf where there is none."""
 
     @classmethod
     def of(cls, model: Dimensionless) -> Rates:

@@ -59,37 +59,40 @@ BASELINE = 4
 
 @dataclass(frozen=True)
 class RungAnswer:
-    """What one rung at one setting says of a response.
-
-    level : names the setting alike for all responses. settings : of the solver. orbit : in model
-    units as far as it is used: n-p-q, status, impacts. shown : (n · POINTS,) first displacement in
-    model units; empty where there is none. seconds : CPU time of a drive period. reason : why there
-    is no answer. gate : whether ngspice's setting passed the numerics gate; None of other rungs.
-    """
+    """What one rung at one setting says of a response."""
 
     rung: str
+    """Name of the rung."""
     level: str
+    """Name of the setting, alike for all responses."""
     settings: dict[str, Any]
+    """Settings of the solver."""
     orbit: Orbit
+    """Orbit in model units as far as it is used: n-p-q, status, impacts."""
     shown: Array
+    """(n · POINTS,) first displacement in model units; empty where there is none."""
     seconds: float = float("nan")
+    """CPU time of a drive period."""
     reason: str = ""
+    """Why there is no answer."""
     gate: bool | None = None
+    """Whether ngspice's setting passed the numerics gate; None of other rungs."""
 
 
 @dataclass(frozen=True)
 class RungAnswers:
-    """A response on every rung.
-
-    subject : its nominal circuit. settings : those of ngspice with ideal op-amps that pass the
-    gate; None where none do. seconds : CPU time of a drive period at these, nan without.
-    """
+    """A response on every rung."""
 
     response: ModelResponse
+    """The response, and what the model shows."""
     subject: GateSubject
+    """The nominal circuit at the response."""
     answers: tuple[RungAnswer, ...]
+    """What each rung says of it."""
     settings: SolverSettings | None
+    """Settings of ngspice with ideal op-amps that pass the gate; None where none do."""
     seconds: float
+    """CPU time of a drive period at ``settings`` [s]; nan without."""
 
 
 @dataclass(frozen=True)

@@ -42,44 +42,56 @@ UNSURE = "the two finest steps of the board show different n-p-q, or none"
 
 @dataclass(frozen=True)
 class Cheapest:
-    """The cheapest rung that answers a question; of all responses where ``label`` is None.
+    """The cheapest rung that answers a question.
 
-    measured : the largest error with the truth's uncertainty, of this rung; for n-p-q the number of
-    responses it has wrong; nan where there is none to measure. shown : whether that keeps the
-    bound; where not, the rung is the one that comes nearest, or none where the truth is not sure.
-    seconds : CPU time of a drive period, summed over the responses. note : what else there is to
-    say. A question that does not arise has no rung, no setting and no answer (None), and the note
-    says why.
+    A question that does not arise has no rung, no setting and no answer (None), and the note says
+    why.
     """
 
     question: str
+    """What is asked of a rung."""
     of: str
+    """What the rung is measured against: the board, its equations, or ideal op-amps in ngspice."""
     label: ResponseLabel | None
+    """Which response; None for all responses together."""
     rung: str | None
+    """Name of the rung; None where there is none."""
     level: str | None
+    """Name of the setting; None where there is none."""
     bound: float
+    """Largest error that answers the question."""
     measured: float
+    """The largest error with the truth's uncertainty, of this rung; for n-p-q the number of
+    responses it has wrong; nan where there is none to measure."""
     shown: bool | None
+    """Whether that keeps the bound; where not, the rung is the one that comes nearest, or none
+    where the truth is not sure."""
     seconds: float
+    """CPU time of a drive period, summed over the responses [s]."""
     note: str = ""
+    """What else there is to say."""
 
 
 @dataclass(frozen=True)
 class TradedResponse:
-    """What was found of one response: its rows by rung and setting, the board's truth, and its
-    boards, or why none were asked (None where none were wanted)."""
+    """What was found of one response."""
 
     rows: tuple[RungError, ...]
+    """Its errors by rung and setting."""
     truth: Truth
+    """What the board does."""
     boards: BoardTrade | LeftOut | None = None
+    """Its yields on boards, or why none were asked; None where none were wanted."""
 
 
 @dataclass(frozen=True)
 class Trade:
-    """responses : in the order of the model file."""
+    """Time against accuracy, for every wanted response."""
 
     responses: tuple[TradedResponse, ...]
+    """What was found, in the order of the model file."""
     cheapest: tuple[Cheapest, ...]
+    """The cheapest rung for each question."""
 
 
 def trade(responses: Sequence[TradedResponse]) -> Trade:

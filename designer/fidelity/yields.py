@@ -38,27 +38,31 @@ class LeftOut:
     """A response of which no boards were asked, and why."""
 
     label: ResponseLabel
+    """The response that it is about."""
     reason: str
+    """Why no boards were asked."""
 
 
 @dataclass(frozen=True)
 class Tally:
-    """Counts of boards, which add up.
-
-    decided : by both engines. ok : by the exact circuit. gained, lost : boards that only ngspice
-    calls ok, and that only the exact circuit does. undecided : boards of which one of them does not
-    say whether they show the response. runs, periods : of ngspice, and their drive periods.
-    seconds : CPU time of the exact circuit.
-    """
+    """Counts of boards, which add up."""
 
     decided: int = 0
+    """Boards that both engines decided."""
     ok: int = 0
+    """Boards that the exact circuit calls ok."""
     gained: int = 0
+    """Boards that only ngspice calls ok."""
     lost: int = 0
+    """Boards that only the exact circuit calls ok."""
     undecided: int = 0
+    """Boards of which one of them does not say whether they show the response."""
     runs: int = 0
+    """Runs of ngspice."""
     periods: float = 0.0
+    """Drive periods of ngspice."""
     seconds: float = 0.0
+    """CPU time of the exact circuit [s]."""
 
     def __add__(self, other: Tally) -> Tally:
         return Tally(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
@@ -66,20 +70,24 @@ class Tally:
 
 @dataclass(frozen=True)
 class BoardTrade:
-    """One response on its boards; see ``Tally``.
-
-    boards : that both engines decided. periods : drive periods of ngspice for a board, mean.
-    seconds : CPU time of a board, by rung.
-    """
+    """One response on its boards; see ``Tally``."""
 
     label: ResponseLabel
+    """The response that it is about."""
     boards: int
+    """Boards that both engines decided."""
     ok: int
+    """Boards that the exact circuit calls ok."""
     gained: int
+    """Boards that only ngspice calls ok."""
     lost: int
+    """Boards that only the exact circuit calls ok."""
     undecided: int
+    """Boards of which one engine does not say whether they show the response."""
     periods: float
+    """Drive periods of ngspice for a board, mean."""
     seconds: dict[str, float] = field(default_factory=dict)
+    """CPU time of a board, by rung [s]."""
 
     @classmethod
     def of(cls, label: ResponseLabel, tally: Tally, spice: float) -> BoardTrade:

@@ -34,33 +34,46 @@ Swept = ModelSubject | BoardSubject
 
 @dataclass(frozen=True)
 class Request:
-    """The command line: numbers in the units that the swept parameter has, or texts with a unit.
-
-    over : None for ω, the generator's frequency with ``circuit``, or x1 with ``basins``. low, high,
-    steps : of it. second : (name, from, to, steps) of a map's or a basin's other axis. omega : the
-    drive's frequency where it is not swept; frequency : the same as text, such as "10 Hz", of the
-    mechanism or with ``circuit`` of the generator. periods : (left out, kept), None for the
-    defaults.
-    """
+    """The command line: numbers in the units that the swept parameter has, or texts with a unit."""
 
     over: str | None = None
+    """The parameter that is swept; None for ω, the generator's frequency with ``circuit``, or x1
+    with ``basins``."""
     low: float | str | None = None
+    """Least value of the swept parameter."""
     high: float | str | None = None
+    """Largest value of the swept parameter."""
     steps: int | None = None
+    """Number of values of the swept parameter."""
     omega: float | None = None
+    """Dimensionless frequency of the drive where it is not swept."""
     frequency: str | None = None
+    """Frequency of the drive as text, such as "10 Hz", of the mechanism or with ``circuit`` of the
+    generator."""
     down: bool = False
+    """Whether a track goes down."""
     up: bool = False
+    """Whether a track goes up."""
     starts: int | None = None
+    """Number of fixed starts at each value; None for none."""
     periods: int | None = None
+    """Drive periods that are left out; None for the default."""
     keep: int | None = None
+    """Drive periods that are kept; None for the default."""
     second: tuple[str, float | str, float | str, int] | None = None
+    """(name, from, to, steps) of a map's or a basin's other axis."""
     basins: bool = False
+    """Whether basins of attraction are asked for."""
     circuit: bool = False
+    """Whether the circuit is swept, and not the model."""
     points: bool = True
+    """Whether bifurcation points are sought."""
     jobs: int | None = None
+    """Workers; None for one a core."""
     overwrite: bool = False
+    """Whether files that the manifest lists may be replaced."""
     resume: bool = False
+    """Whether unfinished work goes on."""
 
     @property
     def kind(self) -> StageName:

@@ -22,9 +22,10 @@ NAMES = (COMPARISON, *COMPARISON_PICTURES)
 
 @dataclass(frozen=True)
 class ComparisonFiles:
-    """file : the object of ``compare.json``."""
+    """What a comparison wrote."""
 
     file: dict[str, Any]
+    """The JSON object of ``compare.json``."""
 
 
 def make(made: Synthesis, progress: Progress) -> ComparisonFiles:

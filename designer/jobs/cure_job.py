@@ -45,12 +45,14 @@ RULES = 5
 
 @dataclass(frozen=True)
 class CureResult:
-    """answer : the JSON object. reached : whether every response has the yield that was asked for,
-    within the budget. reused : whether the folder held the answer already."""
+    """What a cure answers."""
 
     answer: dict[str, Any]
+    """The JSON object."""
     reached: bool
+    """Whether every response has the yield that was asked for, within the budget."""
     reused: bool
+    """Whether the folder held the answer already."""
 
 
 def cure(

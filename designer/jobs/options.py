@@ -18,29 +18,38 @@ MOST_SAMPLES = 1_000_000
 
 @dataclass(frozen=True)
 class Options:
-    """Options of the verbs that write.
-
-    until, rung, tuned, reached, maps : as ``study.tolerance``. trimmed : whether the model file has
-    a trimmer fitted, whose layer every study has. cluster : address of a Dask
-    scheduler, or None. blamed : whether the blame is worked out; blame_budget : its steps, None
-    for ``blame_extent.BUDGET``. measured : list of boards that are studied instead of random ones.
-    """
+    """Options of the verbs that write."""
 
     seed: int = SEED
+    """Seed of the boards."""
     jobs: int | None = None
+    """Workers; None for one a core."""
     samples: int = SAMPLES
+    """Boards of a study."""
     overwrite: bool = False
+    """Whether files that the manifest lists may be replaced."""
     resume: bool = False
+    """Whether unfinished work goes on."""
     until: float | None = None
+    """Width that every interval shall have; None: the study stops at ``samples``."""
     rung: RungName = "auto"
+    """Which engine decides a study; "auto": it is chosen."""
     tuned: bool = False
+    """Whether boards are tuned too."""
     reached: bool = False
+    """Whether boards are powered up too."""
     trimmed: bool = False
+    """Whether the model file has a trimmer fitted, whose layer every study has."""
     maps: tuple[Over, ...] = ()
+    """Yield maps that are asked for."""
     cluster: str | None = None
+    """Address of a Dask scheduler, or None."""
     blamed: bool = True
+    """Whether the blame is worked out."""
     blame_budget: int | None = None
+    """Steps of the blame; None for ``blame_extent.BUDGET``."""
     measured: Path | None = None
+    """File of a list of boards that are studied instead of random ones."""
 
     def check(self) -> None:
         """InputError for a number that cannot be."""

@@ -39,10 +39,12 @@ NAME = "rules.json"
 
 @dataclass(frozen=True)
 class RulesAnswer:
-    """What the rules say of a design. kicad : version of the program that checked the board."""
+    """What the rules say of a design."""
 
     outcomes: tuple[RuleOutcome, ...]
+    """Every rule and what became of it."""
     kicad: str | None
+    """Version of the program that checked the board; None where it was not checked."""
 
     @property
     def passed(self) -> bool:

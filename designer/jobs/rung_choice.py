@@ -36,10 +36,12 @@ LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
 
 @dataclass(frozen=True)
 class RungChoice:
-    """rung : of a study. reason : one line for people; "" where nothing was measured."""
+    """The rung that a study takes, and why."""
 
     rung: RungName
+    """Which engine decides a study."""
     reason: str
+    """Why, in one line for people; "" where nothing was measured."""
 
 
 def choose(folder: Folder) -> RungChoice:

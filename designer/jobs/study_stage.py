@@ -47,13 +47,12 @@ SPICE_TIMEOUT = 900.0
 
 @dataclass(frozen=True)
 class Place:
-    """Where a study is in its folder.
-
-    stage : its name in the manifest. prefix : of the names of its files, "" or ending in "/".
-    """
+    """Where a study is in its folder."""
 
     stage: StageName = "study"
+    """Its name in the manifest."""
     prefix: str = ""
+    """Prefix of the names of its files, "" or ending in "/"."""
 
     def names(self, files: Iterable[str]) -> list[str]:
         """These files of a study, in its place."""
@@ -77,17 +76,24 @@ class Place:
 
 @dataclass
 class StudyStage:
-    """A study that is worked on. command : the command line that its report states. shown : is
-    given the answer once the yields stand, where blame or maps take time after that."""
+    """A study that is worked on."""
 
     folder: Folder
+    """The design folder."""
     place: Place
+    """Where in the folder the study is."""
     made: Synthesis
+    """The design with its model."""
     options: Options
+    """Options of the verb."""
     command: str
+    """The command line that its report states."""
     progress: Progress
+    """Told how far the work is."""
     shown: Callable[[Mapping[str, Any]], None]
+    """Called with the answer once the yields stand, where blame or maps take time after that."""
     design_seconds: float
+    """Wall time that the design took [s]."""
     early: bool = False
     """Whether the yields were shown."""
 
@@ -193,12 +199,14 @@ class StudyStage:
 
 @dataclass(frozen=True)
 class Help:
-    """What a study is helped by. pool : None where ngspice is not asked. runner : who computes
-    blocks."""
+    """What a study is helped by."""
 
     jobs: int
+    """Number of workers."""
     pool: SpicePool | None
+    """Runs ngspice; None where it is not asked."""
     runner: Runner
+    """Who computes blocks."""
 
     @classmethod
     @contextmanager

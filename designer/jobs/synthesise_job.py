@@ -45,19 +45,21 @@ from designer.yields.run_result import RunResult
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """What a verb answers: the JSON object, and whether the answer is yes.
-
-    folder : None where nothing was to be written. reused : whether the folder held the answer
-    already. result : None where it was reused. shown : whether what stands in the answer beside
-    blame and maps was shown before they were worked out.
-    """
+    """What a verb answers: the JSON object, and whether the answer is yes."""
 
     answer: dict[str, Any]
+    """The JSON object."""
     satisfied: bool
+    """Whether the answer is yes."""
     folder: Path | None
+    """The design folder; None where nothing was to be written."""
     reused: bool
+    """Whether the folder held the answer already."""
     result: RunResult | None = None
+    """Everything that was found; None where the answer was reused."""
     shown: bool = False
+    """Whether what stands in the answer beside blame and maps was shown before they were worked
+    out."""
 
 
 def model_file(path: Path) -> ModelFile:

@@ -48,12 +48,14 @@ RULES = 3
 
 @dataclass(frozen=True)
 class TradeExtent:
-    """How much is measured. boards : of each response, none where 0. levels : of ngspice's steps.
-    rounds : of timing."""
+    """How much is measured."""
 
     boards: int = TRADE_BOARDS
+    """Boards of each response; none where 0."""
     levels: tuple[tuple[float, float], ...] = LEVELS
+    """Levels of ngspice's steps."""
     rounds: int = ROUNDS
+    """Rounds of timing."""
 
 
 def measure(

@@ -21,42 +21,44 @@ Trim = Literal["none", "unfitted", "fitted"]
 
 @dataclass(frozen=True)
 class BoardSpec:
-    """What the board has; the defaults of a model file.
-
-    mounting : the cases that it takes. test_points : pads for the outputs. probe_resistor [Ω] :
-    between an output and its pad and pin. decoupling, bulk [F] : at each supply pin, and at the
-    supply connector. dc_trim : the footprints of the DC trim, and whether they are fitted.
-    input_protection : diodes at the driven summing nodes. bom : layouts in which the bill is
-    written beside ``bom.csv``.
-    """
+    """What the board has; the defaults of a model file."""
 
     mounting: Mounting = "mixed"
+    """The cases that it takes."""
     test_points: bool = True
+    """Whether the outputs have pads."""
     probe_resistor: float = 1e3
+    """Resistance between an output and its pad and pin [Ω]."""
     decoupling: float = 100e-9
+    """Capacitance at each supply pin [F]."""
     bulk: float = 10e-6
+    """Capacitance at the supply connector [F]."""
     dc_trim: Trim = "unfitted"
+    """Whether the DC trim has footprints, and whether these are fitted."""
     input_protection: bool = True
+    """Whether diodes protect the driven summing nodes."""
     bom: tuple[str, ...] = ("kicad", "jlcpcb")
+    """Layouts in which the bill is written beside ``bom.csv``."""
 
 
 @dataclass(frozen=True)
 class BoardChoice:
-    """A board for one design: what the model file says, and the figures that it depends on.
-
-    resistor_grade, capacitor_grade : of what is bought, fractions; grades : of the parts that are
-    bought at another one, by name; arrays : that take the places of single parts. diode : the
-    protection's, by its name in the catalogue. trim : largest DC [V] that the trim stands for, as
-    if the generator had it.
-    """
+    """A board for one design: what the model file says, and the figures that it depends on."""
 
     spec: BoardSpec = BoardSpec()
+    """What the model file says of the board."""
     resistor_grade: float = 0.01
+    """Grade of the resistors that are bought, a fraction."""
     capacitor_grade: float = 0.01
+    """Grade of the capacitors that are bought, a fraction."""
     diode: str = "1N4148"
+    """The protection's diode, by its name in the catalogue."""
     trim: float = 0.25
+    """Largest DC [V] that the trim stands for, as if the generator had it."""
     grades: Mapping[str, float] = field(default_factory=dict)
+    """Grades of the parts that are bought at another one, by name."""
     arrays: tuple[PartArray, ...] = ()
+    """Resistor arrays that take the places of single parts."""
 
     @classmethod
     def of(cls, circuit: CircuitSpec, board: BoardSpec | None = None) -> BoardChoice:
@@ -108,5 +110,8 @@ class PartArray:
     """One array on the bill, and the parts whose places its elements take."""
 
     name: str
+    """Its reference on the board."""
     bought: PartChoice
+    """The array that is bought."""
     parts: tuple[str, ...]
+    """Names of the parts whose places its elements take."""

@@ -40,40 +40,55 @@ _PART = re.compile(r"[RC][1-9][0-9]{0,3}", re.ASCII)
 
 @dataclass(frozen=True)
 class CircuitSpec:
-    """What the circuit is to be made of and how it is to be chosen; the defaults of a model file.
-
-    supply, saturation [V] (saturation None: the catalogue's); grades as fractions (0.01 is 1 %);
-    resistor_family, capacitor_family : names of the catalogue's families that parts are bought
-    from, or, each with ``!`` in front, of those that they are not; none: every family.
-    resistor_range [Ω], capacitor_range [F]; frequency [Hz] is the band for ω = 1. diode, reference:
-    parts of the rectifying dead zone. matched : groups of parts with equal values. preferred :
-    values [Ω or F] that do not count among the distinct ones. most_values : limit on distinct
-    values. slack : how much the error may exceed its least for fewer distinct values. composites :
-    resistors that may be two parts. side_conditions : those that are kept.
-    """
+    """What the circuit is to be made of and how it is to be chosen; the defaults of a model
+    file."""
 
     opamp: str = "TL074C"
+    """The op-amp's name in the catalogue."""
     supply: float = 15.0
+    """Supply of either rail, ± [V]."""
     saturation: float | None = None
+    """Output limit of the op-amps, ± [V]; None: the catalogue's."""
     resistors: tuple[str, ...] = ("E96",)
+    """E series that resistors are chosen from."""
     capacitors: tuple[str, ...] = ("E12",)
+    """E series that capacitors are chosen from."""
     resistor_grade: float = 0.01
+    """Grade of the resistors, a fraction (0.01 is 1 %)."""
     capacitor_grade: float = 0.01
+    """Grade of the capacitors, a fraction (0.01 is 1 %)."""
     resistor_range: tuple[float, float] = (1e3, 1e6)
+    """Least and largest resistance [Ω]."""
     capacitor_range: tuple[float, float] = (1e-9, 1e-6)
+    """Least and largest capacitance [F]."""
     frequency: tuple[float, float] = (50.0, 1000.0)
+    """Band for the frequency of ω = 1 [Hz]."""
     dead_zone: DeadZone = "saturation"
+    """Kind of the stage that makes the dead zone."""
     diode: str = "1N4148"
+    """The rectifying dead zone's diode, by its name in the catalogue."""
     reference: str = "LM4040C50"
+    """The rectifying dead zone's reference, by its name in the catalogue."""
     objective: Objective = "match"
+    """What the choice of parts is to make best."""
     matched: tuple[tuple[str, ...], ...] = ()
+    """Groups of parts with equal values."""
     preferred: tuple[float, ...] = ()
+    """Values [Ω or F] that do not count among the distinct ones."""
     most_values: int | None = None
+    """Limit on distinct values; None for none."""
     slack: float = 0.0
+    """How much the error may exceed its least for fewer distinct values."""
     composites: Names = False
+    """Resistors that may be two parts."""
     side_conditions: Names = True
+    """Side conditions that are kept."""
     resistor_family: tuple[str, ...] = ()
+    """Names of the catalogue's families that resistors are bought from, or, each with ``!`` in
+    front, of those that they are not; none: every family."""
     capacitor_family: tuple[str, ...] = ()
+    """Names of the catalogue's families that capacitors are bought from, or, each with ``!`` in
+    front, of those that they are not; none: every family."""
 
     @property
     def kept(self) -> frozenset[str]:

@@ -29,10 +29,12 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 class Uniform:
-    """Every value between ``low`` and ``high`` alike."""
+    """Every value between two limits is equally likely."""
 
     low: float
+    """Lower limit of the values."""
     high: float
+    """Upper limit of the values."""
 
     def ppf(self, u: Array) -> Array:
         return self.low + (self.high - self.low) * u
@@ -43,10 +45,12 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal about 0 with this ``sigma``, cut at ± ``limit``: what lies beyond was sorted out."""
+    """Normal about 0 and cut: what lies beyond was sorted out."""
 
     sigma: float
+    """Standard deviation before the cut."""
     limit: float = 1.0
+    """The cut lies at ± this."""
 
     def ppf(self, u: Array) -> Array:
         if self.sigma == 0.0:
@@ -65,10 +69,12 @@ class Normal:
 
 @dataclass(frozen=True)
 class Binned:
-    """Uniform within ± ``outer`` but never within ± ``inner``: the better grade was picked out."""
+    """Uniform about 0 without a middle part: the better grade was picked out."""
 
     inner: float
+    """No value lies within ± this."""
     outer: float = 1.0
+    """Every value lies within ± this."""
 
     def ppf(self, u: Array) -> Array:
         away = (self.outer - self.inner) * np.abs(2.0 * u - 1.0) + self.inner
@@ -80,12 +86,17 @@ class Binned:
 
 @dataclass(frozen=True)
 class Split:
-    """Half of the values uniform between ``low`` and ``middle``, half between it and ``high``: all
-    that the minimum, typical and maximum of a data sheet say."""
+    """Half of the values lie uniformly on one side of a middle, half on the other.
+
+    This is all that the minimum, typical and maximum of a data sheet say.
+    """
 
     low: float
+    """Lower limit of the values."""
     middle: float
+    """Half of the values lie below it."""
     high: float
+    """Upper limit of the values."""
 
     def ppf(self, u: Array) -> Array:
         below = self.low + (self.middle - self.low) * 2.0 * u

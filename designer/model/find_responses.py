@@ -28,18 +28,18 @@ SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
 
 @dataclass(frozen=True)
 class ModelResponse:
-    """A wanted response and what the model shows there.
-
-    spec : as wanted. b : the clearance it is wanted at. orbit : the wanted one, or the attractor
-    reached from rest where it was not found. others : coexisting attractors that were met.
-    found : whether it is what was wanted (always, where nothing was).
-    """
+    """A wanted response and what the model shows there."""
 
     spec: Response
+    """The response as wanted."""
     b: float
+    """The clearance it is wanted at."""
     orbit: Orbit
+    """The wanted orbit, or the attractor reached from rest where it was not found."""
     others: tuple[Orbit, ...]
+    """Coexisting attractors that were met."""
     found: bool
+    """Whether it is what was wanted (always, where nothing was)."""
 
     @property
     def omega(self) -> float:
@@ -166,15 +166,14 @@ def _with_twin(flow: Flow, orbit: Orbit, spec: Response) -> list[Orbit]:
 
 @dataclass(frozen=True)
 class Peaks:
-    """What the circuit has to hold, in model units.
-
-    states : (4,) peaks of x1, x1', x2, x2' over all wanted responses and the starts from rest.
-    penetration : the deepest of a stop. excursion : largest |x1| on the side that has no stop; 0
-    with stops on both. fastest : angular frequency of the highest harmonic that
-    matters in the velocities (``harmonics.fastest``).
-    """
+    """What the circuit has to hold, in model units."""
 
     states: Array
+    """(4,) peaks of x1, x1', x2, x2' over all wanted responses and the starts from rest."""
     penetration: float
+    """The deepest penetration of a stop."""
     excursion: float = 0.0
+    """Largest |x1| on the side that has no stop; 0 with stops on both."""
     fastest: float = 0.0
+    """Angular frequency of the highest harmonic that matters in the velocities
+    (``harmonics.fastest``)."""

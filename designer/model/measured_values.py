@@ -40,19 +40,20 @@ _PARTS = "a part such as R203, C1, VR1, VCC, U1A.offset, U1A.high, U1A.low, U1A.
 
 @dataclass(frozen=True)
 class MeasuredBoards:
-    """Measured values of one board or several.
-
-    boards : their names in the file's order; one without a name where there is no column for it.
-    values : (boards,) by quantity, in SI units; nan where a board's was not measured. tolerances :
-    (boards,) half-widths in the same units. lines : where each quantity first stands.
-    """
+    """Measured values of one board or several."""
 
     boards: tuple[str, ...]
+    """The boards' names in the file's order; one without a name where there is no column for it."""
     values: Mapping[str, tuple[float, ...]]
+    """(boards,) values by quantity, in SI units; nan where a board's was not measured."""
     tolerances: Mapping[str, tuple[float, ...]]
+    """(boards,) half-widths by quantity, in the same units."""
     content: bytes = field(repr=False)
+    """Content of the file, byte by byte."""
     source: Path | None = None
+    """The file that it was read from."""
     lines: Mapping[str, int] = field(default_factory=dict)
+    """Line on which each quantity first stands."""
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -17,12 +17,16 @@ from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLi
 
 @dataclass(frozen=True)
 class Clearance:
-    """Stops of ``stiffness`` at ± ``gap`` from the rest position of mass number ``mass``."""
+    """Stops that a mass meets at a distance from its rest position."""
 
     mass: int
+    """Index of the mass."""
     stiffness: float
+    """Stiffness of a stop."""
     gap: float
+    """Distance of a stop from the rest position."""
     sides: Literal["both", "upper", "lower"] = "both"
+    """The stops that exist."""
 
     @property
     def positions(self) -> tuple[int, ...]:
@@ -32,13 +36,18 @@ class Clearance:
 
 @dataclass(frozen=True)
 class SecondOrderSystem:
-    """mass, force : (n,); damping, stiffness : (n, n); clearances on any of the masses."""
+    """Masses, dampers and springs with stops, driven by one force."""
 
     mass: Array
+    """(n,) masses."""
     damping: Array
+    """(n, n) damping matrix."""
     stiffness: Array
+    """(n, n) stiffness matrix."""
     force: Array
+    """(n,) amplitude of the force on each mass."""
     clearances: tuple[Clearance, ...]
+    """The clearances, on any of the masses."""
 
     @property
     def size(self) -> int:

@@ -31,9 +31,7 @@ period, comes to no end (docs/stability.md)."""
 
 @dataclass(frozen=True)
 class Dimensionless:
-    """Dimensionless parameters, Eq. (3).
-
-    m, k in (0, 1); k0, c in [0, 1); zeta > 0; f20 in [0, 1]; b > 0; and within ``TRIED``.
+    """Dimensionless parameters, Eq. (3). Each lies in its domain and within ``TRIED``.
 
     Raises
     ------
@@ -41,13 +39,21 @@ class Dimensionless:
     """
 
     m: float
+    """Mass ratio M2/(M1 + M2), in (0, 1)."""
     k: float
+    """Stiffness ratio K2/(K1 + K2), in (0, 1)."""
     k0: float
+    """Stop stiffness ratio K0/(K0 + K1), in [0, 1)."""
     c: float
+    """Damping ratio C2/(C1 + C2), in [0, 1)."""
     zeta: float
+    """Damping C1/(2 sqrt(K1 M1)), > 0."""
     f20: float
+    """Share of the force on the second mass P2/(P1 + P2), in [0, 1]."""
     b: float
+    """Clearance B K1/(P1 + P2), > 0."""
     sides: Sides = "both"
+    """The stops that exist."""
 
     def __post_init__(self) -> None:
         domains = {
@@ -105,22 +111,30 @@ def _close(value: float) -> str:
 
 @dataclass(frozen=True)
 class Mechanical:
-    """Parameters of Eq. (1)-(2) in SI units.
-
-    M1, M2 [kg]; C1, C2 [N s/m]; K0, K1, K2 [N/m]; B [m]; P1, P2 [N].
-    """
+    """Parameters of Eq. (1)-(2) in SI units."""
 
     M1: float
+    """Mass that carries the clearance [kg]."""
     M2: float
+    """Second mass [kg]."""
     C1: float
+    """Damping between the masses [N s/m]."""
     C2: float
+    """Damping between the second mass and ground [N s/m]."""
     K0: float
+    """Stiffness of the stops [N/m]."""
     K1: float
+    """Stiffness between the masses [N/m]."""
     K2: float
+    """Stiffness between the second mass and ground [N/m]."""
     B: float
+    """Distance of a stop from the rest position [m]."""
     P1: float
+    """Amplitude of the force on the first mass [N]."""
     P2: float
+    """Amplitude of the force on the second mass [N]."""
     sides: Sides = "both"
+    """The stops that exist."""
 
     def __post_init__(self) -> None:
         strictly = {"M1", "M2", "C1", "K1", "K2", "B"}

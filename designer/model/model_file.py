@@ -62,26 +62,34 @@ MAX_BYTES = 1_000_000
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file that has passed every check.
-
-    ``model`` is always filled, from ``mechanical`` where that is what the file gives; ``text`` is
-    the file word for word. measured : the list that ``spread.measured`` names; read with the file.
-    rules : other limits of design rules, by their ids.
-    """
+    """A model file that has passed every check."""
 
     title: str
+    """The title that it gives."""
     model: Dimensionless
+    """Dimensionless parameters, made from ``mechanical`` where that is what the file gives."""
     mechanical: Mechanical | None
+    """Parameters in SI units, where the file gives these."""
     responses: tuple[Response, ...]
+    """The wanted responses."""
     circuit: CircuitSpec
+    """What the circuit is to be made of."""
     text: str = field(repr=False)
+    """The file word for word."""
     source: Path | None = None
+    """The file that it was read from; None where it was none."""
     spread: SpreadSpec = BENCH_1
+    """How the boards of a study differ."""
     measured: MeasuredBoards | None = None
+    """The list that ``spread.measured`` names; read with the file."""
     tuning: Bands = field(default_factory=Bands)
+    """The bands that the generator may be tuned in."""
     board: BoardSpec = field(default_factory=BoardSpec)
+    """What the board has."""
     rules: Mapping[str, Override] = field(default_factory=dict, hash=False)
+    """Other limits of design rules, by their ids."""
     search: SearchSpec = field(default_factory=SearchSpec)
+    """What a search may change."""
 
     @property
     def sha256(self) -> str:

@@ -24,11 +24,14 @@ _EXPECT = re.compile(r"([1-9]\d?)-(0|[1-9]\d{0,3})-(0|[1-9]\d{0,3})", re.ASCII)
 
 @dataclass(frozen=True)
 class Expect:
-    """An n-p-q response: n forcing periods, p impacts at +b and q at -b in that time."""
+    """An n-p-q response."""
 
     n: int
+    """Least period, in forcing periods."""
     p: int
+    """Impacts at the upper stop in n forcing periods."""
     q: int
+    """Impacts at the lower stop in n forcing periods."""
 
     def __str__(self) -> str:
         return f"{self.n}-{self.p}-{self.q}"
@@ -50,21 +53,19 @@ class Expect:
 
 @dataclass(frozen=True)
 class Response:
-    """A response that the board shall show.
-
-    omega : dimensionless frequency; None for "best": the tool chooses it.
-    expect : the wanted n-p-q, or None where any is of interest.
-    twin : "either" accepts the mirror twin of ``expect`` as well; "exact" does not.
-    symmetric : whether the orbit has to be symmetric (True), asymmetric (False) or either (None).
-    b : clearance at which this response is wanted: a value, a range to choose from, or None for
-        the model's own.
-    """
+    """A response that the board shall show."""
 
     omega: float | None
+    """Dimensionless frequency; None for "best": the tool chooses it."""
     expect: Expect | None = None
+    """The wanted n-p-q, or None where any is of interest."""
     twin: Twin = "either"
+    """"either" accepts the mirror twin of ``expect`` as well; "exact" does not."""
     symmetric: bool | None = None
+    """Whether the orbit has to be symmetric (True), asymmetric (False) or either (None)."""
     b: float | tuple[float, float] | None = None
+    """Clearance at which this response is wanted: a value, a range to choose from, or None for the
+    model's own."""
 
     def accepts(self, n: int, p: int, q: int) -> bool:
         """Whether n-p-q is what is expected here; without an expectation, anything is."""

@@ -15,17 +15,16 @@ DEAD_ZONES: tuple[DeadZone, ...] = ("saturation", "rectifier")
 
 @dataclass(frozen=True)
 class SearchSpec:
-    """What a search may change.
-
-    omega : dimensionless band in which ``omega = "best"`` is sought. match_error :
-    largest coefficient error that a design may have. opamps : names of the catalogue; the file's
-    own if empty. dead_zones : kinds of stage.
-    """
+    """What a search may change."""
 
     omega: tuple[float, float] = (0.15, 2.0)
+    """Dimensionless band in which ``omega = "best"`` is sought."""
     match_error: float = 0.005
+    """Largest coefficient error that a design may have."""
     opamps: tuple[str, ...] = ()
+    """Names of op-amps in the catalogue that may be tried; the file's own if empty."""
     dead_zones: tuple[DeadZone, ...] = DEAD_ZONES
+    """Kinds of dead-zone stage that may be tried."""
 
 
 def _band() -> Accepts:

@@ -59,7 +59,7 @@ class Reader:
     mechanical: Mechanical | None = None
     """What texts with SI units are of; None: they are refused."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Of a board, the units that plain numbers have, by parameter."""
+    """Units that plain numbers of a board have, by parameter."""
 
     def frequency(self, option: str, text: str) -> float:
         """The dimensionless frequency of a text such as "10 Hz".

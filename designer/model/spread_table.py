@@ -26,15 +26,14 @@ ABSOLUTE_ZERO = -273.15
 
 @dataclass(frozen=True)
 class SpreadShape:
-    """How parts lie within their grade.
-
-    ``uniform``; ``normal``: σ = grade/sigmas, cut at the grade; ``binned``: uniform, without those
-    within ± ``inner`` (a fraction, as a grade is), which were picked out.
-    """
+    """How parts lie within their grade."""
 
     law: LawName = "uniform"
+    """"uniform", "normal" (cut at the grade) or "binned" (uniform without the middle)."""
     sigmas: float = 3.0
+    """Standard deviations that the grade is of the normal law."""
     inner: float = 0.0
+    """No part lies within ± this, a fraction as a grade is: these were picked out ("binned")."""
 
     def of(self, grade: float) -> Law:
         """The relative deviation of parts of this grade."""
@@ -51,60 +50,78 @@ class SpreadShape:
 
 @dataclass(frozen=True)
 class Offset:
-    """Normal with ``sigma`` [V], cut at ± ``limit`` [V]."""
+    """Offsets that are normal about 0 and cut."""
 
     sigma: float
+    """Standard deviation before the cut [V]."""
     limit: float
+    """The cut lies at ± this [V]."""
 
 
 @dataclass(frozen=True)
 class PartRule:
-    """What the parts of these names (or of a kind: "resistors") have of their own; None: as the
-    others. tempco [1/K] and ageing (relative) : lowest and highest."""
+    """What some parts have of their own; None: as the others."""
 
     names: tuple[str, ...]
+    """Names of the parts, or of a kind: "resistors"."""
     grade: float | None = None
+    """Their grade, a fraction."""
     law: SpreadShape | None = None
+    """How they lie within their grade."""
     tempco: tuple[float, float] | None = None
+    """Lowest and highest temperature coefficient [1/K]."""
     ageing: tuple[float, float] | None = None
+    """Lowest and highest relative change by ageing."""
 
 
 @dataclass(frozen=True)
 class NetworkRule:
-    """Parts of one network; ``share`` of a deviation is common to them. family : of the catalogue's
-    arrays that they are bought as, which then says their share and their grade."""
+    """Parts of one network."""
 
     parts: tuple[str, ...]
+    """Names of the parts."""
     share: float | None = None
+    """Share of a part's deviation that is common to all of them."""
     family: str | None = None
+    """Family of the catalogue's arrays that they are bought as, which then says their share and
+    their grade."""
 
 
 @dataclass(frozen=True)
 class SpreadSpec:
-    """How the boards of a study differ; the defaults are ``bench-1``.
-
-    resistors, capacitors : how they lie within their grade. offset : None: the catalogue's.
-    saturation, supply : half-widths, fractions. bias [A], gain_bandwidth [Hz] : the typical figure,
-    what the data sheet gives, or lowest and highest. reference_grade : a fraction; None: the
-    catalogue's. temperature : of the board [°C]. ageing : relative, of resistors and capacitors;
-    "catalogue" : each ± its family's drift.
-    reels : what parts of one value have in common. measured : file of a bench's list.
-    """
+    """How the boards of a study differ; the defaults are ``bench-1``."""
 
     resistors: SpreadShape = SpreadShape()
+    """How resistors lie within their grade."""
     capacitors: SpreadShape = SpreadShape()
+    """How capacitors lie within their grade."""
     offset: Offset | None = None
+    """Distribution of the op-amps' offsets; None: the catalogue's."""
     saturation: float = 0.05
+    """Half-width of the output limits, a fraction."""
     bias: DataSheet | tuple[float, float] = "typical"
+    """Input bias current [A]: the typical figure, what the data sheet gives, or lowest and
+    highest."""
     gain_bandwidth: DataSheet | tuple[float, float] = "typical"
+    """Gain-bandwidth product [Hz]: the typical figure, what the data sheet gives, or lowest and
+    highest."""
     supply: float = 0.0
+    """Half-width of the rails, a fraction."""
     reference_grade: float | None = None
+    """Tolerance of the references, a fraction; None: the catalogue's."""
     temperature: tuple[float, float] | None = None
+    """Lowest and highest temperature of the board [°C]."""
     ageing: Literal["catalogue"] | tuple[float, float] | None = None
+    """Lowest and highest relative change of resistors and capacitors; "catalogue": each ± its
+    family's drift."""
     reels: float = 0.0
+    """Share of a deviation that parts of one value, from one reel, have in common."""
     network: tuple[NetworkRule, ...] = ()
+    """Parts that stand in one network."""
     part: tuple[PartRule, ...] = ()
+    """What some parts have of their own."""
     measured: str | None = None
+    """Name of the file with a bench's list of measured values; None for none."""
 
 
 BENCH_1 = SpreadSpec()

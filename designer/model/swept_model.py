@@ -27,21 +27,23 @@ MODEL_PARAMETERS = ("omega", "b", "k0", "zeta", "m", "k", "c", "f20")
 
 @dataclass
 class ModelSubject:
-    """A model at drive frequency omega (None: it has to be among the changes).
-
-    parameters : names of what can be swept. states : names. units : by parameter, and by "x", "v"
-    and "λ" for the axes of a diagram; none where dimensionless. mechanical : the SI values that
-    the model was made from, if it was.
-    """
+    """A model at one drive frequency, whose parameters can be swept."""
 
     whose: ClassVar[str] = "model"
     model: Dimensionless
+    """The model in dimensionless parameters."""
     omega: float | None = None
+    """Dimensionless drive frequency; None: it has to be among the changes."""
     parameters: tuple[str, ...] = MODEL_PARAMETERS
+    """Names of what can be swept."""
     states: tuple[str, ...] = ("x1", "x1'", "x2", "x2'")
+    """Names of the states."""
     units: Mapping[str, str] = field(default_factory=dict)
+    """Unit by parameter, and by "x", "v" and "λ" for the axes of a diagram; none where
+    dimensionless."""
     _batch: ModalBatch = field(default_factory=ModalBatch, repr=False)
     mechanical: Mechanical | None = None
+    """The SI values that the model was made from, if it was."""
 
     @property
     def si(self) -> dict[str, Unit]:

@@ -9,8 +9,7 @@ from designer.base.errors import InputError
 
 @dataclass(frozen=True)
 class Bands:
-    """Half-widths, as fractions: of the frequency and the amplitude in ``setup.csv``, and of that
-    amplitude for the DC offset.
+    """Half-widths of the bands that the generator may be tuned in, as fractions.
 
     Raises
     ------
@@ -18,8 +17,11 @@ class Bands:
     """
 
     frequency: float = 0.05
+    """Half-width over the frequency in ``setup.csv``."""
     amplitude: float = 0.10
+    """Half-width over the amplitude in ``setup.csv``."""
     offset: float = 0.05
+    """Half-width of the DC offset, over the amplitude in ``setup.csv``."""
 
     def __post_init__(self) -> None:
         for name, most in (("frequency", 1.0), ("amplitude", 1.0), ("offset", float("inf"))):

@@ -40,28 +40,34 @@ DC_REACH = 2.0
 
 @dataclass(frozen=True)
 class CircuitExtent:
-    """How much is done; the defaults are the report's.
-
-    p : responses. circuits : of ``CIRCUITS``. patterns : of signs. clocked : p of the responses on
-    which methods are timed; rounds : how often.
-    """
+    """How much is done; the defaults are the report's."""
 
     p: tuple[int, ...] = tuple(OMEGA)
+    """p of the responses that are compared."""
     circuits: tuple[str, ...] = CIRCUITS
+    """Names of those of ``CIRCUITS`` that are compared."""
     patterns: int = offsets.PATTERNS
+    """Patterns of the offsets' signs."""
     clocked: tuple[int, ...] = (1, 3, 8)
+    """p of the responses on which methods are timed."""
     rounds: int = circuit_clock.ROUNDS
+    """How often each method is timed."""
 
 
 @dataclass(frozen=True)
 class PaperBench:
-    """What every piece needs. jobs : threads and workers."""
+    """What every piece needs."""
 
     catalog: Catalog
+    """The catalogue."""
     found: tuple[ModelResponse, ...]
+    """The paper's responses, and what the model shows."""
     extent: CircuitExtent
+    """How much of the report is done."""
     jobs: int
+    """Number of threads and workers."""
     progress: Progress
+    """Told how far the work is."""
 
     @classmethod
     def of(

@@ -47,14 +47,18 @@ CLAIM = 1.0 / 3.0
 
 @dataclass(frozen=True)
 class Method:
-    """seconds : CPU time of a drive period, median of the rounds. ratio : of it to ``BASE`` in the
-    same round, median. error : RMS of x1 over a drive period, over its peak; nan without a run."""
+    """What one method of integration costs, and its error."""
 
     name: str
+    """Name of the method."""
     setting: str
+    """Setting of the method, as text."""
     seconds: float
+    """CPU time of a drive period, median of the rounds."""
     ratio: float
+    """CPU time over that of ``BASE`` in the same round, median."""
     error: float
+    """RMS of x1 over a drive period, over its peak; nan without a run."""
 
 
 @dataclass(frozen=True)

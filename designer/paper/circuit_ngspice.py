@@ -27,16 +27,18 @@ DISPLACEMENT = "v1"
 
 @dataclass(frozen=True)
 class NgspiceResponse:
-    """One response in ngspice, with the settings that passed the gate.
-
-    trace : (n · FINE + 1, 4) states in model units from a strobe on; empty where there is none.
-    """
+    """One response in ngspice, with the settings that passed the gate."""
 
     response: str
+    """n-p-q or status that ngspice shows."""
     passed: bool
+    """Whether settings passed the gate."""
     reason: str
+    """Why there is no answer, or ""."""
     steps: int
+    """Steps a drive period."""
     trace: Array
+    """(n · FINE + 1, 4) states in model units from a strobe on; empty where there is none."""
 
     @property
     def displacement(self) -> Array:

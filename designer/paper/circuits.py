@@ -43,16 +43,17 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Built:
-    """A circuit with its generator and the scales that carry it over to the model.
-
-    errors : None where a coefficient has the wrong sign, ``reason`` says which; volts (states,)
-    are then those that were given instead.
-    """
+    """A circuit with its generator and the scales that carry it over to the model."""
 
     candidate: ComparedCircuit
+    """The circuit with its generator's settings."""
     errors: CoefficientErrors | None
+    """Errors of its coefficients; None where one has the wrong sign."""
     reason: str
+    """Which coefficient has the wrong sign, or ""."""
     volts: Array
+    """(states,) volts per unit of each model state; where a coefficient has the wrong sign, those
+    that were given."""
 
     @property
     def circuit(self) -> Circuit:
@@ -69,17 +70,18 @@ class Built:
 
 @dataclass(frozen=True)
 class SettledResponse:
-    """What a circuit settles on, from the model's orbit of one response.
-
-    kept : whether that is the wanted n-p-q. error : RMS difference of x1 from the model's, over its
-    peak, nan where the periods differ.
-    """
+    """What a circuit settles on, from the model's orbit of one response."""
 
     omega: float
+    """Dimensionless frequency."""
     expected: str
+    """The wanted n-p-q."""
     orbit: Orbit
+    """The orbit that it settles on."""
     kept: bool
+    """Whether it settles on the wanted n-p-q."""
     error: float
+    """RMS difference of x1 from the model's, over its peak, nan where the periods differ."""
 
 
 def model_with(zone: DeadZone) -> ModelFile:

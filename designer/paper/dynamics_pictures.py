@@ -25,15 +25,16 @@ COLOURS = ("#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#7f3fbf")
 
 @dataclass(frozen=True)
 class Portrait:
-    """An orbit in the plane (x1, x1'), and its mirror twin where it has one of its own.
-
-    title : above the panel. b : clearance. orbit, twin : (points, 2) closed curves.
-    """
+    """An orbit in the plane (x1, x1'), and its mirror twin where it has one of its own."""
 
     title: str
+    """Title above the panel."""
     b: float
+    """Dimensionless clearance."""
     orbit: Array
+    """(points, 2) closed curve."""
     twin: Array | None
+    """(points, 2) closed curve of the mirror twin; None where it has none of its own."""
 
 
 def branches(found: Survey, low: float, high: float) -> Figure:

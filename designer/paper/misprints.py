@@ -23,16 +23,20 @@ MUCH_LESS = 0.1
 
 @dataclass(frozen=True)
 class Misprint:
-    """where, printed, right : as in docs/errata.md. note : how the print is read, where that is not
-    plain. build : the circuit with this misprint alone; None where it reaches no part. run :
-    whether its responses are computed."""
+    """A misprint of the paper, by docs/errata.md."""
 
     where: str
+    """Where in the paper it stands."""
     printed: str
+    """What the paper prints."""
     right: str
+    """What ought to be printed."""
     note: str = ""
+    """How the print is read, where that is not plain."""
     build: Callable[[Catalog], ComparedCircuit] | None = None
+    """The circuit with this misprint alone; None where it reaches no part."""
     run: bool = True
+    """Whether the responses of the circuit with this misprint are computed."""
 
 
 def corrected(catalog: Catalog) -> ComparedCircuit:

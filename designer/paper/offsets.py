@@ -29,18 +29,20 @@ PATTERNS = 512
 
 @dataclass(frozen=True)
 class Shift:
-    """One response with offsets of one size [V]: verdicts over the sign patterns.
-
-    there : whether the nominal circuit shows the response; where not, nothing is counted.
-    to : what the boards that lose it show, and on how many patterns, most frequent first.
-    """
+    """One response with offsets of one size: verdicts over the sign patterns."""
 
     omega: float
+    """Dimensionless frequency."""
     expected: str
+    """The wanted n-p-q."""
     size: float
+    """Size of the offsets [V]."""
     there: bool
+    """Whether the nominal circuit shows the response; where not, nothing is counted."""
     counted: Yield
+    """Counts of the sign patterns."""
     to: tuple[tuple[str, int], ...]
+    """What the boards that lose it show, and on how many patterns, most frequent first."""
 
 
 def signs(sections: int, most: int = PATTERNS) -> Array:

@@ -82,11 +82,17 @@ class DynamicsExtent:
     """How much is done; the defaults are the report's."""
 
     low: float = LOW
+    """Least ω to which branches are followed."""
     high: float = HIGH
+    """Largest ω to which branches are followed."""
     depth: int = DEPTH
+    """Branch switches in a row."""
     figures: tuple[str, ...] = tuple(FIGURES)
+    """Names of those of ``FIGURES`` that are drawn."""
     shared: tuple[float, ...] = SHARED
+    """ω at which coexisting attractors are looked for."""
     chatter: tuple[float, ...] = CHATTER
+    """ω at which the impacts of the response from rest are counted."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +100,20 @@ class Dynamics:
     """Everything that was found."""
 
     found: Survey
+    """The branches, with their bifurcation points."""
     windows: tuple[BranchWindow, ...]
+    """The windows in which responses are stable."""
     cascades: Mapping[int, Cascade]
+    """Period-doubling cascades by p of the main window."""
     after: Mapping[tuple[int, str], str]
+    """Response right beyond an end of a main window, by its p and "S low", "S high", "AS low" or
+    "AS high"."""
     shared: Mapping[float, tuple[str, ...]]
+    """By ω, the coexisting responses."""
     chatter: tuple[tuple[float, Orbit], ...]
+    """(ω, orbit) of the response from rest."""
     statements: tuple[Statement, ...]
+    """What the paper says, and what was found."""
 
 
 def reproduce(

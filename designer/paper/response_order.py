@@ -24,16 +24,19 @@ STEPS = 61
 
 @dataclass(frozen=True)
 class Gap:
-    """From the main window of 1-p-p (``high`` is its lower end) down to the next one's upper end.
-
-    p, after : of the two windows. seen : (ω, response) from rest, falling, inside the gap.
-    """
+    """From the main window of 1-p-p (``high`` is its lower end) down to the next one's upper
+    end."""
 
     p: int
+    """p of the upper window."""
     after: int
+    """p of the next window down."""
     low: float
+    """Upper end of the next window."""
     high: float
+    """Lower end of the upper window."""
     seen: tuple[tuple[float, str], ...]
+    """(ω, response) seen from rest, falling, inside the gap."""
 
     @property
     def chaotic(self) -> int:

@@ -28,13 +28,16 @@ SWEEP = "designer bifurcation examples/paper.toml"
 
 @dataclass(frozen=True)
 class Statement:
-    """paper : what it says, and where. found : here. verdict : "agrees", "in part" or "disagrees".
-    command : that shows it."""
+    """A statement of the paper, against what is found here."""
 
     paper: str
+    """What the paper says, and where."""
     found: str
+    """What is found here."""
     verdict: str
+    """"agrees", "in part" or "disagrees"."""
     command: str
+    """The command line that shows it."""
 
     def as_dict(self) -> dict[str, object]:
         return dict(self.__dict__)

@@ -61,18 +61,22 @@ reference = "LM4040C50"
 
 @dataclass(frozen=True)
 class SpreadCase:
-    """A circuit under a spread. plan : of the responses that the nominal circuit shows.
-
-    asked : for each question its p. missing : by p, what the nominal circuit shows instead.
-    """
+    """A circuit under a spread."""
 
     circuit: str
+    """Name of the circuit."""
     resistor: float
+    """Grade of the resistors, a fraction."""
     capacitor: float
+    """Grade of the capacitors, a fraction."""
     offsets: bool
+    """Whether the op-amps have offsets."""
     plan: StudyPlan
+    """What decides the samples, with the responses that the nominal circuit shows."""
     asked: tuple[int, ...]
+    """p of the response of each question."""
     missing: dict[int, str]
+    """What the nominal circuit shows instead of the wanted response, by p."""
 
     @property
     def name(self) -> str:

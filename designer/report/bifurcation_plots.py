@@ -51,10 +51,12 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Mark:
-    """A bifurcation point to be marked: "pitchfork", "period-doubling", "fold", "grazing"."""
+    """A bifurcation point to be marked."""
 
     kind: str
+    """"pitchfork", "period-doubling", "fold" or "grazing"."""
     value: float
+    """Value of the parameter."""
 
 
 def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Mark]:

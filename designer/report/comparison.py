@@ -46,64 +46,77 @@ _GAIN = 1e9
 
 @dataclass(frozen=True)
 class Shown:
-    """One wanted response on one circuit: what it settles on from the model's own orbit.
-
-    kept : whether that is the wanted response (where nothing is wanted, the model's).
-    """
+    """One wanted response on one circuit: what it settles on from the model's own orbit."""
 
     omega: float
+    """Dimensionless frequency."""
     expected: str | None
+    """The wanted n-p-q; None where any is of interest."""
     orbit: Orbit
+    """The orbit that the circuit settles on."""
     kept: bool
+    """Whether that is the wanted response (where nothing is wanted, the model's)."""
 
 
 @dataclass(frozen=True)
 class OffsetShare:
-    """Shift of v1's operating point against the middle of the clearance, over the threshold.
-
-    typical, maximum : root of the sum of squares over all sections, each with the offset of that
-    name in the catalogue; nan where the catalogue has none. largest : the section with the largest
-    part in it.
-    """
+    """Shift of v1's operating point against the middle of the clearance, over the threshold."""
 
     typical: float
+    """Root of the sum of squares over all sections, each with the catalogue's typical offset; nan
+    where it has none."""
     maximum: float
+    """Root of the sum of squares over all sections, each with the catalogue's largest offset; nan
+    where it has none."""
     largest: str
+    """Name of the section with the largest part in it."""
 
 
 @dataclass(frozen=True)
 class Bill:
-    """parts : pieces to solder. packages : of op-amps. distinct : different values of resistors
-    and capacitors. price : upper bound [€], the sum of the upper ends of the price classes of
-    everything that is sold. unsold : names of the parts whose value no catalogue family holds."""
+    """What a circuit asks to be bought and soldered."""
 
     parts: int
+    """Pieces to solder."""
     packages: int
+    """Packages of op-amps."""
     distinct: int
+    """Different values of resistors and capacitors."""
     price: float
+    """Upper bound [€], the sum of the upper ends of the price classes of everything that is
+    sold."""
     unsold: tuple[str, ...]
+    """Names of the parts whose value no catalogue family holds."""
 
 
 @dataclass(frozen=True)
 class DesignColumn:
-    """Everything about one design.
-
-    errors : None where a coefficient has the wrong sign; ``reason`` says so. k0, f20, b : as
-    realised by the parts and the stated amplitude, by their definitions in Eq. (3); nan where they
-    do not apply. frequency_error : ln(stated/right) of the generator's frequency.
-    """
+    """Everything about one design."""
 
     candidate: ComparedCircuit
+    """The circuit with its generator's settings."""
     errors: CoefficientErrors | None
+    """Errors of its coefficients; None where one has the wrong sign."""
     reason: str
+    """Which coefficient has the wrong sign, or ""."""
     k0: float
+    """Stop stiffness ratio as realised by the parts, by Eq. (3); nan where it does not apply."""
     f20: float
+    """Share of the force on the second mass as realised by the parts, by Eq. (3); nan where it does
+    not apply."""
     b: float
+    """Clearance as realised by the parts and the stated amplitude, by Eq. (3); nan where it does
+    not apply."""
     frequency_error: float
+    """ln(stated/right) of the generator's frequency."""
     offset: OffsetShare | None
+    """What the op-amps' offsets do; None where it does not apply."""
     loads: Loads
+    """What its outputs have to give."""
     shown: tuple[Shown, ...]
+    """What each wanted response settles on."""
     bill: Bill
+    """What has to be bought."""
 
     @property
     def current(self) -> Load | None:

@@ -28,34 +28,41 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReportData:
-    """What a report is made from.
-
-    checked : every wanted response. plan, answers : the tolerance study, of some or all of them;
-    plan None where there was none. yields : one for each response (None where it was left out) or
-    one for each question of the plan; None where there was no study. bom : rows of ``bom.csv``.
-    command : the command line that makes these results again. equations : the equation check.
-    heard : what ngspice said about boards of the study. layers : what else the study has.
-    starts : how to start each response, from ``setup.csv``; empty where there is none. board : the
-    circuit with its fittings, to be drawn; None for no drawing. pins : of its op-amps.
-    better_grades : parts that are bought at a better grade than was asked for.
-    """
+    """What a report is made from."""
 
     modelfile: ModelFile
+    """The model file."""
     design: Design
+    """The design."""
     checked: tuple[CheckedResponse, ...]
+    """Every wanted response."""
     yields: tuple[Yield | None, ...] | None
+    """One for each response (None where it was left out) or one for each question of the plan; None
+    where there was no study."""
     answers: tuple[Answer, ...]
+    """Rows of the study, of some or all of the responses."""
     plan: StudyPlan | None
+    """What decides the study's samples; None where there was no study."""
     bom: Sequence[Mapping[str, str]]
+    """Rows of ``bom.csv``."""
     provenance: Mapping[str, Any]
+    """Versions, seed and settings."""
     command: str
+    """The command line that makes these results again."""
     equations: EquationCheck | None = None
+    """The equation check; None where it was not made."""
     heard: tuple[Hearing, ...] = ()
+    """What ngspice said about boards of the study."""
     layers: Layers = field(default_factory=Layers)
+    """What else the study has."""
     starts: tuple[str, ...] = ()
+    """How to start each response, from ``setup.csv``; empty where there is none."""
     board: Circuit | None = None
+    """The circuit with its fittings, to be drawn; None for no drawing."""
     pins: Numbers = field(default_factory=dict)
+    """Pins of the board's op-amps."""
     better_grades: Mapping[str, BetterGrade] = field(default_factory=dict)
+    """Parts that are bought at a better grade than was asked for."""
 
     @classmethod
     def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:

@@ -86,17 +86,21 @@ class Start(Protocol):
 
 @dataclass(frozen=True)
 class Layers:
-    """What a study has beside its answers as built; empty or None where it was not asked.
-
-    tuned, trimmed, reached : rows of all questions. combined : by response. recipes : by question.
-    status : how much of the blame there is; None where nobody says.
-    """
+    """What a study has beside its answers as built; empty or None where it was not asked."""
 
     tuned: Sequence[Benched] | None = None
+    """Rows of all questions with the generator tuned."""
     trimmed: Sequence[LayerRow] | None = None
+    """Rows of all questions with the trimmer set."""
     reached: Sequence[LayerRow] | None = None
+    """Rows of all questions powered up."""
     combined: Sequence[Both | None] = ()
+    """Yield by both engines, by response."""
     recipes: Sequence[Start] = ()
+    """Recipes of power-up, by question."""
     blame: Blame | None = None
+    """The blame of every question."""
     maps: Sequence[YieldMap] = ()
+    """Yield maps of the study."""
     status: BlameStatus | None = None
+    """How much of the blame there is; None where nobody says."""

@@ -21,20 +21,26 @@ from designer.report.tolerance import blame_of
 
 @dataclass(frozen=True)
 class ReportPicture:
-    """A figure as an ``<svg>`` element, which says what it shows, and a caption."""
+    """A figure with its caption."""
 
     svg: Markup
+    """An ``<svg>`` element, which says what it shows."""
     caption: str = ""
+    """The caption."""
 
 
 @dataclass(frozen=True)
 class Card:
-    """The pictures of one response; ``warning`` : what is wrong with it, or ""."""
+    """The pictures of one response."""
 
     portrait: ReportPicture
+    """The orbit in the phase plane."""
     trace: ReportPicture
+    """The orbit over time."""
     caption: str
+    """The caption of both."""
     warning: str
+    """What is wrong with the response, or ""."""
 
 
 def pictures(data: ReportData) -> dict[str, Any]:

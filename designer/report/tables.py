@@ -32,11 +32,14 @@ PHRASE = 60
 
 @dataclass(frozen=True)
 class Table:
-    """Cells as text; ``numeric`` : indices of the columns that are set flush right."""
+    """A table of texts."""
 
     columns: tuple[str, ...]
+    """Headings of the columns."""
     rows: tuple[tuple[str, ...], ...]
+    """Cells, row by row."""
     numeric: tuple[int, ...] = ()
+    """Indices of the columns that are set flush right."""
 
     @property
     def broad(self) -> bool:

@@ -175,7 +175,7 @@ class RawPlot:
     """One analysis of a raw file."""
 
     name: str
-    """Such as ``Transient Analysis``."""
+    """Name of the analysis, such as ``Transient Analysis``."""
     vectors: dict[str, NDArray[np.float64]]
     """By the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
     phasors: dict[str, NDArray[np.complex128]] = field(default_factory=dict)

@@ -40,24 +40,26 @@ _NOT_CONVERGED = re.compile(
 
 @dataclass(frozen=True)
 class Task(Generic[T]):
-    """A run that can be made with other settings.
-
-    make : (settings, nudge) → job; ``nudge`` is the fraction by which every initial voltage is
-    raised, 0 at first. settings : the first that are tried.
-    """
+    """A run that can be made with other settings."""
 
     make: Callable[[SolverSettings, float], SpiceJob[T]]
+    """(settings, nudge) → job; ``nudge`` is the fraction by which every initial voltage is raised,
+    0 at first."""
     settings: SolverSettings
+    """The first that are tried."""
 
 
 @dataclass(frozen=True)
 class AidedRun(Generic[T]):
-    """result : of the last attempt. settings : its. tried : remedies in order, none where the
-    first attempt converged; if ``result`` is no failure, the last of them helped."""
+    """A run that was repeated with other settings until it converged."""
 
     result: T | SimulationFailed
+    """Result of the last attempt."""
     settings: SolverSettings
+    """Settings of the last attempt."""
     tried: tuple[Remedy, ...] = ()
+    """Remedies in order, none where the first attempt converged; if ``result`` is no failure, the
+    last of them helped."""
 
 
 def did_not_converge(failure: SimulationFailed) -> bool:

@@ -27,13 +27,18 @@ IDEAL_GAIN = 1e9
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """What ngspice is told: integration method, largest step [s], relative tolerance."""
+    """What ngspice is told."""
 
     method: str
+    """Integration method."""
     max_step: float
+    """Largest step [s]."""
     reltol: float = 1e-4
+    """Relative tolerance."""
     abstol: float = 1e-12
+    """Absolute tolerance of currents [A]."""
     vntol: float = 1e-7
+    """Absolute tolerance of voltages [V]."""
 
     def as_dict(self) -> dict[str, float | str]:
         return dict(self.__dict__)

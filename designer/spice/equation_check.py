@@ -58,13 +58,16 @@ STAGE = "fv"
 
 @dataclass(frozen=True)
 class EquationFinding:
-    """One comparison. deviation, bound : dimensionless, see `name`. reason : where ngspice gave
-    no answer; the deviation is then nan and the finding is no."""
+    """One comparison."""
 
     name: str
+    """What is compared; see ``EquationCheck``."""
     deviation: float
+    """Dimensionless deviation; nan where ngspice gave no answer."""
     bound: float
+    """Largest deviation that passes, dimensionless."""
     reason: str = ""
+    """Why ngspice gave no answer; the finding is then no."""
 
     @property
     def passed(self) -> bool:
@@ -76,14 +79,16 @@ class EquationFinding:
 
 @dataclass(frozen=True)
 class EquationCheck:
-    """findings : "transfer, open", "transfer, upper contact" … are the largest |H/H_model - 1|
-    over the decade from ``low`` to ``high`` [Hz]; "slope …" |ln(realised/wanted)| of fv against
-    v1 in contact; "threshold …" |realised/wanted - 1|; "leftover slope" that of the dead zone in
-    units of K1."""
+    """Whether ngspice's circuit obeys the wanted equations."""
 
     findings: tuple[EquationFinding, ...]
+    """"transfer, open", "transfer, upper contact" … are the largest |H/H_model - 1| over the decade
+    from ``low`` to ``high``; "slope …" |ln(realised/wanted)| of fv against v1 in contact;
+    "threshold …" |realised/wanted - 1|; "leftover slope" that of the dead zone in units of K1."""
     low: float = field(default=float("nan"))
+    """Lower end of the decade [Hz]."""
     high: float = field(default=float("nan"))
+    """Upper end of the decade [Hz]."""
 
     @property
     def passed(self) -> bool:

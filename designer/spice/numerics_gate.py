@@ -62,24 +62,30 @@ SHORTEST = 8
 
 @dataclass(frozen=True)
 class GateResult:
-    """settings : what passed, or the finest that was tried. passed : whether any did.
-    difference : largest strobe difference between the runs, of the peak. read : the run at
-    ``settings``; tried : steps a period that were tried. contact_steps : N, largest steps in the
-    shortest contact at ``settings`` (nan without contact). remedies : what the run at ``settings``
-    needed besides, or its companions. discarded : drive periods before the run was judged. wave :
-    `wave_error` of the run at ``settings``, and wave_bound what it was held to: nan where it is
-    not periodic, as ``difference`` is; the bound is also nan above the rung ``ideal``."""
+    """How ngspice's settings for a response were found, and the run at these settings."""
 
     settings: SolverSettings
+    """The settings that passed, or the finest that were tried."""
     passed: bool
+    """Whether any settings passed."""
     difference: float
+    """Largest strobe difference between the runs, of the peak."""
     read: Read | SimulationFailed
+    """The run at ``settings``."""
     tried: tuple[int, ...]
+    """Steps a period that were tried."""
     contact_steps: float = float("nan")
+    """N, largest steps in the shortest contact at ``settings`` (nan without contact)."""
     remedies: tuple[Remedy, ...] = ()
+    """What the run at ``settings``, or its companions, needed besides."""
     discarded: int = DISCARD
+    """Drive periods before the run was judged."""
     wave: float = float("nan")
+    """``wave_error`` of the run at ``settings``; nan where it is not periodic, as ``difference``
+    is."""
     wave_bound: float = float("nan")
+    """What ``wave`` was held to; nan where the run is not periodic, and above the rung
+    ``ideal``."""
 
     @property
     def why(self) -> str:
@@ -123,20 +129,22 @@ class GateResult:
 
 @dataclass(frozen=True)
 class GateSubject:
-    """One response of one board (a reduction): what a run of ngspice needs.
-
-    orbit : on the exact circuit; its n sets the length of the run. start : (states,) capacitor
-    voltages at t = 0 if not the orbit's. discard : periods left out before the run is judged.
-    judged : periods that are judged at least. rung : the op-amps' model in ngspice.
-    """
+    """One response of one board (a reduction): what a run of ngspice needs."""
 
     reduction: Reduction
+    """The reduction of the board's circuit."""
     excitation: Excitation
+    """The generator's setting."""
     orbit: Orbit
+    """Orbit on the exact circuit; its n sets the length of the run."""
     start: Array | None = None
+    """(states,) capacitor voltages at t = 0 if not the orbit's."""
     discard: int = DISCARD
+    """Periods left out before the run is judged."""
     rung: Rung = "ideal"
+    """The op-amps' model in ngspice."""
     judged: int = 0
+    """Periods that are judged at least."""
 
     @property
     def circuit(self) -> Circuit:

@@ -33,16 +33,22 @@ HARD = 0.25
 
 @dataclass(frozen=True)
 class OpAmpBench:
-    """One op-amp on a bench: its model's rung, rails of ± supply [V], offset [V], bias [A],
-    output limits [V], a vendor's model if there is one."""
+    """One op-amp on a bench."""
 
     rung: Rung
+    """Rung of its model."""
     parameters: Parameters
+    """Figures of its model."""
     supply: float
+    """Supply of either rail, ± [V]."""
     vos: float
+    """Input offset voltage [V]."""
     ib: float
+    """Input bias current [A]."""
     rails: tuple[float, float]
+    """Output limits, (low, high) [V]."""
     vendor: VendorModel | None = None
+    """A vendor's model, if there is one."""
 
     @classmethod
     def of(cls, opamp: OpAmp, rung: Rung) -> OpAmpBench:
@@ -203,15 +209,20 @@ _POINT = ".op"
 
 @dataclass(frozen=True)
 class FigureCheck:
-    """One figure: expected by the catalogue, measured in ngspice, whether they agree, and whether
-    the catalogue's figure is assumed."""
+    """One figure of the catalogue, and what the model shows."""
 
     figure: str
+    """Name of the figure."""
     unit: str
+    """Its unit."""
     expected: float
+    """What the catalogue says."""
     measured: float
+    """What was measured in ngspice."""
     tolerance: float
+    """Largest relative difference that is allowed."""
     assumed: bool
+    """Whether the catalogue's figure is assumed."""
 
     @property
     def agrees(self) -> bool:

@@ -61,28 +61,35 @@ _FLICKER_CURRENT = 1e-3
 
 @dataclass(frozen=True)
 class Parameters:
-    """Figures of a model, typical.
-
-    gain [V/V]; gbw [Hz]; slew [V/s]; output_resistance [Ω]; recovery [s]; second_pole [Hz];
-    saturation_resistance [Ω], by which the limit falls with the load; current_limit [A];
-    headroom [V], from either rail to the input common-mode range: lower, upper (None: no limit);
-    reversal : whether the output goes high for an input below that range; supply_current [A];
-    noise [V/√Hz] above the corner, noise_corner [Hz] (0: none).
-    """
+    """Figures of a model, typical."""
 
     gain: float
+    """Open-loop gain [V/V]."""
     gbw: float
+    """Gain-bandwidth product [Hz]."""
     slew: float
+    """Slew rate [V/s]."""
     output_resistance: float
+    """Open-loop output resistance [Ω]."""
     recovery: float
+    """Recovery from saturation [s]."""
     second_pole: float
+    """Frequency of the second pole [Hz]."""
     saturation_resistance: float
+    """Resistance by which the output limit falls with the load [Ω]."""
     current_limit: float
+    """Largest output current [A]."""
     headroom: tuple[float, float | None]
+    """Headroom from the lower and the upper rail to the input common-mode range [V]; None: no
+    limit."""
     reversal: bool
+    """Whether the output goes high for an input below the common-mode range."""
     supply_current: float
+    """Supply current [A]."""
     noise: float
+    """Input voltage noise above the corner [V/√Hz]."""
     noise_corner: float
+    """Corner frequency of the 1/f noise [Hz]; 0: none."""
 
     @classmethod
     def of(cls, opamp: OpAmp, gain: float | None = None) -> Parameters:

@@ -23,36 +23,40 @@ ENGINE_ERROR = 5e-4
 
 @dataclass(frozen=True)
 class Reading:
-    """How to read a run.
-
-    period : drive period [s]. discard : periods to leave out at the start. nets : nets that carry
-    the states; shift : (states,) what their voltages are above the capacitors' (offsets).
-    upper, lower : (states + 2,) guard rows over (states, generator, 1), positive in contact, or
-    None. generator : its net. moving : index of the state that moves in the clearance. keep :
-    whether to return a trace.
-    """
+    """How to read a run."""
 
     period: float
+    """Drive period [s]."""
     discard: int
+    """Periods to leave out at the start."""
     nets: tuple[str, ...]
+    """Nets that carry the states."""
     shift: Array
+    """(states,) what their voltages are above the capacitors' (offsets)."""
     upper: Array | None
+    """(states + 2,) guard row over (states, generator, 1), positive in contact with the upper stop;
+    None where there is none."""
     lower: Array | None
+    """(states + 2,) guard row over (states, generator, 1), positive in contact with the lower stop;
+    None where there is none."""
     generator: str
+    """Net of the generator."""
     moving: int
+    """Index of the state that moves in the clearance."""
     keep: bool = False
+    """Whether to return a trace."""
 
 
 @dataclass(frozen=True)
 class Read:
-    """An orbit, its strobes (k, states), and on request one stretch of the trace.
-
-    trace : time (m,) from 0 over the last n periods and states (m, states).
-    """
+    """What was read from a run."""
 
     orbit: Orbit
+    """The orbit."""
     strobes: Array
+    """(k, states) strobes."""
     trace: tuple[Array, Array] | None
+    """On request, time (m,) from 0 over the last n periods and states (m, states)."""
 
 
 def read(waveforms: Waveforms, reading: Reading) -> Read:

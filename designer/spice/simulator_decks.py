@@ -49,18 +49,20 @@ LOAD = 1e6
 
 @dataclass(frozen=True)
 class ResponseRun:
-    """What shows one response: the generator, the start and the analysis.
-
-    omega, expected : of the response as wanted; expected is None where any will do. stop_time [s].
-    initial : (states,) capacitor voltages at t = 0; None for discharged ones.
-    """
+    """What shows one response: the generator, the start and the analysis."""
 
     omega: float
+    """Dimensionless frequency of the wanted response."""
     expected: str | None
+    """The wanted n-p-q; None where any will do."""
     excitation: Excitation
+    """The generator's setting."""
     settings: SolverSettings
+    """Settings of ngspice."""
     stop_time: float
+    """End of the run [s]."""
     initial: Array | None
+    """(states,) capacitor voltages at t = 0; None for discharged ones."""
 
     @property
     def name(self) -> str:

@@ -30,9 +30,12 @@ if TYPE_CHECKING:
 class Reply:
     """What a worker says: first how its start went, then one for each job."""
 
-    text: str = ""  # at the start: ngspice's version, or what is missing
-    value: bytes = b""  # pickled result or SimulationFailed
-    last: bool = False  # the worker ends after this
+    text: str = ""
+    """At the start: ngspice's version, or what is missing."""
+    value: bytes = b""
+    """Pickled result or ``SimulationFailed``."""
+    last: bool = False
+    """Whether the worker ends after this."""
 
 
 def work(connection: Connection, backend: Backend, folder: str) -> None:

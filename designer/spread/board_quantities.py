@@ -20,17 +20,16 @@ _NAMES = {"values": "", "reference": "", "supply": ""}
 
 @dataclass(frozen=True)
 class Quantity:
-    """One column of ``Boards``.
-
-    part : name of the part, section, reference or rail. group : the field of ``Boards``. nominal,
-    sigma : value on the nominal board and standard deviation over the spread, in ohm, farad, volt
-    or ampere.
-    """
+    """One column of ``Boards``."""
 
     part: str
+    """Name of the part, section, reference or rail."""
     group: str
+    """Name of the field of ``Boards`` that holds it."""
     nominal: float
+    """Value on the nominal board, in ohm, farad, volt or ampere."""
     sigma: float
+    """Standard deviation over the spread, in the same unit."""
 
     @property
     def name(self) -> str:

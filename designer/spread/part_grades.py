@@ -21,13 +21,12 @@ from designer.spread.part_rules import spread_of
 
 @dataclass(frozen=True)
 class BetterGrade:
-    """A part of which nobody sells the value at the grade that was asked for; fractions.
-
-    asked : the grade that was asked for. bought : the grade that it is bought and drawn at.
-    """
+    """A part of which nobody sells the value at the grade that was asked for."""
 
     asked: float
+    """The grade that was asked for, a fraction."""
     bought: float
+    """The grade that it is bought and drawn at, a fraction."""
 
 
 def better_grades(

@@ -47,52 +47,66 @@ _WHAT = ("offset", "low", "high", "bias", "gbw", "tempco", "ageing")
 
 @dataclass(frozen=True)
 class Group:
-    """Parts that vary together, of one network or (``reel``) one reel.
+    """Parts that vary together.
 
-    share : in [0, 1], of a part's deviation that it has in common with the others; the rest is its
-    own. So the total stays within the grade, and two parts correlate by s²/(s² + (1 − s)²).
+    The total stays within the grade, and two parts correlate by s²/(s² + (1 - s)²), s the share.
     """
 
     name: str
+    """Name of the network or the reel."""
     parts: tuple[str, ...]
+    """Names of the parts."""
     share: float
+    """Share in [0, 1] of a part's deviation that it has in common with the others; the rest is its
+    own."""
     reel: bool = False
+    """Whether they are from one reel, and not of one network."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """What varies from board to board, and by how much.
-
-    resistor, capacitor : grades as fractions; their shapes : of a deviation over the grade.
-    offset_sigma, offset_limit [V]. saturation : half-width as a fraction. reference : half-width
-    over the grade of each reference. bias [A], gain_bandwidth [Hz] : of each section; None: the
-    circuit's, which is the typical figure. supply : half-width as a fraction, each rail its own.
-    grades, shapes : of the parts that have their own. temperature : range [°C] of the board.
-    tempco [1/K], ageing (relative) : by part; tempco counts where there is a temperature.
-    groups : parts that track. measured : a bench's list, which goes before anything drawn.
-    asked : the grade that was asked for, of the parts that are drawn at a better one because
-    nobody sells their value at it (``Catalog.part``); what they are drawn at stands in ``grades``.
-    """
+    """What varies from board to board, and by how much."""
 
     resistor: float
+    """Grade of the resistors, a fraction."""
     capacitor: float
+    """Grade of the capacitors, a fraction."""
     offset_sigma: float
+    """Standard deviation of the offsets before the cut [V]."""
     offset_limit: float
+    """The offsets are cut at ± this [V]."""
     saturation: float = SATURATION_SPREAD
+    """Half-width of the output limits as a fraction."""
     reference: float = 1.0
+    """Half-width of each reference's voltage over its grade."""
     resistor_shape: Law = EVEN
+    """Law of a resistor's deviation over the grade."""
     capacitor_shape: Law = EVEN
+    """Law of a capacitor's deviation over the grade."""
     bias: Law | None = None
+    """Input bias current of each section [A]; None: the circuit's, which is the typical figure."""
     gain_bandwidth: Law | None = None
+    """Gain-bandwidth product of each section [Hz]; None: the circuit's, which is the typical
+    figure."""
     supply: float = 0.0
+    """Half-width of the rails as a fraction, each rail its own."""
     grades: Mapping[str, float] = field(default_factory=dict)
+    """Grades of the parts that have their own, fractions by part."""
     shapes: Mapping[str, Law] = field(default_factory=dict)
+    """Laws of the deviation over the grade of the parts that have their own, by part."""
     temperature: tuple[float, float] | None = None
+    """Range of the board's temperature [°C]."""
     tempco: Mapping[str, Law] = field(default_factory=dict)
+    """Temperature coefficient [1/K] by part; it counts where there is a temperature."""
     ageing: Mapping[str, Law] = field(default_factory=dict)
+    """Relative change by part."""
     groups: tuple[Group, ...] = ()
+    """Groups of parts that vary together."""
     measured: MeasuredBoards | None = None
+    """Measured values of a bench's list, which go before anything drawn."""
     asked: Mapping[str, float] = field(default_factory=dict)
+    """The grade that was asked for, by part, where nobody sells the value at it; these parts are
+    drawn at the better one in ``grades`` (``Catalog.part``)."""
 
     @classmethod
     def bench_1(cls, opamp: OpAmp, resistor_grade: float, capacitor_grade: float) -> Spread:

@@ -41,28 +41,36 @@ REFERENCE_MARGIN = 1.5
 
 @dataclass(frozen=True)
 class Order:
-    """What is to be built, and from what.
-
-    resistors, capacitors : values that can be bought [ohm], [F], ascending; prices : price class of
-    each capacitor; resistor_prices : by value. terms : of the model; parts : its circuit with every
-    value 1. largest : of the generator's amplitudes, over that at the model's clearance. aims :
-    inside the side conditions.
-    """
+    """What is to be built, and from what."""
 
     model: Dimensionless
+    """The wanted model."""
     spec: CircuitSpec
+    """What the circuit is to be made of."""
     opamp: OpAmp
+    """The op-amp that it is built with."""
     saturation: float
+    """Output limit of the op-amps, ± [V]."""
     zone: Zone
+    """The stage that makes the dead zone."""
     peaks: Peaks
+    """What the circuit has to hold."""
     resistors: Array
+    """Resistances that can be bought [ohm], ascending."""
     capacitors: Array
+    """Capacitances that can be bought [F], ascending."""
     prices: Array
+    """Price class of each capacitance."""
     resistor_prices: Mapping[float, float]
+    """Price class by resistance."""
     terms: tuple[Term, ...]
+    """Terms of the model's equations."""
     parts: Circuit
+    """The model's circuit with every value 1."""
     largest: float
+    """Largest of the generator's amplitudes, over that at the model's clearance."""
     aims: Aims = NO_AIMS
+    """What is aimed at inside the side conditions."""
 
     @property
     def base(self) -> float:
@@ -94,10 +102,15 @@ class Attempt:
     """Chosen values, the circuit that they make, and what each search said."""
 
     values: dict[str, float]
+    """The chosen values by part [ohm, F]."""
     circuit: Circuit
+    """The circuit that they make."""
     errors: CoefficientErrors
+    """Errors of its coefficients."""
     linear: LinearBlock
+    """What the search of the linear block said."""
     zone: DeadZone | None
+    """What the search of the dead-zone stage said; None where there is no such stage."""
 
     @property
     def solver(self) -> dict[str, str]:

@@ -41,11 +41,14 @@ STEP = 1e-3
 
 @dataclass(frozen=True)
 class Pair:
-    """Two parts [ohm], the larger first, that make one resistor."""
+    """Two parts that make one resistor."""
 
     kind: Composite
+    """How they are joined."""
     a: float
+    """The larger resistance [ohm]."""
     b: float
+    """The smaller resistance [ohm]."""
 
     @property
     def value(self) -> float:
@@ -56,18 +59,19 @@ class Pair:
 
 @dataclass(frozen=True)
 class PairProgram:
-    """errors (m,) = h + D scales + the sum over resistors of what their pairs change.
-
-    tables : pairs that each resistor may become, by name; changes : (m, pairs) what each does to
-    the errors. curved : resistors whose effect is no product of powers (a loaded divider): of them
-    at most one may change, or the sum would not hold.
-    """
+    """errors (m,) = h + D scales + the sum over resistors of what their pairs change."""
 
     h: Array
+    """(m,) constant term of the errors."""
     D: Array
+    """(m, scales) change of the errors with each scale."""
     tables: Mapping[str, tuple[Pair, ...]]
+    """Pairs that each resistor may become, by name."""
     changes: Mapping[str, Array]
+    """(m, pairs) by resistor, what each of its pairs does to the errors."""
     curved: frozenset[str]
+    """Resistors whose effect is no product of powers (a loaded divider): of them at most one may
+    change, or the sum would not hold."""
 
 
 def improve(order: Order, made: Attempt) -> Attempt | None:

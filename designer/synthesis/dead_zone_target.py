@@ -15,35 +15,40 @@ LEAST_SPAN, SPAN_ROOM = 1.25, 1.6
 
 @dataclass(frozen=True)
 class DeadZoneTarget:
-    """What the stage has to do.
-
-    mu : stop stiffness over K1. slope : least and largest wanted (fv slope)/R50 [1/ohm]; inside the
-    interval the slope has no error. saturation : of U3C [V].
-    threshold : largest v1 at the stop that keeps every state inside its swing [V].
-    linear_gain : largest A- that keeps U3A linear; output_gain : largest fv slope that keeps the
-    output of the stage inside its swing, a diode's drop included. load : least resistance that an
-    output may drive [ohm]. noise_gain : largest noise gain of an amplifier of the stage.
-    strict : whether these limits are conditions; otherwise they only say where the search begins.
-    excursion : largest excursion on the free side of a one-sided stop, over the clearance.
-    supply [V], reference [V], reference_current : least and largest current of the reference [A],
-    margins included.
-    """
+    """What the stage has to do."""
 
     mu: float
+    """Stop stiffness over K1."""
     slope: tuple[float, float]
+    """Least and largest wanted (fv slope)/R50 [1/ohm]; inside the interval the slope has no
+    error."""
     saturation: float
+    """Output limit of U3C [V]."""
     threshold: float
+    """Largest v1 at the stop that keeps every state inside its swing [V]."""
     linear_gain: float
+    """Largest A- that keeps U3A linear."""
     output_gain: float
+    """Largest fv slope that keeps the output of the stage inside its swing, a diode's drop
+    included."""
     load: float
+    """Least resistance that an output may drive [ohm]."""
     noise_gain: float = float("inf")
+    """Largest noise gain of an amplifier of the stage."""
     strict: bool = True
+    """Whether these limits are conditions; otherwise they only say where the search begins."""
     kind: Literal["saturation", "rectifier"] = "saturation"
+    """Kind of the stage."""
     sides: Literal["both", "upper", "lower"] = "both"
+    """The stops that exist."""
     excursion: float = 1.0
+    """Largest excursion on the free side of a one-sided stop, over the clearance."""
     supply: float = 15.0
+    """Supply of either rail, ± [V]."""
     reference: float = 5.0
+    """Voltage of the reference [V]."""
     reference_current: tuple[float, float] = (0.0, float("inf"))
+    """Least and largest current of the reference [A], margins included."""
 
     @property
     def shift(self) -> tuple[float, float]:
@@ -56,27 +61,30 @@ class DeadZoneTarget:
 
 @dataclass(frozen=True)
 class DeadZone:
-    """Values of R50 and R200 … [ohm], and what is known of them.
-
-    errors : each error of the stage, signed, from the values alone; error : the largest size.
-    threshold : v1 at the stop [V]. bound : no choice under the stated conditions has a smaller
-    error; proved : the error is within 1e-6 of the bound, or of none; proof : how that is known.
-    solver : what the solver said. looked_at : rows of tables that the search went through;
-    seconds : wall time.
-    """
+    """What was chosen for the stage, and what is known of it."""
 
     values: dict[str, float]
+    """Values of R50 and R200 … by part [ohm]."""
     errors: dict[str, float]
+    """Each error of the stage, signed, from the values alone."""
     threshold: float
+    """v1 at the stop [V]."""
     bound: float
+    """No choice under the stated conditions has a smaller error."""
     proved: bool
+    """Whether the error is within 1e-6 of the bound, or of none."""
     proof: str
+    """How the bound is known."""
     solver: str
+    """What the solver said of the search."""
     looked_at: int
+    """Rows of tables that the search went through."""
     seconds: float
+    """Wall time [s]."""
 
     @property
     def error(self) -> float:
+        """The largest size among the errors."""
         return max(abs(e) for e in self.errors.values())
 
     @property

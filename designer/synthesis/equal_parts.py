@@ -16,10 +16,12 @@ TIED = 3000
 
 @dataclass(frozen=True)
 class Ties:
-    """Parts that must be equal: tie maps each to its group; value : those that are given [ohm]."""
+    """Parts that must be equal."""
 
     tie: Mapping[str, str]
+    """Group by part name; parts of one group are equal."""
     value: Mapping[str, float]
+    """Values that are given, by part name [ohm]."""
 
 
 def ties_of(

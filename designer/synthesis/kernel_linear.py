@@ -23,54 +23,69 @@ R1, R2, R3, R4, R5, R7, R8, R9, R10, R11, C1, C2, C3, C4 = range(14)
 
 
 class Values(NamedTuple):
-    """A catalogue in logarithms, sorted, with its sums and ratios.
-
-    r (n,), c (m,) : values. ratios (k,) : distinct ratios of two resistors; the pairs that have
-    ratio i are upper[first[i]:first[i+1]] over lower[...] (indices into r). sums (n·m,) : of
-    sum_r, sum_c (indices into r, c). deltas (d,) : distinct ratios C4/C2, nearest to zero first,
-    of the pairs delta_c2, delta_c4 from delta_first[i] on.
-    """
+    """A catalogue in logarithms, sorted, with its sums and ratios."""
 
     r: Array
+    """(n,) logarithms of the resistances, ascending."""
     c: Array
+    """(m,) logarithms of the capacitances, ascending."""
     ratios: Array
+    """(k,) distinct ratios of two resistors, ascending."""
     first: Index
+    """(k + 1,) where the pairs of each ratio begin in ``upper`` and ``lower``."""
     upper: Index
+    """Index into r of each pair's first resistor."""
     lower: Index
+    """Index into r of each pair's second resistor."""
     sums: Array
+    """(n·m,) sums of a resistor's and a capacitor's logarithm, ascending."""
     sum_r: Index
+    """(n·m,) index into r of each sum."""
     sum_c: Index
+    """(n·m,) index into c of each sum."""
     deltas: Array
+    """(d,) distinct ratios C4/C2, nearest to zero first."""
     delta_first: Index
+    """(d + 1,) where the pairs of each delta begin in ``delta_c2`` and ``delta_c4``."""
     delta_c2: Index
+    """Index into c of each pair's C2."""
     delta_c4: Index
+    """Index into c of each pair's C4."""
 
 
 class Rules(NamedTuple):
-    """What a choice must keep, beside the level of error.
-
-    w (8,) : ln |wanted| of R2, R3, R4, R5, R8, R9, R10, R11. seconds (2,) : range of ln(time
-    scale). level, share : ln of those of ``linear_rules.Bounds``. stop (2,) : range of ln R4. peaks
-    (4,) : ln. ties (14, 14) : true where two parts must be equal. free_r (n,), free_c (m,) : true
-    for values that do not count as distinct. most : limit on distinct values. six, one, two, both :
-    elementary vectors, (k, 3) places and (k, 3) entries: of the six, and those that hold values of
-    the first mass, the second, and both.
-    """
+    """What a choice must keep, beside the level of error."""
 
     w: Array
+    """(8,) ln |wanted| of R2, R3, R4, R5, R8, R9, R10, R11."""
     seconds: Array
+    """(2,) range of ln(time scale)."""
     level: float
+    """ln of ``linear_rules.Bounds.level``."""
     share: float
+    """ln of ``linear_rules.Bounds.share``."""
     stop: Array
+    """(2,) range of ln R4."""
     peaks: Array
+    """(4,) ln of the peaks of the states."""
     ties: Mask
+    """(14, 14) true where two parts must be equal."""
     free_r: Mask
+    """(n,) true for resistances that do not count as distinct."""
     free_c: Mask
+    """(m,) true for capacitances that do not count as distinct."""
     most: int
+    """Limit on distinct values."""
     six: tuple[Index, Array]
+    """Elementary vectors of the six, as (k, 3) places and (k, 3) entries."""
     one: tuple[Index, Array]
+    """Elementary vectors that hold values of the first mass, as (k, 3) places and (k, 3)
+    entries."""
     two: tuple[Index, Array]
+    """Elementary vectors that hold values of the second mass, as (k, 3) places and (k, 3)
+    entries."""
     both: tuple[Index, Array]
+    """Elementary vectors that hold values of both masses, as (k, 3) places and (k, 3) entries."""
 
 
 @compiled

@@ -44,16 +44,14 @@ MARGIN = 1e-3
 
 @dataclass(frozen=True)
 class Aims:
-    """What a choice of parts aims at inside its side conditions; a search moves these.
-
-    swing : share of the op-amp's limit that the peaks of the outputs may use. share : how much
-    larger than x1's peak voltage another state's may be. noise_gain : of a stage whose gain is a
-    ratio of resistors. Wider than the side conditions they have no effect.
-    """
+    """What a choice of parts aims at inside its side conditions; a search moves these."""
 
     swing: float = SWING_SHARE
+    """Share of the op-amp's limit that the peaks of the outputs may use."""
     share: float = SHARE
+    """How much larger than x1's peak voltage another state's may be."""
     noise_gain: float = NOISE_GAIN
+    """Noise gain of a stage whose gain is a ratio of resistors."""
 
 
 NO_AIMS = Aims()
@@ -62,22 +60,24 @@ NO_AIMS = Aims()
 
 @dataclass(frozen=True)
 class ConditionLimits:
-    """kept : names of the conditions that hold; the limits of the others are infinite or zero.
-
-    seconds : range of the time scale [s per unit of model time]. swing : what the peaks of the
-    outputs are aimed at [V], whether or not it is a condition. level, share : ratios of peaks of
-    the state voltages. load : least resistance that a part may put on an output [ohm]. signal :
-    range of the signal resistors [ohm]. noise_gain : of a ratio stage.
-    """
+    """Limits of the side conditions; those of conditions that do not hold are infinite or zero."""
 
     kept: frozenset[str]
+    """Names of the conditions that hold."""
     seconds: tuple[float, float]
+    """Range of the time scale [s per unit of model time]."""
     swing: float
+    """What the peaks of the outputs are aimed at [V], whether or not it is a condition."""
     level: float
+    """Largest ratio between the peaks of the state voltages of one mass."""
     share: float
+    """How much larger than x1's peak voltage another state's may be."""
     load: float
+    """Least resistance that a part may put on an output [ohm]."""
     signal: tuple[float, float]
+    """Range of the signal resistors [ohm]."""
     noise_gain: float
+    """Largest noise gain of a ratio stage."""
 
     def bounds(self, mu: float, peaks: Peaks, resistors: Array) -> Bounds:
         """What the linear block has to keep. mu : stop stiffness over K1; 0 without a stop."""

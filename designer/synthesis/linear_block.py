@@ -49,16 +49,24 @@ SAME = 1e-12
 
 @dataclass(frozen=True)
 class Targets:
-    """ln |wanted| of the eight terms, by the resistor that realises them."""
+    """The eight terms that the linear block has to realise."""
 
     w2: float
+    """ln |wanted| of the term that R2 realises."""
     w3: float
+    """ln |wanted| of the term that R3 realises."""
     w4: float
+    """ln |wanted| of the term that R4 realises."""
     w5: float
+    """ln |wanted| of the term that R5 realises."""
     w8: float
+    """ln |wanted| of the term that R8 realises."""
     w9: float
+    """ln |wanted| of the term that R9 realises."""
     w10: float
+    """ln |wanted| of the term that R10 realises."""
     w11: float
+    """ln |wanted| of the term that R11 realises."""
 
     @classmethod
     def from_state_matrix(cls, A: Array) -> Targets:
@@ -157,14 +165,18 @@ def _grouped(numbers: Array) -> tuple[Array, Index, Index]:
 
 @dataclass(frozen=True)
 class Slice:
-    """rows (k, 7), errors (k,) : joined, by ascending error. following : where the next slice
-    begins. cut : whether rows of this one are missing."""
+    """Rows that were joined from one stretch of the outermost tables."""
 
     rows: Index
+    """(k, 7) indices, by ascending error."""
     errors: Array
+    """(k,) error of each row."""
     following: int
+    """Where the next slice begins."""
     steps: int
+    """Steps of the loops."""
     cut: bool
+    """Whether rows of this one are missing."""
 
 
 def slice_from(values: Values, rules: Rules, level: float, start: int, patience: int) -> Slice:

@@ -23,22 +23,23 @@ ANY_NUMBER = len(PARTS)
 
 @dataclass(frozen=True)
 class Bounds:
-    """Side conditions of the linear block; infinite or zero where switched off.
-
-    seconds : range of the time scale. level : largest ratio between the peaks of the state
-    voltages of one mass, and between the two velocities. share : how much larger than x1's the
-    peak voltage of another state may be. stop : least R4 [ohm] that leaves room
-    for the stop's resistor; stop_most : largest R4 that is looked at [ohm]. peaks : (4,) peaks of
-    x1, x1', x2, x2' in model units. signal : range of the linear block's resistors [ohm].
-    """
+    """Side conditions of the linear block; infinite or zero where switched off."""
 
     seconds: tuple[float, float]
+    """Range of the time scale."""
     level: float
+    """Largest ratio between the peaks of the state voltages of one mass, and between the two
+    velocities."""
     share: float
+    """How much larger than x1's the peak voltage of another state may be."""
     stop: float
+    """Least R4 [ohm] that leaves room for the stop's resistor."""
     peaks: Array
+    """(4,) peaks of x1, x1', x2, x2' in model units."""
     signal: tuple[float, float] = (0.0, np.inf)
+    """Range of the linear block's resistors [ohm]."""
     stop_most: float = np.inf
+    """Largest R4 that is looked at [ohm]."""
 
 
 def rules_of(values: Values, t: Targets, bounds: Bounds, wishes: Wishes) -> Rules:

@@ -34,50 +34,57 @@ THINNED = (8, 4, 2)
 
 @dataclass(frozen=True)
 class Cost:
-    """seconds : wall time. rows : ratio choices that were joined. steps : of the loops."""
+    """What a search took."""
 
     seconds: float
+    """Wall time [s]."""
     rows: int
+    """Ratio choices that were joined."""
     steps: int
+    """Steps of the loops."""
 
 
 @dataclass(frozen=True)
 class LinearBlock:
-    """The parts chosen, and what is known of them.
-
-    values : by part name [ohm, F]. error : the least that the largest of the ten errors can be
-    made by the scales; with ``Wishes.slack`` up to that much above ``least``, the least error
-    that was found. bound : no choice under the conditions has a smaller error. proved : ``least``
-    is within ``EXACT`` of bound. proof : how that is known, in words. solver : its word
-    for the choice among equals.
-    """
+    """The parts chosen, and what is known of them."""
 
     values: dict[str, float]
+    """Chosen values by part name [ohm, F]."""
     error: float
+    """The least that the largest of the ten errors can be made by the scales; with ``Wishes.slack``
+    up to that much above ``least``."""
     least: float
+    """The least error that was found."""
     bound: float
+    """No choice under the conditions has a smaller error."""
     proved: bool
+    """Whether ``least`` is within ``EXACT`` of ``bound``."""
     proof: str
+    """How the bound is known, in words."""
     solver: str
+    """The solver's word for the choice among equals."""
     cost: Cost
+    """What the search took."""
 
 
 @dataclass(frozen=True)
 class LevelSearch:
-    """Where a search of levels ended.
-
-    error : infinite if nothing was found. parts : (14,) indices. empty : highest level at which
-    nothing can be completed. whole : nothing was left out. reached : how far any row came, -1 if
-    there was none.
-    """
+    """Where a search of levels ended."""
 
     error: float
+    """The least error that was found; infinite if nothing was."""
     parts: Index
+    """(14,) indices of the values with that error."""
     empty: float
+    """Highest level at which nothing can be completed."""
     whole: bool
+    """Whether nothing was left out."""
     reached: int
+    """How far any row came, -1 if there was none."""
     rows: int
+    """Ratio choices that were joined."""
     steps: int
+    """Steps of the loops."""
 
 
 def best(

@@ -27,28 +27,34 @@ LEAST_PENETRATION = 0.02
 
 @dataclass(frozen=True)
 class StageRoom:
-    """What the responses, the op-amps and the conditions leave to the stage.
-
-    saturation : of U3C [V]; swing : largest voltage of an output that stays linear [V]; supply [V].
-    peaks : (4,) of the states, penetration and excursion : deepest beyond a stop, and largest
-    |x1| on the side without one, all in model units.
-    load [ohm], noise_gain, strict : as in ``DeadZoneTarget``. drop : of a diode [V].
-    reference [V] and reference_current [A] (least, largest), margins included.
-    """
+    """What the responses, the op-amps and the conditions leave to the stage."""
 
     saturation: float
+    """Output limit of U3C [V]."""
     swing: float
+    """Largest voltage of an output that stays linear [V]."""
     supply: float
+    """Supply of either rail, ± [V]."""
     peaks: Array
+    """(4,) peaks of the states in model units."""
     penetration: float
+    """Deepest penetration of a stop in model units."""
     load: float
+    """Least resistance that an output may drive [ohm]."""
     strict: bool = True
+    """Whether these limits are conditions; otherwise they only say where the search begins."""
     noise_gain: float = float("inf")
+    """Largest noise gain of an amplifier of the stage."""
     kind: Literal["saturation", "rectifier"] = "saturation"
+    """Kind of the stage."""
     excursion: float = 0.0
+    """Largest |x1| on the side without a stop, in model units."""
     drop: float = 0.0
+    """Forward voltage of a diode [V]."""
     reference: float = 5.0
+    """Voltage of the reference [V]."""
     reference_current: tuple[float, float] = (0.0, float("inf"))
+    """Least and largest current of the reference [A], margins included."""
 
 
 def target_of(model: Dimensionless, values: Mapping[str, float], room: StageRoom) -> DeadZoneTarget:

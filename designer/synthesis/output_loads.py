@@ -47,33 +47,36 @@ WALK = 64
 
 @dataclass(frozen=True)
 class Run:
-    """One trajectory that a circuit must be able to follow.
-
-    name : such as "1.55" or "1.55 from rest". drive : in rad/s and volts. start : capacitor
-    voltages (n,) at drive phase 0. periods : drive periods that count.
-    """
+    """One trajectory that a circuit must be able to follow."""
 
     name: str
+    """Name of the run, such as "1.55" or "1.55 from rest"."""
     drive: Drive
+    """The generator's drive, in rad/s and volts."""
     start: Array
+    """Capacitor voltages (n,) at drive phase 0."""
     periods: int
+    """Drive periods that count."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """Extremes of one section's output over all runs.
-
-    low, high [V]; current, the largest magnitude [A]; low_in, high_in, current_in : the names of
-    the runs where these happen.
-    """
+    """Extremes of one section's output over all runs."""
 
     section: str
+    """Name of the section."""
     low: float
+    """Lowest voltage of the output [V]."""
     high: float
+    """Highest voltage of the output [V]."""
     current: float
+    """Largest size of the current out of it [A]."""
     low_in: str
+    """Name of the run with the lowest voltage."""
     high_in: str
+    """Name of the run with the highest voltage."""
     current_in: str
+    """Name of the run with the largest current."""
 
     @property
     def peak(self) -> float:
@@ -83,13 +86,12 @@ class Load:
 
 @dataclass(frozen=True)
 class Loads:
-    """sections : in the circuit's order. left_out : runs without an answer, with the reason.
-
-    Where nothing ran, ``sections`` is empty.
-    """
+    """What the outputs of a circuit have to give, over all runs."""
 
     sections: tuple[Load, ...]
+    """The outputs' loads in the circuit's order; empty where nothing ran."""
     left_out: dict[str, str]
+    """Runs without an answer, with the reason."""
 
     def of(self, section: str) -> Load:
         """The load of one section; KeyError where there is none."""

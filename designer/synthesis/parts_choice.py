@@ -50,16 +50,21 @@ class UncertifiedDesign:
     """A design that keeps the conditions, without its certificate's last word."""
 
     made: Attempt
+    """The chosen values."""
     design: Design
+    """The design that they make."""
     limits: ConditionLimits
+    """Limits of the side conditions that were kept."""
 
 
 @dataclass(frozen=True)
 class Missed:
-    """Why there is no design, and whether a limit had been tightened by then."""
+    """Why there is no design."""
 
     short: Shortfall
+    """What leaves no choice."""
     tightened: bool
+    """Whether a limit had been tightened by then."""
 
 
 def synthesise(

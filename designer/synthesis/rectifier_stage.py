@@ -43,11 +43,14 @@ EXPANDED, ROWS, FEEDS = 1_000_000, 400, 12
 
 @dataclass(frozen=True)
 class Lists:
-    """Values of each part, by the parts' own names, and which of them are equal."""
+    """What can be bought for each part, and which parts are equal."""
 
     names: tuple[str, str, str, str]
+    """Names of the parts; the last feeds the stage."""
     of: Mapping[str, Array]
+    """Values [ohm] by part name."""
     tie: Mapping[str, str]
+    """Group by part name; parts of one group are equal."""
 
     def group(self, name: str) -> str:
         """The name that all parts equal to this one share."""
@@ -65,7 +68,9 @@ class ThresholdRange:
     """Ranges (low, high) of the threshold [V] and of the fv slope."""
 
     threshold: tuple[float, float]
+    """Least and largest threshold [V]."""
     gain: tuple[float, float]
+    """Least and largest fv slope."""
 
 
 def size(

@@ -57,28 +57,32 @@ ATOMS = (
 
 @dataclass(frozen=True)
 class SearchStage:
-    """One stage of the search: the values of each part and the ranges.
-
-    slope, whole : whether the slope's tables, or all, hold every value that the conditions leave.
-    rescue : the stage is for where the ones before have no answer.
-    """
+    """One stage of the search: the values of each part and the ranges."""
 
     lists: Mapping[str, Array]
+    """Values of each part by name [ohm]."""
     box: SearchBox
+    """The ranges that are searched."""
     slope: bool = False
+    """Whether the slope's tables hold every value that the conditions leave."""
     whole: bool = False
+    """Whether all tables hold every value that the conditions leave."""
     rescue: bool = False
+    """Whether the stage is only for where the ones before have no answer."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """What the stages found: the tables with the least error, a bound that holds for the whole
-    catalogue, rows looked at, and where there is nothing, the condition that binds."""
+    """What the stages found."""
 
     best: tuple[SaturatingTables, Least] | None
+    """The tables with the least error, with that error; None where there is nothing."""
     bound: float
+    """No choice from the whole catalogue has a smaller error."""
     looked_at: int
+    """Rows that were looked at."""
     binding: str
+    """Where there is nothing, the condition that binds."""
 
     @property
     def error(self) -> float:
@@ -227,14 +231,17 @@ def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
 
 @dataclass(frozen=True)
 class Least:
-    """The least largest error of the tables and the u that has it; bound : no row of them has a
-    smaller one, rules that tie the slope's tables to the others left out; looked_at : values of u
-    that were completed."""
+    """The least largest error of the tables."""
 
     error: float
+    """The least largest error."""
     u: float
+    """The u = ln A-/R209 that has it."""
     bound: float
+    """No row of them has a smaller one, rules that tie the slope's tables to the others left
+    out."""
     looked_at: int
+    """Values of u that were completed."""
 
 
 def least_error(t: SaturatingTables, tolerance: float, most: float) -> Least:

@@ -44,15 +44,20 @@ LEAST_SECOND = 1.15
 
 @dataclass(frozen=True)
 class SearchBox:
-    """Ranges (low, high) of A+, A-, R50 [ohm] and, one-sided, c/Esat; least gain of U3B; limit of
-    the noise gain."""
+    """The ranges (low, high) that a search of the saturating stage looks at."""
 
     steep: tuple[float, float]
+    """Least and largest A+."""
     linear: tuple[float, float]
+    """Least and largest A-."""
     stop: tuple[float, float]
+    """Least and largest R50 [ohm]."""
     shift: tuple[float, float]
+    """Least and largest c/Esat, one-sided only."""
     first: float
+    """Least gain of U3B."""
     noise_gain: float
+    """Limit of the noise gain."""
 
 
 def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) -> SearchBox:
@@ -87,13 +92,21 @@ class SaturatingTables:
     """The tables of one search; every row keeps its own conditions of the box."""
 
     target: DeadZoneTarget
+    """What the stage has to do."""
     box: SearchBox
+    """The ranges that the rows keep to."""
     left: ValueTable
+    """Values of R206, R207 and R209."""
     right: ValueTable
+    """Values of R210 and R50."""
     first: ValueTable
+    """Values of R200 and R201."""
     second: ValueTable
+    """Values of R202 and R203."""
     divider: ValueTable
+    """Values of R204, R205 and R208."""
     shift: ValueTable | None
+    """Values of R200, R211 and R212, for a one-sided dead zone; None with both stops."""
 
     @cached_property
     def u(self) -> Array:

@@ -46,35 +46,40 @@ SECOND = [PARTS.index(name) for name in ("R5", "R11", "R7", "C3")]
 
 @dataclass(frozen=True)
 class Shortfall:
-    """No choice: what leaves none, and whether every one was looked at."""
+    """There is no choice."""
 
     what: str
+    """What leaves no choice."""
     whole: bool
+    """Whether every choice was looked at."""
 
 
 @dataclass(frozen=True)
 class Pool:
-    """What the program chooses from: indices of values.
-
-    parts1, parts2 : (k, 14), a completion of the first, of the second mass with its group's own
-    parts, -1 elsewhere. group1, group2 : (k,). fewest : distinct values that can be reached.
-    whole : nothing that could have as few is missing.
-    """
+    """What the program chooses from: indices of values."""
 
     parts1: Index
+    """(k, 14) completions of the first mass with its group's own parts, -1 elsewhere."""
     group1: Index
+    """(k,) group of each completion of the first mass."""
     parts2: Index
+    """(k, 14) completions of the second mass with its group's own parts, -1 elsewhere."""
     group2: Index
+    """(k,) group of each completion of the second mass."""
     fewest: int
+    """Distinct values that can be reached."""
     whole: bool
+    """Whether nothing that could have as few is missing."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """parts (14,) : indices of the values chosen; the solver's word."""
+    """What the program chose."""
 
     parts: Index
+    """(14,) indices of the values chosen."""
     solver: str
+    """The solver's word."""
 
 
 def pool_of(

@@ -25,12 +25,14 @@ ERROR_WEIGHT = 1e-4
 
 @dataclass(frozen=True)
 class TableRows:
-    """One table of the program: its values, the error of each row, and a key that the rows chosen
-    from all tables must share."""
+    """One table of the program."""
 
     table: ValueTable
+    """Values of the table."""
     error: Array
+    """(rows,) error of each row."""
     key: Index
+    """(rows,) key that the rows chosen from all tables must share."""
 
     def __len__(self) -> int:
         return len(self.table)
@@ -42,35 +44,42 @@ class TableRows:
 
 @dataclass(frozen=True)
 class ValueRule:
-    """low <= sum over the tables of the chosen row's weight <= high."""
+    """A rule on the rows chosen: low <= sum over the tables of the chosen row's weight <= high."""
 
     weights: tuple[Array, ...]
+    """Weight of each row, table by table."""
     low: float
+    """Least sum that keeps the rule."""
     high: float
+    """Largest sum that keeps the rule."""
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """What counts after the error.
-
-    free : values that cost nothing. price : price class by value. tolerance : errors up to it count
-    as none. slack : how far above its least the error may be. most : limit on new values.
-    """
+    """What counts after the error."""
 
     free: frozenset[float]
+    """Values that cost nothing."""
     price: Mapping[float, float]
+    """Price class by value."""
     tolerance: float
+    """Errors up to it count as none."""
     slack: float
+    """How far above its least the error may be."""
     most: int | None = None
+    """Limit on new values."""
 
 
 @dataclass(frozen=True)
 class Pick:
-    """The chosen row of each table, the largest error, and the solver's word."""
+    """What was chosen."""
 
     rows: tuple[int, ...]
+    """The chosen row of each table."""
     error: float
+    """The largest error."""
     solver: str
+    """The solver's word."""
 
 
 def choose(

@@ -19,10 +19,12 @@ DIGITS = 11
 
 @dataclass(frozen=True)
 class ValueTable:
-    """Combinations of values: values (rows, parts) [ohm], parts in the order of ``names``."""
+    """Combinations of values."""
 
     names: tuple[str, ...]
+    """Names of the parts."""
     values: Array
+    """(rows, parts) values [ohm], parts in the order of ``names``."""
 
     def __len__(self) -> int:
         return len(self.values)

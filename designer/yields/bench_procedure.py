@@ -51,15 +51,18 @@ TAG = 0xBE7C
 
 @dataclass(frozen=True)
 class BenchResult:
-    """Where the person stopped. state : (states,) of the board there, at drive phase 0; seen :
-    whether the wanted pattern was on the screen; steps : settings tried, the first one included.
-    failure : why the procedure could not be played; "" where it was."""
+    """Where the person at the bench stopped."""
 
     setting: Adjustment
+    """The setting of the generator there."""
     state: Array
+    """(states,) state of the board there, at drive phase 0."""
     seen: bool
+    """Whether the wanted pattern was on the screen."""
     steps: int
+    """Settings tried, the first one included."""
     failure: str = ""
+    """Why the procedure could not be played; "" where it was."""
 
 
 def find_on_bench(

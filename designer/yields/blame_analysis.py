@@ -36,49 +36,63 @@ NOTHING_LOST = "no board was lost, so none was replayed"
 
 @dataclass(frozen=True)
 class NearLimit:
-    """What ends the response: in words, and how many standard deviations away it is nominally."""
+    """What ends the response."""
 
     what: str
+    """What ends the response, in words."""
     distance: float
+    """How many standard deviations away it is on the nominal board."""
 
 
 @dataclass(frozen=True)
 class ResponseBlame:
-    """Of one question of the plan.
-
-    lost : boards of the study. subjects : most losses avoided first, groups among them. there : of
-    ``sought`` lost boards, those on which the response exists and the nominal orbit leads
-    elsewhere. limited_by : one sentence. skipped : why boards were not replayed, or no more than a
-    few; "" where they were.
-    """
+    """Why boards lose one response."""
 
     question: int
+    """Number of the question of the plan."""
     lost: int
+    """Boards of the study that lost the response."""
     subjects: tuple[BlamedPart, ...]
+    """Parts and groups that were made exact, most losses avoided first."""
     indices: tuple[Index, ...]
+    """Sobol indices of the margin."""
     limits: tuple[NearLimit, ...]
+    """Ways of losing the response, the nearest first."""
     prediction: Prediction
+    """How well the margin foretells what became of boards."""
     sought: int
+    """Lost boards on which the response was looked for."""
     there: int
+    """Of ``sought`` lost boards, those on which the response exists and the nominal orbit
+    leads elsewhere."""
     corner: Corner | None
+    """The worst corner; None where none was looked for."""
     limited_by: str
+    """What limits the response, in one sentence."""
     skipped: str = ""
+    """Why boards were not replayed, or no more than a few; "" where they were."""
 
 
 @dataclass(frozen=True)
 class Blame:
-    """The blame of every question. attractors, orbits : sought and followed; seconds : wall time,
-    all that may differ between equal runs. budget : steps that were allowed, None where all were;
-    share : of the whole work, what was done within it."""
+    """The blame of every question. Only ``seconds`` may differ between equal runs."""
 
     responses: tuple[ResponseBlame, ...]
+    """The blame of each question."""
     samples: int
+    """How many boards were drawn."""
     seed: int
+    """Seed that the boards were drawn with."""
     attractors: int
+    """Attractors that were sought."""
     orbits: int
+    """Orbits that were followed."""
     seconds: float
+    """Wall time [s]."""
     budget: int | None = None
+    """Steps that were allowed, None where all were."""
     share: float = 1.0
+    """Share of the whole work that was done within the budget."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; an undefined number is None."""

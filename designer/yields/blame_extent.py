@@ -27,21 +27,22 @@ DRAWN = 256
 
 @dataclass(frozen=True)
 class Extent:
-    """What a blame of these answers does.
-
-    boards : of the study, by sample. rows : the answers to each question, by sample. made : what
-    is made exact. replays : boards that are asked again. crossings : lost boards that are followed
-    from the nominal one, as (question, sample). steps : of all this, at most; whole : without a
-    budget.
-    """
+    """What a blame of these answers does."""
 
     boards: Boards
+    """Boards of the study, by sample."""
     rows: tuple[tuple[Answer, ...], ...]
+    """The answers to each question, by sample."""
     made: tuple[ExactChange, ...]
+    """What is made exact."""
     replays: tuple[Replay, ...]
+    """Boards that are asked again."""
     crossings: tuple[tuple[int, int], ...]
+    """Lost boards that are followed from the nominal one, as (question, sample)."""
     steps: int
+    """Steps of all this, at most."""
     whole: int
+    """Steps of all this without a budget."""
 
     @property
     def share(self) -> float:

@@ -40,17 +40,21 @@ _VERDICTS = {str(verdict)[0]: verdict for verdict in Verdict}
 class BlamedPart:
     """A part or a group that was made exact, and what became of the boards.
 
-    kind : "resistor", "capacitor", "op-amp", "reference", "supply" or "group". avoided of replayed
-    lost boards were ok then; caused of kept ok boards were lost. Boards without an answer count in
-    neither.
+    Boards without an answer count in neither ``avoided`` nor ``caused``.
     """
 
     name: str
+    """Name of the part or the group."""
     kind: str
+    """"resistor", "capacitor", "op-amp", "reference", "supply" or "group"."""
     avoided: int
+    """Of ``replayed`` boards, those that were ok then."""
     replayed: int
+    """Lost boards that were asked again."""
     caused: int
+    """Of ``kept`` boards, those that were lost then."""
     kept: int
+    """Ok boards that were asked again."""
 
     @property
     def share(self) -> float:
@@ -65,15 +69,16 @@ class BlamedPart:
 
 @dataclass(frozen=True)
 class ExactChange:
-    """A part or a group that is made exact on boards that are replayed.
-
-    parts : that get their nominal values. fields : of ``Boards`` that are nominal on every part.
-    """
+    """A part or a group that is made exact on boards that are replayed."""
 
     name: str
+    """Name of the part or the group."""
     kind: str
+    """What it is; see ``BlamedPart``."""
     parts: tuple[str, ...] = ()
+    """Names of the parts that get their nominal values."""
     fields: tuple[str, ...] = ()
+    """Fields of ``Boards`` that are nominal on every part."""
 
     def of(self, boards: Boards) -> Boards:
         """The same boards with it exact."""
@@ -82,17 +87,18 @@ class ExactChange:
 
 @dataclass(frozen=True)
 class Replay:
-    """A board that is asked a question again.
-
-    before : what became of it in the study. place : number of lost or of ok boards of the question
-    before it. turn : share of the question's boards of that verdict that come before it.
-    """
+    """A board that is asked a question again."""
 
     question: int
+    """Number of the question of the plan."""
     sample: int
+    """Number of the board."""
     before: Verdict
+    """What became of the board in the study."""
     place: int
+    """Number of lost or of ok boards of the question before it."""
     turn: float
+    """Share of the question's boards of that verdict that come before it."""
 
     @property
     def piece(self) -> str:

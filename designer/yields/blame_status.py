@@ -20,13 +20,16 @@ class BlameStage(StrEnum):
 
 @dataclass(frozen=True)
 class BlameStatus:
-    """Of a study. share : of the whole work, what was done; budget : steps that were allowed, None
-    where all were; reason : why there is no blame, or not all of it; "" where it is whole."""
+    """How much of a study's blame there is."""
 
     stage: BlameStage
+    """How far the blame is."""
     share: float
+    """Share of the whole work that was done."""
     budget: int | None
+    """Steps that were allowed, None where all were."""
     reason: str
+    """Why there is no blame, or not all of it; "" where it is whole."""
 
     @classmethod
     def of(cls, blame: Blame | None, wanted: bool = True) -> BlameStatus:

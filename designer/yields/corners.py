@@ -31,20 +31,22 @@ LAST = 1.0 - 2.0**-53
 
 @dataclass(frozen=True)
 class Corner:
-    """Coordinates at the ends of their ranges, all others in the middle of theirs.
-
-    coordinates : what was put to its ends; worst : for each "low" or "high", the smaller or larger
-    number, in the corner of the least margin; margin : there. verdict, response : on the exact
-    rung. survived : of ``corners``.
-    """
+    """Coordinates at the ends of their ranges, all others in the middle of theirs."""
 
     coordinates: tuple[str, ...]
+    """What was put to its ends."""
     worst: tuple[str, ...]
+    """For each "low" or "high", the smaller or larger number, in the corner of the least margin."""
     margin: float
+    """Margin in the worst corner."""
     verdict: Verdict
+    """What became of the corner's board on the exact rung."""
     response: str
+    """n-p-q or status of the corner's board on the exact rung."""
     survived: int
+    """Of ``corners`` corners, those whose board shows the response."""
     corners: int
+    """Corners that were asked."""
 
 
 def worst_corners(

@@ -21,16 +21,22 @@ ROUNDS = 10
 
 @dataclass(frozen=True)
 class Crossing:
-    """board : which. question : number. inside : the farthest share of the way at which the
-    response was met, with its orbit there; outside : the nearest at which it was not. Where it was
-    met on the board itself, inside = outside = 1: the response is there, and the nominal orbit
-    leads to another attractor."""
+    """Where on the way from the nominal board to a lost one the response ends.
+
+    Where it was met on the board itself, ``inside`` and ``outside`` are 1: the response is there,
+    and the nominal orbit leads to another attractor.
+    """
 
     board: int
+    """The lost board, by its place in the ensemble."""
     question: int
+    """Number of the question of the plan."""
     inside: float
+    """The farthest share of the way at which the response was met."""
     outside: float
+    """The nearest share of the way at which the response was not met."""
     orbit: Orbit
+    """The orbit at ``inside``."""
 
     @property
     def there(self) -> bool:

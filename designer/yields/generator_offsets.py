@@ -10,12 +10,14 @@ from designer.model.tuning_bands import Bands
 
 @dataclass(frozen=True)
 class Adjustment:
-    """Changes as fractions: of the frequency, of the amplitude, and the DC offset over the
-    amplitude of ``setup.csv``."""
+    """Changes of the generator's setting, as fractions."""
 
     frequency: float = 0.0
+    """Over the frequency in ``setup.csv``."""
     amplitude: float = 0.0
+    """Over the amplitude in ``setup.csv``."""
     offset: float = 0.0
+    """The DC offset, over the amplitude in ``setup.csv``."""
 
     def of(self, excitation: Excitation) -> Excitation:
         """The generator's setting after the change."""

@@ -48,18 +48,18 @@ _DEAD_ZONE = re.compile(r"R(2\d\d|50)[AB]?")
 
 @dataclass(frozen=True)
 class Limiting:
-    """What limits one response.
-
-    mechanism : one of ``MECHANISMS``. border : where the response ends, in words; distance : of
-    the nominal board from it in standard deviations; nan without one. shares : of the border's
-    variance, by what moves it; see ``shares``. line : all of it in one line.
-    """
+    """What limits one response."""
 
     mechanism: str
+    """What ends the response, one of ``MECHANISMS``."""
     border: str
+    """Where the response ends, in words."""
     distance: float
+    """Standard deviations from the nominal board to the border; nan without one."""
     shares: dict[str, float]
+    """Shares of the border's variance, by what moves it; see ``shares``."""
     line: str
+    """All of this in one line."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain, for JSON."""

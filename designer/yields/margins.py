@@ -49,20 +49,21 @@ CROSSINGS = 8
 
 @dataclass(frozen=True)
 class Limit:
-    """One way of losing the response.
-
-    what : in words; kind : see ``continued_orbit.Function``. nominal : its value on the nominal
-    board [V for contact, miss, parting], where the linear function is positive. sigma : its
-    standard deviation over the spread. slopes : (k,) its change over one standard deviation of each
-    quantity. board : the lost board it was found on; -1 for the nominal board.
-    """
+    """One way of losing the response."""
 
     what: str
+    """How the response is lost, in words."""
     kind: str
+    """Kind of the function; see ``continued_orbit.Function``."""
     nominal: float
+    """Its value on the nominal board [V for contact, miss, parting], where the linear function is
+    positive."""
     sigma: float
+    """Its standard deviation over the spread."""
     slopes: Array
+    """(k,) its change over one standard deviation of each quantity."""
     board: int = -1
+    """The lost board it was found on; -1 for the nominal board."""
 
     @property
     def distance(self) -> float:
@@ -72,36 +73,38 @@ class Limit:
 
 @dataclass(frozen=True)
 class Prediction:
-    """How well the sign of a margin says what became of boards that had no part in choosing it.
-
-    right : verdicts foretold. ok, lost : boards of either verdict. missed : lost boards that were
-    said to be ok; alarms : ok boards that were said to be lost.
-    """
+    """How well the sign of a margin says what became of boards that had no part in choosing it."""
 
     ok: int
+    """Boards that were ok."""
     lost: int
+    """Boards that were lost."""
     missed: int
+    """Lost boards that were said to be ok."""
     alarms: int
+    """Ok boards that were said to be lost."""
 
     @property
     def right(self) -> int:
+        """Verdicts that were foretold."""
         return self.ok + self.lost - self.missed - self.alarms
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The margin of one response.
-
-    quantities : what differs between boards, in the order of the slopes. limits : nearest first.
-    there : of ``sought`` lost boards, those on which the response exists all the same and the
-    nominal orbit leads to another attractor.
-    """
+    """The margin of one response."""
 
     quantities: tuple[Quantity, ...]
+    """What differs between boards, in the order of the slopes."""
     limits: tuple[Limit, ...]
+    """Ways of losing the response, the nearest first."""
     prediction: Prediction = Prediction(0, 0, 0, 0)
+    """How well the margin's sign foretells what became of boards."""
     sought: int = 0
+    """Lost boards on which the response was looked for."""
     there: int = 0
+    """Of ``sought`` lost boards, those on which the response exists all the same and the
+    nominal orbit leads to another attractor."""
 
     def each(self, boards: Boards) -> Array:
         """(N, limits) every limit on these boards, in its own standard deviations."""

@@ -49,25 +49,32 @@ OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
 
 @dataclass(frozen=True)
 class Query:
-    """One run of ngspice. expected : the exact circuit's response. refinements : how often the
-    step is halved at most."""
+    """One run of ngspice."""
 
     subject: GateSubject
+    """The response and the board that is run."""
     settings: SolverSettings
+    """Settings of ngspice."""
     expected: str
+    """Response of the exact circuit."""
     refinements: int = OWN_REFINEMENTS
+    """How often the step is halved at most."""
 
 
 @dataclass(frozen=True)
 class NgspiceAnswer:
-    """What ngspice said: n-p-q, status or `UNDECIDED`, with the reason and the remedies of the last
-    run. An undecided one's reason has both answers, as has ``either`` if both are any."""
+    """What ngspice said."""
 
     response: str
+    """n-p-q, status or ``UNDECIDED``."""
     reason: str = ""
+    """Why; of an undecided one, both answers."""
     remedies: str = ""
+    """Remedies that the last run needed."""
     symmetric: bool = False
+    """Whether the orbit is its own mirror image."""
     either: str = ""
+    """Both answers of an undecided one, if both are any."""
 
 
 def hear(

@@ -69,32 +69,40 @@ class Ask:
     """One run that ngspice is to make."""
 
     sample: int
+    """Number of the board."""
     question: int
+    """Number of the question of the plan."""
     kind: StartKind
+    """Where the board was started."""
     why: Why
+    """Why the board was asked about."""
 
 
 @dataclass(frozen=True)
 class Hearing:
-    """What ngspice said about one sample of one response.
-
-    response : n-p-q or status there, "undecided" where two step sizes differ to the last, ""
-    where the way was too long to be asked; ``reason`` then says how long. remedies : those that a
-    run needed to converge, in order. periods : drive periods left out before the run was judged.
-    symmetric : whether its orbit was; False too where it has none. either : the last two answers of
-    an undecided one, with `OR` between them.
-    """
+    """What ngspice said about one sample of one response."""
 
     sample: int
+    """Number of the board."""
     question: int
+    """Number of the question of the plan."""
     kind: StartKind
+    """Where the board was started."""
     why: Why
+    """Why the board was asked about."""
     response: str
+    """n-p-q or status there, "undecided" where two step sizes differ to the last, "" where the way
+    was too long to be asked."""
     reason: str
+    """Why; how long the way was where it was too long."""
     remedies: str
+    """Remedies that a run needed to converge, in order."""
     periods: int
+    """Drive periods left out before the run was judged."""
     symmetric: bool
+    """Whether the run's orbit was symmetric; False too where it has none."""
     either: str = ""
+    """The last two answers of an undecided one, with `OR` between them."""
 
     @property
     def decided(self) -> bool:

@@ -84,12 +84,15 @@ def with_generator(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseLine
 
 @dataclass(frozen=True)
 class Arrival:
-    """Where a power-up led: state (n,) at drive phase 0, drive periods that it took, and whether an
-    element that ought to be linear was at its limit in the first ``WATCHED`` periods."""
+    """Where a power-up led."""
 
     state: Array
+    """(n,) state at drive phase 0."""
     periods: int
+    """Drive periods that it took."""
     clipped: bool
+    """Whether an element that ought to be linear was at its limit in the first ``WATCHED``
+    periods."""
 
 
 def follow(

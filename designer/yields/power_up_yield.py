@@ -28,31 +28,39 @@ STREAM = "phase:"
 
 @dataclass(frozen=True)
 class PowerUpAnswer:
-    """One sample of one response, switched on by the recipe.
-
-    verdict, response, reason : as of a board as built. phase : of the generator at power-up [rad].
-    periods : drive periods from power-up to the end of the recipe, and those that settling cost
-    after it. clipped : an op-amp that ought to be linear was at its limit in the first periods.
-    """
+    """One sample of one response, switched on by the recipe."""
 
     sample: int
+    """Number of the board."""
     question: int
+    """Number of the question of the plan."""
     verdict: Verdict
+    """What became of the board."""
     response: str
+    """n-p-q or status that it shows."""
     reason: str
+    """Why it is not ok, or ""."""
     phase: float
+    """Phase of the generator at power-up [rad]."""
     periods: int
+    """Drive periods from power-up to the end of the recipe, and those that settling cost after
+    it."""
     clipped: bool
+    """Whether an op-amp that ought to be linear was at its limit in the first periods."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """What a power-up led to. arrival : at the end of the recipe; None where the flow failed."""
+    """What a power-up led to."""
 
     verdict: Verdict
+    """What became of the board."""
     reason: str
+    """Why it is not ok, or ""."""
     orbit: Orbit
+    """The orbit that was reached; None where none was."""
     arrival: Arrival | None
+    """State at the end of the recipe; None where the flow failed."""
 
 
 def switched_on(

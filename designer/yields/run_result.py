@@ -20,14 +20,23 @@ class RunResult:
     """Everything that ``run`` found."""
 
     modelfile: ModelFile
+    """The model file."""
     catalog: Catalog
+    """The catalogue."""
     found: tuple[ModelResponse, ...]
+    """What the model shows of the wanted responses."""
     design: Design
+    """The design."""
     checked: tuple[CheckedResponse, ...]
+    """The wanted responses on all engines."""
     study: Study
+    """The tolerance study."""
     provenance: dict[str, Any] = field(default_factory=dict)
+    """Versions, seed and settings."""
     cost: dict[str, float] = field(default_factory=dict)
+    """Wall times [s] by stage."""
     equations: EquationCheck | None = None
+    """The equation check; None where it was not made."""
 
     @property
     def plan(self) -> StudyPlan:

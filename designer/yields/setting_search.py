@@ -52,9 +52,13 @@ class Try:
     """One setting that a board was asked at, and what it answered."""
 
     setting: Adjustment
+    """The setting, as changes of the generator."""
     orbit: Orbit
+    """The orbit that it settled on."""
     verdict: Verdict
+    """What became of the board."""
     reason: str
+    """Why it is not ok, or ""."""
 
     @property
     def margin(self) -> float:
@@ -64,17 +68,18 @@ class Try:
 
 @dataclass
 class BoardCase:
-    """One board, by its place in the ensemble, and one response that it does not show as built.
-
-    centre : the DC offset that centres the board, over the amplitude. followed : orbits that were
-    followed on paths to it.
-    """
+    """One board, by its place in the ensemble, and one response that it does not show as built."""
 
     board: int
+    """Place of the board in the ensemble."""
     question: Question
+    """The response that is asked for."""
     centre: float
+    """The DC offset that centres the board, over the amplitude."""
     tries: list[Try] = field(default_factory=list)
+    """The settings that were asked."""
     followed: int = 0
+    """Orbits that were followed on paths to the board."""
 
     @property
     def found(self) -> Try | None:

@@ -20,12 +20,16 @@ CUBE = 512
 
 @dataclass(frozen=True)
 class Index:
-    """Sobol indices of the margin for one coordinate of the spread, which belongs to ``part``."""
+    """Sobol indices of the margin for one coordinate of the spread."""
 
     coordinate: str
+    """Name of the coordinate."""
     part: str
+    """Name of the part that it belongs to."""
     first: float
+    """First-order Sobol index."""
     total: float
+    """Total Sobol index."""
 
 
 def sobol(

@@ -33,31 +33,38 @@ class RecipeKind(StrEnum):
 
 @dataclass(frozen=True)
 class Recipe:
-    """Switch on at ``first``, go to ``target`` in steps of equal ratio, wait.
-
-    steps : of the sweep, ``hold`` drive periods each, the one at ``first`` included; 0 without
-    one. wait : drive periods at the target. omega : dimensionless frequency of the target.
-    reached, trials : switch-on phases of the nominal circuit; board_reached, board_trials : starts
-    of the ``able`` sample boards that show the response as built, of ``boards`` drawn. smooth,
-    slower : whether a sweep
-    without steps, and one ``SLOWER`` times as slow, did as well.
-    """
+    """Switch on at ``first``, go to ``target`` in steps of equal ratio, wait."""
 
     way: RecipeKind
+    """Kind of the recipe."""
     omega: float | None
+    """Dimensionless frequency of the target."""
     target: Excitation
+    """The generator's setting at the end."""
     first: Excitation
+    """The generator's setting at power-up."""
     steps: int
+    """Steps of the sweep, the one at ``first`` included; 0 without one."""
     hold: int
+    """Drive periods at each step of the sweep."""
     wait: int
+    """Drive periods at the target."""
     reached: int = 0
+    """Switch-on phases of the nominal circuit, of ``trials``, that lead to the response."""
     trials: int = 0
+    """Switch-on phases of the nominal circuit that were tried."""
     board_reached: int = 0
+    """Starts of sample boards, of ``board_trials``, that lead to the response."""
     board_trials: int = 0
+    """Starts of the ``able`` sample boards that were tried."""
     boards: int = 0
+    """Sample boards that were drawn."""
     able: int = 0
+    """Sample boards that show the response as built."""
     smooth: bool = False
+    """Whether a sweep without steps did as well."""
     slower: bool = False
+    """Whether a sweep ``SLOWER`` times as slow did as well."""
 
     def stages(self) -> Iterator[tuple[Excitation, int]]:
         """Settings of the generator in order, each with its whole drive periods."""

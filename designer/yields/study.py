@@ -24,31 +24,38 @@ from designer.yields.yield_maps import YieldMap
 
 @dataclass(frozen=True)
 class Study:
-    """A tolerance study of the responses in ``checked``.
-
-    asked : for each question of the plan, the index of its response. left_out : why a response
-    is no question, by index. heard : what ngspice said. until : the width that was asked for;
-    narrow : whether every interval is narrower (None where no width was asked for). tuned,
-    reached : their rows; None where they were not asked for. trimmed : likewise; None where no
-    trimmer is fitted. recipes : one for each question.
-    blame, maps : by question, where they were asked for. blame_wanted : whether a blame was.
-    """
+    """A tolerance study of wanted responses."""
 
     checked: tuple[CheckedResponse, ...]
+    """The wanted responses on all engines."""
     plan: StudyPlan
+    """What decides the samples."""
     asked: tuple[int, ...]
+    """Index of the response that each question of the plan asks for."""
     left_out: dict[int, str]
+    """Why a response is no question, by index."""
     answers: tuple[Answer, ...]
+    """Rows of the boards as built."""
     heard: tuple[Hearing, ...] = ()
+    """What ngspice said about boards of the study."""
     until: float | None = None
+    """Width of the intervals that was asked for; None for none."""
     narrow: bool | None = None
+    """Whether every interval is narrower (None where no width was asked for)."""
     tuned: tuple[Tuned, ...] | None = None
+    """Rows of the boards with the generator tuned; None where these were not asked for."""
     trimmed: tuple[Trimmed, ...] | None = None
+    """Rows of the boards with the trimmer set; None where no trimmer is fitted."""
     reached: tuple[PowerUpAnswer, ...] | None = None
+    """Rows of the boards powered up; None where these were not asked for."""
     recipes: tuple[Recipe, ...] | None = None
+    """Recipes of power-up, one for each question."""
     blame: Blame | None = None
+    """The blame by question; None where none was asked for."""
     maps: tuple[YieldMap, ...] = ()
+    """Yield maps of questions; empty where none were asked for."""
     blame_wanted: bool = True
+    """Whether a blame was asked for."""
 
     def answers_to(self, index: int) -> tuple[Answer, ...]:
         """The answers for response number ``index``, by sample."""

@@ -83,12 +83,19 @@ class Work:
     """Who does the work of a study, and where it goes."""
 
     jobs: int
+    """Number of workers."""
     pool: SpicePool | None
+    """Runs ngspice; None where it is not asked."""
     stores: Stores
+    """Where rows are kept."""
     runner: Runner
+    """Who computes blocks."""
     said: Progress
+    """Told how far the work is."""
     rung: RungName
+    """Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample."""
     blame_budget: int = BUDGET
+    """Steps that the blame may take."""
 
     def made(self, study: Study) -> Study:
         """A study of the plan's samples."""

@@ -47,12 +47,14 @@ TAG = 0x7213
 
 @dataclass(frozen=True)
 class DcTrim:
-    """circuit : with the trimmer and its resistor among its parts, the wiper in the middle. track
-    [Ω]. adjustability : how finely the wiper is set, ± of the travel."""
+    """A trimmer that sets a board's DC offset."""
 
     circuit: Circuit
+    """The circuit with the trimmer and its resistor among its parts, the wiper in the middle."""
     track: float
+    """Resistance of the trimmer's track [Ω]."""
     adjustability: float
+    """How finely the wiper is set, ± of the travel."""
 
     @classmethod
     def of(cls, circuit: Circuit, part: Trimmer, series: Resistor, adjustability: float) -> DcTrim:
@@ -85,24 +87,30 @@ class DcTrim:
 
 @dataclass(frozen=True)
 class Trimmed:
-    """One sample of one response at the board's one setting of the trimmer.
-
-    verdict, response, reason : the exact circuit's; the margins are its. position : of the wiper,
-    0 at the negative rail and 1 at the positive one. at_end : whether the trimmer reaches no
-    further.
-    """
+    """One sample of one response at the board's one setting of the trimmer."""
 
     sample: int
+    """Number of the board."""
     question: int
+    """Number of the question of the plan."""
     verdict: Verdict
+    """What became of the board."""
     response: str
+    """n-p-q or status on the exact circuit."""
     reason: str
+    """Why it is not ok, or ""."""
     position: float
+    """Position of the wiper, 0 at the negative rail and 1 at the positive one."""
     at_end: bool
+    """Whether the trimmer reaches no further."""
     radius: float
+    """Largest modulus of the orbit's multipliers."""
     penetration: float
+    """Smallest penetration of all contacts, in units of the moving state."""
     miss: float
+    """Nearest approach to a stop without contact, in units of the moving state."""
     asymmetry: float
+    """Distance of the orbit from its mirror image (``Orbit.asymmetry``)."""
 
 
 def dc_trim(made: Synthesis) -> DcTrim | None:

@@ -33,45 +33,57 @@ _NAN = float("nan")
 
 @dataclass(frozen=True)
 class Tuned:
-    """One sample of one response, with the generator free within the bands.
-
-    verdict : ok where some setting works; failed where none is known to and at least half of those
-    asked, as built among them, gave no answer; else grazing where one is undecided, and lost where
-    none was found, which is no proof that there is none. response, reason : there, or as
-    built where nothing was found. frequency, amplitude, offset : the setting as fractions, see
-    ``Adjustment``; zeros where the board works as built and where nothing was found. tries :
-    settings asked, unanswered of them without an answer; followed : orbits that were followed to
-    find some of them. radius, penetration, miss : margins of
-    the orbit found (nan without one).
-
-    bench_verdict : the exact circuit's, at the setting where the simulated person stopped;
-    failed where the procedure could not be played. bench_reason : why it is not ok. bench_seen :
-    whether the person saw the wanted pattern there. bench_steps : settings of the generator that it
-    took.
-    """
+    """One sample of one response, with the generator free within the bands."""
 
     sample: int
+    """Number of the board."""
     question: int
+    """Number of the question of the plan."""
     verdict: Verdict
+    """Ok where some setting works; failed where none is known to and at least half of those asked,
+    as built among them, gave no answer; else grazing where one is undecided, and lost where none
+    was found, which is no proof that there is none."""
     response: str
+    """n-p-q or status at the setting, or as built where nothing was found."""
     reason: str
+    """Why it is not ok, or ""."""
     frequency: float
+    """Change of the frequency at the setting, a fraction; 0 as built and where nothing was
+    found."""
     amplitude: float
+    """Change of the amplitude at the setting, a fraction; 0 as built and where nothing was
+    found."""
     offset: float
+    """DC offset at the setting, over the amplitude; 0 as built and where nothing was found."""
     tries: int
+    """Settings that were asked."""
     unanswered: int
+    """Settings without an answer."""
     followed: int
+    """Orbits that were followed to find some of the settings."""
     radius: float
+    """Largest modulus of the multipliers of the orbit found; nan without one."""
     penetration: float
+    """Smallest penetration of the orbit found; nan without one."""
     miss: float
+    """Nearest miss of the orbit found; nan without one."""
     bench_verdict: Verdict
+    """Verdict of the exact circuit at the setting where the simulated person stopped; failed where
+    the procedure could not be played."""
     bench_response: str
+    """n-p-q or status of the exact circuit there."""
     bench_reason: str
+    """Why that is not ok, or ""."""
     bench_seen: bool
+    """Whether the person saw the wanted pattern there."""
     bench_frequency: float
+    """Change of the frequency there, a fraction."""
     bench_amplitude: float
+    """Change of the amplitude there, a fraction."""
     bench_offset: float
+    """DC offset there, over the amplitude."""
     bench_steps: int
+    """Settings of the generator that the person tried."""
 
     @property
     def setting(self) -> Adjustment:

@@ -60,20 +60,29 @@ class Disagreement:
     """One board on which ngspice says another response than the exact rung."""
 
     sample: int
+    """Number of the board."""
     kind: StartKind
+    """Where the board was started."""
     why: Why
+    """Why the board was asked about."""
     exact: str
+    """n-p-q or status on the exact rung."""
     ngspice: str
+    """n-p-q or status in ngspice."""
     distance: float
+    """How far the board is from losing the response (``ngspice_sampling.distance``)."""
     explanation: Explanation
+    """What explains the difference."""
 
 
 @dataclass(frozen=True)
 class Rate:
-    """A share with its two-sided 95 % Wilson interval."""
+    """A share of boards."""
 
     count: int
+    """Boards that have the property."""
     of: int
+    """Boards in all."""
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -82,33 +91,46 @@ class Rate:
 
 @dataclass(frozen=True)
 class Stratum:
-    """samples : N_h. asked : n_h, those with an answer. gained, lost : of these, boards that only
-    ngspice calls ok, and that only the exact rung does."""
+    """A part of the boards, of which ngspice was asked about some."""
 
     name: str
+    """Name of the stratum."""
     samples: int
+    """Boards in the stratum, N_h."""
     asked: int
+    """Boards in the stratum with an answer of ngspice, n_h."""
     gained: int
+    """Of ``asked``, boards that only ngspice calls ok."""
     lost: int
+    """Of ``asked``, boards that only the exact rung calls ok."""
     could_gain: int
+    """Boards in the stratum that the exact rung does not call ok."""
     could_lose: int
+    """Boards in the stratum that the exact rung calls ok."""
 
 
 @dataclass(frozen=True)
 class Combined:
-    """The yield by both engines; low, high : 95 %. disagreement : of n-p-q, on the random subset
-    from the nominal orbit. undecided : boards that were asked and have no answer; if_lost, if_ok :
-    the estimate if ngspice lost all of these, and if it called all of them ok."""
+    """The yield by both engines."""
 
     estimate: float
+    """Estimate of the yield."""
     low: float
+    """Lower end of its 95 % interval."""
     high: float
+    """Upper end of its 95 % interval."""
     disagreement: Rate
+    """Share of boards with another n-p-q, on the random subset from the nominal orbit."""
     undecided: int
+    """Boards that were asked and have no answer."""
     if_lost: float
+    """The estimate if ngspice lost all undecided boards."""
     if_ok: float
+    """The estimate if ngspice called all undecided boards ok."""
     strata: tuple[Stratum, ...]
+    """The strata that it was estimated from."""
     differences: tuple[Disagreement, ...]
+    """Boards on which the engines differ."""
 
     @property
     def width(self) -> float:

@@ -34,16 +34,17 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Question:
-    """One wanted response of the nominal design: what every board is asked.
-
-    start : nominal orbit on the exact circuit. settings : ngspice's, from the numerics gate;
-    None where the gate did not pass, and ngspice is then not asked.
-    """
+    """One wanted response of the nominal design: what every board is asked."""
 
     spec: Response
+    """The wanted response."""
     excitation: Excitation
+    """The generator's setting."""
     start: Orbit
+    """Nominal orbit on the exact circuit."""
     settings: SolverSettings | None
+    """Settings of ngspice, from the numerics gate; None where the gate did not pass, and ngspice is
+    then not asked."""
 
     @property
     def stream(self) -> str:
@@ -54,37 +55,46 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """One sample of one response.
-
-    response : n-p-q or status on the exact circuit; the margins are its, waveform among them: RMS
-    difference of the first displacement from the nominal board's, over its peak.
-    """
+    """One sample of one response. The margins are those of the exact circuit."""
 
     sample: int
+    """Number of the board."""
     question: int
+    """Number of the question of the plan."""
     verdict: Verdict
+    """What became of the board."""
     response: str
+    """n-p-q or status on the exact circuit."""
     reason: str
+    """Why it is not ok, or ""."""
     radius: float
+    """Largest modulus of the orbit's multipliers."""
     penetration: float
+    """Smallest penetration of all contacts, in units of the moving state."""
     miss: float
+    """Nearest approach to a stop without contact, in units of the moving state."""
     asymmetry: float
+    """Distance of the orbit from its mirror image (``Orbit.asymmetry``)."""
     periods: int
+    """Drive periods that the answer cost."""
     waveform: float = float("nan")
+    """RMS difference of the first displacement from the nominal board's, over its peak."""
 
 
 @dataclass(frozen=True)
 class Yield:
-    """Counts, and the two-sided 95 % Wilson interval of ok/(samples - failed).
-
-    census : whether these are all the boards there are; then the interval is the rate itself.
-    """
+    """Counts of boards, with the two-sided 95 % Wilson interval of ok/(samples - failed)."""
 
     ok: int
+    """Boards that keep the response."""
     lost: int
+    """Boards that lose the response."""
     grazing: int
+    """Boards whose count of impacts is undecided."""
     failed: int
+    """Boards without an answer."""
     census: bool = field(default=False, kw_only=True)
+    """Whether these are all the boards there are; then the interval is the rate itself."""
 
     @property
     def samples(self) -> int:
@@ -109,10 +119,15 @@ class StudyPlan:
     """Everything that decides a study's samples; equal plans give equal answers."""
 
     circuit: Circuit
+    """The nominal circuit."""
     spread: Spread
+    """What varies from board to board."""
     seed: int
+    """Seed that the boards were drawn with."""
     samples: int
+    """How many boards were drawn."""
     questions: tuple[Question, ...]
+    """The wanted responses."""
 
     @property
     def labels(self) -> tuple[str, ...]:

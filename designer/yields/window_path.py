@@ -50,21 +50,24 @@ RESERVE = 24
 
 @dataclass(frozen=True)
 class PathSetting:
-    """A setting on a path. radius : half-bands, of the ball about it on which the linearised
-    functions stay positive; negative outside of the window; -inf where the path ended on the way to
-    the board."""
+    """A setting on a path."""
 
     setting: Adjustment
+    """The setting, as changes of the generator."""
     radius: float
+    """Radius, in half-bands, of the ball about it on which the linearised functions stay positive;
+    negative outside of the window; -inf where the path ended on the way to the board."""
 
 
 @dataclass(frozen=True)
 class PathTrail:
-    """What a path met on the board itself, in order, or the one spot where it ended on the way.
-    followed : orbits that were shot for."""
+    """What a path met."""
 
     spots: tuple[PathSetting, ...]
+    """Settings met on the board itself, in order, or the one spot where the path ended on the
+    way."""
     followed: int
+    """Orbits that were shot for."""
 
 
 @dataclass(frozen=True)

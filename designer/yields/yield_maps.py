@@ -55,38 +55,50 @@ seen."""
 
 @dataclass(frozen=True)
 class Axis:
-    """name : "omega", "b" or "grade" (a fraction, of resistors and capacitors)."""
+    """An axis of a yield map."""
 
     name: str
+    """What is varied: "omega", "b" or "grade" (a fraction, of resistors and capacitors)."""
     values: tuple[float, ...]
+    """Values of the setting along the axis."""
 
 
 @dataclass(frozen=True)
 class YieldMap:
-    """Counts of a response on a grid of settings; every array has the axes' shape.
-
-    question : of the plan. there : whether the nominal circuit shows the response, with the
-    symmetry that is asked for. window : edges of the nominal circuit's window in the first axis's
-    unit, None over the grade; an edge at the reach of the search is marked in ``open`` (below,
-    above). used : the setting of the plan, at which the generator runs at ``frequency`` [Hz].
-    """
+    """Counts of a response on a grid of settings; every array has the axes' shape."""
 
     over: Over
+    """What the settings differ in."""
     question: int
+    """Number of the question of the plan."""
     axes: tuple[Axis, ...]
+    """The axes of the grid."""
     there: NDArray[np.bool_]
+    """Whether the nominal circuit shows the response, with the symmetry that is asked for."""
     ok: Counts
+    """Boards that keep the response."""
     lost: Counts
+    """Boards that lose the response."""
     grazing: Counts
+    """Boards whose count of impacts is undecided."""
     failed: Counts
+    """Boards without an answer."""
     samples: int
+    """Boards at each setting."""
     seed: int
+    """Seed that the boards were drawn with."""
     used: float
+    """The setting of the plan, in the first axis's unit."""
     window: tuple[float, float] | None
+    """Edges of the nominal circuit's window in the first axis's unit; None over the grade."""
     open: tuple[bool, bool]
+    """Whether the lower and the upper edge of the window lie at the reach of the search."""
     attractors: int
+    """Attractors that were sought."""
     seconds: float
+    """Wall time [s]."""
     frequency: float | None = None
+    """Frequency of the generator at the setting of the plan [Hz]."""
 
     def at(self, *index: int) -> Yield:
         """The yield at one point."""

@@ -149,6 +149,77 @@ def test_a_class_name_stands_once() -> None:
     assert {name: found for name, found in homes.items() if len(found) > 1} == {}
 
 
+def bare_fields(text: str) -> tuple[list[str], int]:
+    """Public fields without a docstring, as "Class.field", and how many fields there are.
+
+    Of public dataclasses and named tuples at the top of a module.
+    """
+    bare, count = [], 0
+    for node in ast.parse(text).body:
+        if not isinstance(node, ast.ClassDef) or node.name.startswith("_") or not is_record(node):
+            continue
+        for field, after in zip(node.body, [*node.body[1:], ast.Pass()], strict=True):
+            if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
+                continue
+            name = field.target.id
+            if name.startswith("_") or ast.unparse(field.annotation).startswith("ClassVar"):
+                continue
+            count += 1
+            if not (
+                isinstance(after, ast.Expr)
+                and isinstance(after.value, ast.Constant)
+                and isinstance(after.value.value, str)
+                and after.value.value.strip()
+            ):
+                bare.append(f"{node.name}.{name}")
+    return bare, count
+
+
+def is_record(node: ast.ClassDef) -> bool:
+    """Whether a class is a dataclass or a named tuple."""
+    marks = [m.func if isinstance(m, ast.Call) else m for m in node.decorator_list]
+    names = {ast.unparse(m).split(".")[-1] for m in [*marks, *node.bases]}
+    return not names.isdisjoint({"dataclass", "NamedTuple"})
+
+
+def test_bare_fields_are_found() -> None:
+    text = textwrap.dedent(
+        '''
+        @dataclasses.dataclass(frozen=True)
+        class Spring:
+            """A spring."""
+
+            stiffness: float
+            """[N/m]."""
+            gap: float = 0.0
+            sides: ClassVar[int] = 2
+            _cache: int = 0
+
+            def force(self) -> float: ...
+
+        class Step(NamedTuple):
+            size: float
+
+        class Plain:
+            size: float
+        '''
+    )
+    assert bare_fields(text) == (["Spring.gap", "Step.size"], 3)
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_every_field_has_its_docstring(package: str) -> None:
+    """In editors and on the pages of the reference, each field is explained where it stands."""
+    bare, total = [], 0
+    for module, path in sources().items():
+        if module.split(".")[0] == package:
+            found, count = bare_fields(path.read_text("utf-8"))
+            bare += [f"{module}:{field}" for field in found]
+            total += count
+    assert total > 0 or package == "cli"
+    assert bare == []
+
+
 def test_dynamics_and_bifurcations_stand_alone() -> None:
     """Shaw and Holmes' oscillator, built by hand where no other package can be imported."""
     script = textwrap.dedent(
