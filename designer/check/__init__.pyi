@@ -28,6 +28,7 @@ from .simulation import (
 from .synthesis_result import (
     Synthesis as Synthesis,
     synthesise as synthesise,
+    synthesize as synthesize,
 )
 from .trust import (
     WORDS as WORDS,

@@ -38,3 +38,7 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
     with naming(modelfile):
         found, design = checked_design.design_for(modelfile, catalog)
     return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)
+
+
+synthesize = synthesise
+"""The same in American spelling."""

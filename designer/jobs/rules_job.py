@@ -50,6 +50,37 @@ class RulesAnswer:
         return all(o.status != FAIL for o in self.outcomes)
 
 
+@dataclass(frozen=True)
+class RulesResult:
+    """What the verb ``rules`` answers."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md), which is the folder's ``rules.json``."""
+    passed: bool
+    """Whether no rule fails; what was not run does not fail."""
+
+
+def rules(
+    folder: Path | str,
+    *,
+    board: Path | str | None = None,
+    junit: Path | str | None = None,
+    progress: Progress | None = None,
+) -> RulesResult:
+    """The verb ``rules``: the design rules on a design folder and its board.
+
+    board : a .kicad_pcb of this design. junit : where to write a JUnit report.
+
+    Raises
+    ------
+    InputError : as ``into_folder``.
+    """
+    given = None if board is None else Path(board)
+    report = None if junit is None else Path(junit)
+    said = Progress() if progress is None else progress
+    return RulesResult(*into_folder(Path(folder), given, report, said))
+
+
 def into_folder(
     path: Path, board: Path | None, report: Path | None, progress: Progress
 ) -> tuple[dict[str, Any], bool]:

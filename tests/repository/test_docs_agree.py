@@ -13,7 +13,7 @@ from designer.base.progress import SILENCE
 from designer.bifurcations import parameter_map
 from designer.board.bom_layouts import file_of
 from designer.centering import ngspice_check, places
-from designer.cli import app
+from designer.cli import command_line
 from designer.dynamics.steady_state import Course
 from designer.jobs import bifurcation_request, board_files, trade_job
 from designer.model import find_responses, si_units
@@ -32,7 +32,7 @@ from designer.yields.verdict import BLOCK
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTRACT = (DOCS / "contract.md").read_text("utf-8")
-ROOT = typer.main.get_command(app.app)
+ROOT = typer.main.get_command(command_line.application())
 VERBS = {name: verb for name, verb in ROOT.commands.items() if not verb.hidden}  # type: ignore[attr-defined]
 COMMON = {"-h", "--help"}
 
