@@ -7,6 +7,9 @@ from .base.errors import (
 from .base.version import (
     __version__ as __version__,
 )
+from .board.bill_frame import (
+    bill_of_materials as bill_of_materials,
+)
 from .catalog.catalog import (
     Catalog as Catalog,
     load_catalog as load_catalog,
@@ -14,6 +17,9 @@ from .catalog.catalog import (
 from .check.simulation import (
     Simulated as Simulated,
     simulate as simulate,
+)
+from .check.simulation_frame import (
+    simulated_table as simulated_table,
 )
 from .check.synthesis_result import (
     Synthesis as Synthesis,

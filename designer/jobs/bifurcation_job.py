@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.arrays import Array
 from designer.base.checks import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.frames import frame, table_html
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
@@ -39,6 +40,9 @@ from designer.jobs.synthesise_job import read_design, source
 from designer.model.model_file import ModelFile, read_model_file
 from designer.model.swept_model import ModelSubject
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 FORMAT = 1
 
 
@@ -50,6 +54,25 @@ class BifurcationResult:
     """The JSON object (docs/contract.md)."""
     reused: bool
     """Whether the folder held the answer already."""
+
+    def windows(self) -> pd.DataFrame:
+        """The windows of a sweep, a row each; empty of a map and of basins."""
+        return frame(self.answer.get("windows", ()))
+
+    def points(self) -> pd.DataFrame:
+        """The bifurcation points of a sweep, a row each; empty of a map and of basins."""
+        return frame(self.answer.get("points", ()))
+
+    def _repr_html_(self) -> str:
+        names = ("from", "to", "response", "symmetric")
+        rows = [{n: w.get(n) for n in names} for w in self.answer.get("windows", ())]
+        return table_html(f"{self.answer['kind']} over {self._over}", rows)
+
+    @property
+    def _over(self) -> str:
+        if "parameter" in self.answer:
+            return str(self.answer["parameter"])
+        return f"{self.answer['x']['name']} and {self.answer['y']['name']}"
 
 
 def bifurcation(

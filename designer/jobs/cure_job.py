@@ -13,11 +13,12 @@ import time
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.default_counts import SEED
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
+from designer.base.frames import flat_frame, table_html
 from designer.base.keyed_store import Lines
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
@@ -36,6 +37,9 @@ from designer.jobs.synthesise_job import design_inputs, grade_inputs, made_from,
 from designer.model.model_file import naming, need_responses
 from designer.synthesis.tie_break import SOLVER
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 CURE, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
 """How the studies are written: each by its hash, which says all that decides it."""
@@ -52,6 +56,19 @@ class CureResult:
     answer: dict[str, Any]
     reached: bool
     reused: bool
+
+    def front(self) -> pd.DataFrame:
+        """The front of yield against price, a row for each choice of upgrades."""
+        return flat_frame(self.answer["front"])
+
+    def responses(self) -> pd.DataFrame:
+        """A row for each response, before and with the cure."""
+        return flat_frame(self.answer["responses"])
+
+    def _repr_html_(self) -> str:
+        rows = [{"upgrade": text} for text in self.answer["said"]]
+        title = f"Yield {self.answer['target']:g}: {'reached' if self.reached else 'not reached'}"
+        return table_html(title, rows, f"price {self.answer['price']:.4g}")
 
 
 def cure(

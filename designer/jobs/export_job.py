@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.design_folder import DESIGN, Folder
+from designer.base.frames import table_html
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import load_catalog
@@ -34,6 +35,9 @@ class ExportResult:
     def files(self) -> tuple[Path, ...]:
         """The files that were asked for."""
         return tuple(self.folder / name for name in self.answer["files"])
+
+    def _repr_html_(self) -> str:
+        return table_html(str(self.folder), [{"file": name} for name in self.answer["files"]])
 
 
 def export(

@@ -8,11 +8,12 @@ from __future__ import annotations
 import io
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.checks import at_least, cores
 from designer.base.default_counts import SEED, TRADE_BOARDS
 from designer.base.design_folder import Folder
+from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
@@ -36,6 +37,9 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, naming, need_responses, read_model_file
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields.verdict import StudyPlan
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHEET = "trade.md"
 PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")
@@ -64,6 +68,23 @@ class TradeResult:
     """The JSON object (docs/contract.md)."""
     reused: bool
     """Whether the folder held the answer already."""
+
+    def rungs(self) -> pd.DataFrame:
+        """Time and error of every rung on every response."""
+        return frame(self.answer["rungs"])
+
+    def boards(self) -> pd.DataFrame:
+        """What both engines say of the same boards, a row for each response."""
+        return frame(self.answer["boards"])
+
+    def cheapest(self) -> pd.DataFrame:
+        """The cheapest rung for each question."""
+        return frame(self.answer["cheapest"])
+
+    def _repr_html_(self) -> str:
+        names = ("question", "of", "expected", "rung", "level", "bound", "measured")
+        rows = [{name: row.get(name) for name in names} for row in self.answer["cheapest"]]
+        return table_html("The cheapest rung for each question", rows)
 
 
 def trade(
