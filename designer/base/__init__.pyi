@@ -77,6 +77,11 @@ from .figure_style import (
     to_png as to_png,
     to_svg as to_svg,
 )
+from .frames import (
+    flat_frame as flat_frame,
+    frame as frame,
+    table_html as table_html,
+)
 from .guarded_reading import (
     UNREADABLE as UNREADABLE,
     csv_rows as csv_rows,

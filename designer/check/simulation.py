@@ -16,6 +16,7 @@ from designer.base.arrays import Array
 from designer.base.checks import cores
 from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.errors import InputError
+from designer.base.frames import table_html
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
 from designer.check.checked_design import CheckedResponse
@@ -90,6 +91,18 @@ class Simulated:
     def twin(self) -> Orbit | None:
         """The mirror twin of the orbit, if it has one."""
         return self.twins[0] if self.twins else None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each orbit, which ``orbit`` says: "wanted" or "reached", "twin", "other"."""
+        first = "reached" if self.expected is None else "wanted"
+        orbits = [(first, self.orbit)]
+        orbits += [("twin", self.twin)] if self.twin is not None else []
+        orbits += [("other", orbit) for orbit in self.others]
+        head = {"omega": self.omega, "expected": self.expected, "found": self.found}
+        return [{**head, "orbit": kind, **_figures(orbit)} for kind, orbit in orbits]
+
+    def _repr_html_(self) -> str:
+        return table_html(f"ω = {self.omega:g}", self.rows())
 
 
 def simulate(
@@ -177,6 +190,22 @@ def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
 
 
 # ---------------------------------------------------------------------------------------------
+
+
+def _figures(orbit: Orbit) -> dict[str, Any]:
+    """What a table says of an orbit; NaN where it has no extremes."""
+    low, high = orbit.extremes[0] if len(orbit.extremes) else (np.nan, np.nan)
+    return {
+        "response": orbit.response,
+        "status": str(orbit.status),
+        "symmetric": orbit.symmetric,
+        "x1_max": float(high),
+        "x1_min": float(low),
+        "largest_multiplier": orbit.radius,
+        "lyapunov": orbit.lyapunov,
+        "penetration": orbit.penetration,
+        "miss": orbit.miss,
+    }
 
 
 def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated:

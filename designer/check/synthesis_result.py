@@ -8,9 +8,10 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from designer.base.frames import table_html
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
-from designer.circuit.design import Design
+from designer.circuit.design import Design, settings
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, naming
 
@@ -30,6 +31,20 @@ class Synthesis:
     seconds: float = 0.0
     """Wall time [s]."""
 
+    def _repr_html_(self) -> str:
+        rows = [
+            {
+                "omega": r.omega,
+                "expected": r.expected,
+                "model": r.orbit.response,
+                "frequency_hz": s.frequency_hz,
+                "amplitude_v_peak": s.amplitude_v_peak,
+            }
+            for r, s in zip(self.found, settings(self.design, self.found), strict=True)
+        ]
+        note = f"largest coefficient error {self.design.errors.max_error:.3g}"
+        return table_html(self.modelfile.title, rows, note)
+
 
 def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesis:
     """Find the wanted responses on the model and choose the parts.
@@ -43,3 +58,7 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
     with naming(modelfile):
         found, design = checked_design.design_for(modelfile, catalog)
     return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)
+
+
+synthesize = synthesise
+"""The same in American spelling."""

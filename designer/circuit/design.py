@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.frames import frame, table_html
 from designer.circuit.coefficients import CoefficientErrors
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite, composites_of
 from designer.model.find_responses import ModelResponse
 from designer.model.model import Dimensionless
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TOLERANCE = 2e-3
 """Relative, of a side condition: two circuits with like errors differ so much in their scales."""
@@ -106,6 +111,22 @@ class Design:
         driven = gain > 0.0
         volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
         return volts * (1.0 if b is None else self.model.b / b)
+
+    def parts_table(self) -> pd.DataFrame:
+        """The resistors and capacitors as a frame: ``name``, ``value``, ``unit``, ``role``."""
+        return frame(self._parts(), ("name", "value", "unit", "role"))
+
+    def _parts(self) -> list[dict[str, Any]]:
+        kinds = ((self.circuit.resistors, "Ω"), (self.circuit.capacitors, "F"))
+        return [
+            {"name": part.name, "value": part.value, "unit": unit, "role": part.role}
+            for parts, unit in kinds
+            for part in parts
+        ]
+
+    def _repr_html_(self) -> str:
+        note = f"largest coefficient error {self.errors.max_error:.3g}, {self.certificate.status}"
+        return table_html("Parts", self._parts(), note)
 
     def volts(self, b: float | None = None) -> Array:
         """(4,) volts per unit of each model state at clearance ``b``."""

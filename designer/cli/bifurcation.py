@@ -99,12 +99,12 @@ def bifurcation(
     """Bifurcation diagrams, maps of n-p-q over two parameters, basins of attraction."""
     with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import bifurcation_job
-        from designer.jobs.bifurcation_request import Request
 
-        request = Request(
+        found = bifurcation_job.bifurcation(
+            model,
             over=over,
-            low=low,
-            high=high,
+            from_=low,
+            to=high,
             steps=steps,
             omega=omega,
             frequency=frequency,
@@ -113,19 +113,20 @@ def bifurcation(
             starts=starts,
             periods=periods,
             keep=keep,
-            second=second,
+            map_=second,
             basins=basins,
             circuit=circuit,
             points=points,
+            out=out,
             jobs=jobs,
             overwrite=overwrite,
             resume=resume,
+            progress=progress,
         )
-        answer, reused = bifurcation_job.answer(model, request, out, progress)
     if json:
-        print_json(answer)
+        print_json(found.answer)
     elif not quiet:
         from designer.cli import bifurcation_tables
 
-        bifurcation_tables.show(answer, out, reused)
+        bifurcation_tables.show(found.answer, out, found.reused)
     return 0

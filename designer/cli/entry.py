@@ -1,4 +1,4 @@
-"""The command ``designer``: exit statuses and messages; the verbs are in ``cli.verbs``.
+"""The command ``designer``: exit statuses and messages; ``cli.command_line`` has the verbs.
 
 Worker processes import this module again, so it imports nothing that takes time.
 """
@@ -34,9 +34,9 @@ def status(arguments: list[str]) -> int:
 
 def _status(arguments: list[str]) -> int:
     try:
-        from designer.cli import verbs
+        from designer.cli import command_line
 
-        code = verbs.dispatch(arguments)
+        code = command_line.dispatch(arguments)
         if code == INTERRUPTED:  # the parser has caught it
             _say(_INTERRUPTED)
         return code

@@ -50,24 +50,20 @@ def export(
 ) -> int:
     """The KiCad project: schematic, placed board, netlist; or decks; into the design folder."""
     with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.jobs import synthesise_job
-        from designer.jobs.export_job import export_into
-        from designer.jobs.options import Options
+        from designer.jobs import export_job
 
-        options = Options(overwrite=overwrite, resume=resume)
-        modelfile, folder = synthesise_job.source(model, out)
-        if deck:
-            from designer.jobs.deck_job import export_decks
-
-            answer, reused = export_decks(
-                modelfile, folder, [name.value for name in deck], options, progress
-            )
-        else:
-            answer, reused = export_into(modelfile, folder, options, progress)
+        found = export_job.export(
+            model,
+            out,
+            deck=[name.value for name in deck or ()],
+            overwrite=overwrite,
+            resume=resume,
+            progress=progress,
+        )
     if json:
-        print_json(answer)
+        print_json(found.answer)
     elif not quiet:
         from designer.cli import tables
 
-        tables.files(folder, reused)
+        tables.files(found.folder, found.reused)
     return 0

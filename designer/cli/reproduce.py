@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from designer.base.errors import InputError
 from designer.cli.app import Jobs, Log, Quiet, Resume, Verbose, app, compiling, session
 
 
@@ -18,13 +17,6 @@ class ReproducedPart(StrEnum):
     DYNAMICS = "dynamics"
     CIRCUIT = "circuit"
     TOLERANCE = "tolerance"
-
-
-PLACES = {
-    ReproducedPart.DYNAMICS: Path("reports/paper-dynamics"),
-    ReproducedPart.CIRCUIT: Path("reports/paper-circuit"),
-    ReproducedPart.TOLERANCE: Path("reports/tolerance"),
-}
 
 
 @app.command()
@@ -59,35 +51,15 @@ def reproduce(
 ) -> int:
     """The paper's figures and statements, measured again."""
     with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.base.checks import at_least, cores
+        from designer.paper import paper_reports
 
-        if jobs is not None:
-            at_least("--jobs", jobs, 1)
-        place = PLACES[what] if out is None else out
-        if what is not ReproducedPart.TOLERANCE:
-            for name, value in (("--samples", samples), ("--seed", seed)):
-                if value is not None:
-                    raise InputError(None, name, value, f"nothing: {what.value} draws no boards")
-        if what is ReproducedPart.DYNAMICS:
-            from designer.paper import reproduce_dynamics
-
-            if resume:
-                expected = "nothing: dynamics is made anew each time"
-                raise InputError(None, "--resume", "given", expected)
-            reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
-        elif what is ReproducedPart.CIRCUIT:
-            from designer.paper import reproduce_circuit
-
-            reproduce_circuit.reproduce(place, jobs=jobs, progress=progress, resume=resume)
-        else:
-            from designer.paper import reproduce_tolerance
-
-            reproduce_tolerance.reproduce(
-                place,
-                samples=reproduce_tolerance.SAMPLES if samples is None else samples,
-                seed=reproduce_tolerance.SEED if seed is None else seed,
-                jobs=jobs,
-                progress=progress,
-                resume=resume,
-            )
+        paper_reports.reproduce(
+            what.value,
+            out,
+            samples=samples,
+            seed=seed,
+            jobs=jobs,
+            resume=resume,
+            progress=progress,
+        )
     return 0

@@ -30,11 +30,11 @@ def rules(
     with session(verbose, quiet, log) as progress, compiling(progress):
         from designer.jobs import rules_job
 
-        answer, passed = rules_job.into_folder(folder, board, junit, progress)
+        found = rules_job.rules(folder, board=board, junit=junit, progress=progress)
     if json:
-        print_json(answer)
+        print_json(found.answer)
     elif not quiet:
         from designer.cli import rules_table
 
-        rules_table.show(answer)
-    return 0 if passed else 1
+        rules_table.show(found.answer)
+    return 0 if found.passed else 1

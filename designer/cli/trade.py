@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from designer.base.default_counts import SEED, TRADE_BOARDS
+from designer.base.default_counts import TRADE_BOARDS
 from designer.cli.app import (
     Jobs,
     Json,
@@ -50,25 +50,18 @@ def trade(
 ) -> int:
     """Time and error of every rung on this design, and the cheapest for each question."""
     with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.base.checks import at_least
-        from designer.base.design_folder import Folder
-        from designer.jobs import folder_numbers, synthesise_job, trade_job
-        from designer.model.model_file import read_model_file
+        from designer.jobs import trade_job
 
-        given = {"boards": boards, "seed": seed}
-        numbers: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
-        at_least("--boards", numbers.get("boards", TRADE_BOARDS), 0)
-        synthesise_job.Options(numbers.get("seed", SEED), jobs).check()
-        if out is None and not model.is_dir():
-            modelfile, folder = read_model_file(model), None
-        else:
-            modelfile, folder = synthesise_job.source(model, out)
-        if folder is not None and folder_numbers.goes_on(model, folder, resume):
-            numbers = folder_numbers.own(Folder(folder), "trade", tuple(given)) | numbers
-        seed = numbers.get("seed", SEED)
-        options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
-        extent = trade_job.TradeExtent(boards=numbers.get("boards", TRADE_BOARDS))
-        answer, _ = trade_job.answer(modelfile, folder, options, extent, progress)
+        answer = trade_job.trade(
+            model,
+            out,
+            boards=boards,
+            seed=seed,
+            jobs=jobs,
+            overwrite=overwrite,
+            resume=resume,
+            progress=progress,
+        ).answer
     if json:
         print_json(answer)
     elif not quiet:

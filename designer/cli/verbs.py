@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from designer.base.default_counts import DRAWN_STARTS, SEED
-from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.cli.app import (
-    VERBS,
     EngineName,
     Jobs,
     Json,
@@ -67,16 +65,6 @@ BlameBudget = Annotated[
     int | None,
     typer.Option("--blame-budget", metavar="STEPS", help="Of the work on the blame [20000]."),
 ]
-
-
-def dispatch(arguments: list[str]) -> int:
-    """Run a command line; returns the exit status or raises what went wrong."""
-    if arguments and not arguments[0].startswith("-") and arguments[0] not in VERBS:
-        from designer.base.schema import one_of
-
-        raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
-    result = app(args=arguments, prog_name="designer", standalone_mode=False)
-    return result if isinstance(result, int) else 0
 
 
 @app.callback(invoke_without_command=True)
@@ -294,17 +282,9 @@ def new(
 ) -> int:
     """Write a commented model file to start from; an existing file is left alone."""
     with session(verbose, quiet, log):
-        from designer.model.template import TEXT
+        from designer.model.template import new as write_model_file
 
-        try:
-            with path.open("x", encoding="utf-8") as stream:
-                stream.write(TEXT)
-        except FileExistsError:
-            raise InputError(path, "PATH", "a file", "a name that is free") from None
-        except OSError as error:
-            raise InputError(
-                path, "PATH", error.strerror or str(error), "a file that can be written"
-            ) from None
+        write_model_file(path)
     if json:
         print_json({"format": 1, "files": [str(path)]})
     elif not quiet:
@@ -350,6 +330,3 @@ def _shown(answer: Mapping[str, Any], verb: str) -> None:
         "tolerance": tables.tolerance,
     }
     shows[verb](answer)
-
-
-# The verbs that stand in files of their own register themselves.

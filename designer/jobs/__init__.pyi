@@ -1,5 +1,7 @@
 from . import (
     bifurcation_job as bifurcation_job,
+    cure_job as cure_job,
+    export_job as export_job,
     folder_numbers as folder_numbers,
     origin as origin,
     rules_job as rules_job,
@@ -8,12 +10,17 @@ from . import (
     synthesise_job as synthesise_job,
     trade_job as trade_job,
 )
+from .bifurcation_job import (
+    BifurcationResult as BifurcationResult,
+    bifurcation as bifurcation,
+)
 from .bifurcation_request import (
     Request as Request,
 )
 from .cure_job import (
     CureResult as CureResult,
     cure as cure,
+    cure_into as cure_into,
 )
 from .deck_job import (
     export_decks as export_decks,
@@ -22,6 +29,8 @@ from .design_files import (
     load as load,
 )
 from .export_job import (
+    ExportResult as ExportResult,
+    export as export,
     export_into as export_into,
 )
 from .measured_job import (
@@ -33,7 +42,12 @@ from .options import (
 from .origin import (
     provenance as provenance,
 )
+from .rules_job import (
+    RulesResult as RulesResult,
+    rules as rules,
+)
 from .search_job import (
+    search as search,
     search_into as search_into,
 )
 from .study_folder import (
@@ -44,4 +58,9 @@ from .study_job import (
 )
 from .synthesise_job import (
     JobOutcome as JobOutcome,
+    read_design as read_design,
+)
+from .trade_job import (
+    TradeResult as TradeResult,
+    trade as trade,
 )

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.arrays import Array
 from designer.base.checks import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
+from designer.base.frames import frame, table_html
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
@@ -38,7 +40,100 @@ from designer.jobs.synthesise_job import read_design, source
 from designer.model.model_file import ModelFile, read_model_file
 from designer.model.swept_model import ModelSubject
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 FORMAT = 1
+
+
+@dataclass(frozen=True)
+class BifurcationResult:
+    """What the verb ``bifurcation`` answers."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md)."""
+    reused: bool
+    """Whether the folder held the answer already."""
+
+    def windows(self) -> pd.DataFrame:
+        """The windows of a sweep, a row each; empty of a map and of basins."""
+        return frame(self.answer.get("windows", ()))
+
+    def points(self) -> pd.DataFrame:
+        """The bifurcation points of a sweep, a row each; empty of a map and of basins."""
+        return frame(self.answer.get("points", ()))
+
+    def _repr_html_(self) -> str:
+        names = ("from", "to", "response", "symmetric")
+        rows = [{n: w.get(n) for n in names} for w in self.answer.get("windows", ())]
+        return table_html(f"{self.answer['kind']} over {self._over}", rows)
+
+    @property
+    def _over(self) -> str:
+        if "parameter" in self.answer:
+            return str(self.answer["parameter"])
+        return f"{self.answer['x']['name']} and {self.answer['y']['name']}"
+
+
+def bifurcation(
+    model: Path | str,
+    *,
+    over: str | None = None,
+    from_: float | str | None = None,
+    to: float | str | None = None,
+    steps: int | None = None,
+    omega: float | None = None,
+    frequency: str | None = None,
+    down: bool = False,
+    up: bool = False,
+    starts: int | None = None,
+    periods: int | None = None,
+    keep: int | None = None,
+    map_: tuple[str, float | str, float | str, int] | None = None,
+    basins: bool = False,
+    circuit: bool = False,
+    points: bool = True,
+    out: Path | str | None = None,
+    jobs: int | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> BifurcationResult:
+    """The verb ``bifurcation``: a diagram, a map of two parameters, or basins of attraction.
+
+    model : a model file or a design folder. from_, to : the ends of the sweep, as numbers or as
+    texts with a unit. map_ : (name, from, to, steps) of the other axis. out : a folder to write
+    into; without one nothing is written. The other words are those of the command line
+    (docs/bifurcations.md).
+
+    Raises
+    ------
+    InputError : the words do not fit together, or a value lies outside its domain.
+    """
+    request = Request(
+        over=over,
+        low=from_,
+        high=to,
+        steps=steps,
+        omega=omega,
+        frequency=frequency,
+        down=down,
+        up=up,
+        starts=starts,
+        periods=periods,
+        keep=keep,
+        second=map_,
+        basins=basins,
+        circuit=circuit,
+        points=points,
+        jobs=jobs,
+        overwrite=overwrite,
+        resume=resume,
+    )
+    said = Progress() if progress is None else progress
+    return BifurcationResult(
+        *answer(Path(model), request, None if out is None else Path(out), said)
+    )
 
 
 def answer(

@@ -13,10 +13,12 @@ import time
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from designer.base.design_folder import Folder
-from designer.base.errors import InputError
+from designer.base.default_counts import SEED
+from designer.base.design_folder import Folder, is_design_folder
+from designer.base.errors import MISSING, InputError
+from designer.base.frames import flat_frame, table_html
 from designer.base.keyed_store import Lines
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
@@ -28,12 +30,15 @@ from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, rung_choice
+from designer.jobs import design_files, folder_numbers, rung_choice
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
 from designer.jobs.synthesise_job import design_inputs, grade_inputs, made_from, read_design
 from designer.model.model_file import naming, need_responses
 from designer.synthesis.tie_break import SOLVER
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CURE, STUDIES = "cure.json", "cure-studies.json"
 _LINES = Lines("studies", "verdicts")
@@ -54,8 +59,63 @@ class CureResult:
     reused: bool
     """Whether the folder held the answer already."""
 
+    def front(self) -> pd.DataFrame:
+        """The front of yield against price, a row for each choice of upgrades."""
+        return flat_frame(self.answer["front"])
+
+    def responses(self) -> pd.DataFrame:
+        """A row for each response, before and with the cure."""
+        return flat_frame(self.answer["responses"])
+
+    def _repr_html_(self) -> str:
+        rows = [{"upgrade": text} for text in self.answer["said"]]
+        title = f"Yield {self.answer['target']:g}: {'reached' if self.reached else 'not reached'}"
+        return table_html(title, rows, f"price {self.answer['price']:.4g}")
+
 
 def cure(
+    folder: Path | str,
+    *,
+    yield_: float | None = None,
+    budget: float | None = None,
+    without: Collection[str] = (),
+    out: Path | str | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> CureResult:
+    """The verb ``search --yield``: the cheapest cure of a design folder, which is written there.
+
+    yield_, budget, without, out : as ``cure_into``. What is not given is that of the folder's own
+    cure, if there is one; with ``overwrite`` its budget and its kinds are not taken over.
+
+    Raises
+    ------
+    InputError : as ``cure_into``, or no yield is given and the folder has no cure.
+    """
+    path = Path(folder)
+    limits = () if overwrite else ("budget", "without")
+    known: dict[str, Any] = {}
+    if is_design_folder(path):
+        known = folder_numbers.own(Folder(path), "cure", ("yield", "seed"), limits)
+    given = {"yield": yield_, "budget": budget, "without": without or None, "seed": seed}
+    asked = known | {name: value for name, value in given.items() if value is not None}
+    if "yield" not in asked:
+        raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
+    return cure_into(
+        path,
+        target=asked["yield"],
+        budget=asked.get("budget"),
+        out=None if out is None else Path(out),
+        without=asked.get("without", ()),
+        options=Options(asked.get("seed", SEED), jobs, overwrite=overwrite, resume=resume),
+        progress=progress,
+    )
+
+
+def cure_into(
     folder: Path,
     *,
     target: float,

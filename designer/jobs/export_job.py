@@ -2,17 +2,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from designer.base.design_folder import DESIGN, Folder
+from designer.base.frames import table_html
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import load_catalog
 from designer.jobs import kicad_files, synthesise_job
+from designer.jobs.deck_job import export_decks
 from designer.jobs.design_files import load
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile
+from designer.spice.simulator_decks import Dialect
+
+
+@dataclass(frozen=True)
+class ExportResult:
+    """What the verb ``export`` answers."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md)."""
+    folder: Path
+    """The design folder."""
+    reused: bool
+    """Whether every file was there already."""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that were asked for."""
+        return tuple(self.folder / name for name in self.answer["files"])
+
+    def _repr_html_(self) -> str:
+        return table_html(str(self.folder), [{"file": name} for name in self.answer["files"]])
+
+
+def export(
+    model: Path | str,
+    out: Path | str | None = None,
+    *,
+    deck: Sequence[Dialect] = (),
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> ExportResult:
+    """The verb ``export``: the KiCad project of a design, or decks for other simulators.
+
+    model : a design folder, or a model file with ``out``. deck : "ltspice", "portable" or both;
+    the KiCad project if empty.
+
+    Raises
+    ------
+    InputError : as ``export_into`` and ``export_decks``.
+    """
+    options = Options(overwrite=overwrite, resume=resume)
+    said = Progress() if progress is None else progress
+    place = None if out is None else Path(out)
+    modelfile, folder = synthesise_job.source(Path(model), place)
+    if deck:
+        answer, reused = export_decks(modelfile, folder, deck, options, said)
+    else:
+        answer, reused = export_into(modelfile, folder, options, said)
+    return ExportResult(answer, folder, reused)
 
 
 def export_into(

@@ -9,11 +9,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base import atomic_write
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
+from designer.base.frames import frame, table_html
 from designer.base.hashing import sha256
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
@@ -33,6 +34,9 @@ from designer.jobs.origin import provenance
 from designer.jobs.synthesise_job import read_design
 from designer.model.model_file import naming
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 FORMAT = 1
 NAME = "rules.json"
 
@@ -50,6 +54,47 @@ class RulesAnswer:
     def passed(self) -> bool:
         """Whether no rule fails; what was not run does not fail."""
         return all(o.status != FAIL for o in self.outcomes)
+
+
+@dataclass(frozen=True)
+class RulesResult:
+    """What the verb ``rules`` answers."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md), which is the folder's ``rules.json``."""
+    passed: bool
+    """Whether no rule fails; what was not run does not fail."""
+
+    def table(self) -> pd.DataFrame:
+        """A row for each rule."""
+        return frame(self.answer["rules"])
+
+    def _repr_html_(self) -> str:
+        names = ("id", "status", "found", "limit", "do")
+        rows = [{n: r[n] for n in names} for r in self.answer["rules"] if r["status"] != PASS]
+        counts = ", ".join(f"{number} {status}" for status, number in self.answer["counts"].items())
+        return table_html(self.answer["title"], rows, counts)
+
+
+def rules(
+    folder: Path | str,
+    *,
+    board: Path | str | None = None,
+    junit: Path | str | None = None,
+    progress: Progress | None = None,
+) -> RulesResult:
+    """The verb ``rules``: the design rules on a design folder and its board.
+
+    board : a .kicad_pcb of this design. junit : where to write a JUnit report.
+
+    Raises
+    ------
+    InputError : as ``into_folder``.
+    """
+    given = None if board is None else Path(board)
+    report = None if junit is None else Path(junit)
+    said = Progress() if progress is None else progress
+    return RulesResult(*into_folder(Path(folder), given, report, said))
 
 
 def into_folder(

@@ -10,25 +10,27 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from designer.base.checks import cores
+from designer.base.default_counts import SEARCH_SAMPLES, SEED
 from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder
-from designer.base.errors import InputError
+from designer.base.errors import MISSING, InputError
 from designer.base.manifest import MANIFEST, StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
-from designer.centering.design_search import look, search
+from designer.centering.design_search import look, search as design_search
 from designer.centering.memory import Memory
 from designer.centering.ngspice_check import LEVELS, RUNG, Listener
 from designer.centering.resolved_file import resolved
 from designer.centering.result_json import confirmation_json, search_json
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import nominal
-from designer.jobs import design_files, rung_choice
+from designer.jobs import design_files, folder_numbers, rung_choice, synthesise_job
 from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
@@ -51,6 +53,7 @@ from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields import ngspice_runs
 from designer.yields.limiting_parts import limitings
 from designer.yields.ngspice_sampling import OWN_SAMPLES, Ask, StartKind, Why
+from designer.yields.study_layers import RungName
 from designer.yields.tolerance_study import check, tolerance
 from designer.yields.verdict import Answer, Verdict
 
@@ -118,7 +121,7 @@ def searched_into(
     folder.write(ASKED, modelfile.text)
     memory = Memory(folder / CANDIDATES, inputs["model"], progress.note)
     with SpicePool(jobs, timeout=SPICE_TIMEOUT) as pool:
-        found = search(
+        found = design_search(
             modelfile,
             catalog,
             seed=options.seed,
@@ -142,6 +145,51 @@ def searched_into(
     folder.write(SEARCH, dumps({**said, "cost": {"seconds": time.perf_counter() - began}}))
     folder.finish("search")
     return model_file(out / MODEL)
+
+
+def search(
+    model: Path | str,
+    out: Path | str | None = None,
+    *,
+    samples: int | None = None,
+    rung: RungName = "auto",
+    seed: int | None = None,
+    jobs: int | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> JobOutcome:
+    """The verb ``search`` for a model file: the design of the highest yield, written into ``out``.
+
+    samples : fresh boards at the end. rung : of the final study. samples, seed : None for the usual
+    ones, or with ``resume`` for the folder's own.
+
+    Raises
+    ------
+    InputError : no model file, no ``out``, or a folder that holds something else. A design folder
+        is not searched but cured (``cure_job.cure``).
+    EnvironmentMissing : no ngspice; said before any work.
+    """
+    path = Path(model)
+    given = {"samples": samples, "seed": seed}
+    options = Options(
+        SEED if seed is None else seed,
+        jobs,
+        SEARCH_SAMPLES if samples is None else samples,
+        overwrite,
+        resume,
+        rung=rung,
+    )
+    options.check()
+    if path.is_dir() or not path.exists():
+        found = "a folder" if path.is_dir() else MISSING
+        raise InputError(path, "MODEL", found, "a model file; a design folder can be cured")
+    place = None if out is None else Path(out)
+    modelfile, folder = synthesise_job.source(path, place)
+    options = folder_numbers.of_search(folder, options, given)
+    command = partial(Options.command, verb="search", model=path, out=place)
+    said = Progress() if progress is None else progress
+    return search_into(modelfile, folder, options, said, command)
 
 
 def search_into(

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from designer.base.default_counts import DRAWN_STARTS, SEED
 from designer.base.design_folder import (
@@ -21,6 +21,7 @@ from designer.base.design_folder import (
     is_design_folder,
 )
 from designer.base.errors import MISSING, InputError
+from designer.base.frames import flat_frame, table_html
 from designer.base.manifest import StageName
 from designer.base.plain_json import plain
 from designer.base.progress import Progress
@@ -42,6 +43,9 @@ from designer.spice.opamp_model import Rung
 from designer.spread.part_grades import once_otherwise
 from designer.yields.run_result import RunResult
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 @dataclass(frozen=True)
 class JobOutcome:
@@ -60,6 +64,19 @@ class JobOutcome:
     shown: bool = False
     """Whether what stands in the answer beside blame and maps was shown before they were worked
     out."""
+
+    def responses(self) -> pd.DataFrame:
+        """A row for each response; of what a yield has, columns such as "yield.ok"."""
+        return flat_frame(self.answer.get("responses", ()))
+
+    def _repr_html_(self) -> str:
+        names = ("omega", "expected", "model", "circuit", "ngspice")
+        rows = [
+            {**{n: row.get(n) for n in names}, "ok": row["yield"]["ok"]}
+            for row in self.answer.get("responses", ())
+            if row.get("yield")
+        ]
+        return table_html(str(self.answer.get("title", "")), rows)
 
 
 def model_file(path: Path) -> ModelFile:

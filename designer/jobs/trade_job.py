@@ -8,11 +8,12 @@ from __future__ import annotations
 import io
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from designer.base.checks import cores
-from designer.base.default_counts import TRADE_BOARDS
+from designer.base.checks import at_least, cores
+from designer.base.default_counts import SEED, TRADE_BOARDS
 from designer.base.design_folder import Folder
+from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
@@ -25,17 +26,20 @@ from designer.fidelity.label import ResponseLabel
 from designer.fidelity.pieces import CHUNK, PIECES, TradePieces, read_pieces
 from designer.fidelity.rung_errors import compare
 from designer.fidelity.rungs import LEVELS, ROUNDS
-from designer.fidelity.trade_study import Trade, TradedResponse, trade
+from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
-from designer.jobs import design_files
+from designer.jobs import design_files, folder_numbers, synthesise_job
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import TRADE
 from designer.jobs.synthesise_job import grade_inputs, standing_inputs
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.model_file import ModelFile, naming, need_responses, read_model_file
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields.verdict import StudyPlan
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHEET = "trade.md"
 PICTURES = ("trade.svg", "trade.png", "trade-numerics.svg", "trade-numerics.png")
@@ -56,6 +60,73 @@ class TradeExtent:
     """Levels of ngspice's steps."""
     rounds: int = ROUNDS
     """Rounds of timing."""
+
+
+@dataclass(frozen=True)
+class TradeResult:
+    """What the verb ``trade`` answers."""
+
+    answer: dict[str, Any]
+    """The JSON object (docs/contract.md)."""
+    reused: bool
+    """Whether the folder held the answer already."""
+
+    def rungs(self) -> pd.DataFrame:
+        """Time and error of every rung on every response."""
+        return frame(self.answer["rungs"])
+
+    def boards(self) -> pd.DataFrame:
+        """What both engines say of the same boards, a row for each response."""
+        return frame(self.answer["boards"])
+
+    def cheapest(self) -> pd.DataFrame:
+        """The cheapest rung for each question."""
+        return frame(self.answer["cheapest"])
+
+    def _repr_html_(self) -> str:
+        names = ("question", "of", "expected", "rung", "level", "bound", "measured")
+        rows = [{name: row.get(name) for name in names} for row in self.answer["cheapest"]]
+        return table_html("The cheapest rung for each question", rows)
+
+
+def trade(
+    model: Path | str,
+    out: Path | str | None = None,
+    *,
+    boards: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> TradeResult:
+    """The verb ``trade``: time and error of every rung on a design.
+
+    model : a model file or a design folder. out : a folder to write into; a model file without one
+    writes nothing. boards : of each response, for the yield; 0 for none. boards, seed : None for
+    the usual ones, or for the folder's own.
+
+    Raises
+    ------
+    InputError : a number that cannot be, or a folder that holds something else.
+    EnvironmentMissing : ngspice is missing.
+    """
+    path, place = Path(model), None if out is None else Path(out)
+    given = {"boards": boards, "seed": seed}
+    numbers: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
+    at_least("--boards", numbers.get("boards", TRADE_BOARDS), 0)
+    Options(numbers.get("seed", SEED), jobs).check()
+    folder: Path | None = None
+    if place is None and not path.is_dir():
+        modelfile = read_model_file(path)
+    else:
+        modelfile, folder = synthesise_job.source(path, place)
+    if folder is not None and folder_numbers.goes_on(path, folder, resume):
+        numbers = folder_numbers.own(Folder(folder), "trade", tuple(given)) | numbers
+    options = Options(numbers.get("seed", SEED), jobs, overwrite=overwrite, resume=resume)
+    extent = TradeExtent(boards=numbers.get("boards", TRADE_BOARDS))
+    said = Progress() if progress is None else progress
+    return TradeResult(*answer(modelfile, folder, options, extent, said))
 
 
 def measure(
@@ -103,7 +174,7 @@ def measure(
                     tallied = _tally(plan, label, count, pieces, pool, jobs, progress)
                     boards = BoardTrade.of(label, tallied, seconds)
             responses.append(TradedResponse(rows, truth, boards))
-    return trade(responses)
+    return traded(responses)
 
 
 def _tally(

@@ -79,6 +79,7 @@ from .swept_model import (
 )
 from .template import (
     TEXT as TEXT,
+    new as new,
 )
 from .tuning_bands import (
     Bands as Bands,

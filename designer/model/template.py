@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from designer.base.errors import InputError
 from designer.model.ascii_sketch import sketch
 
 _SKETCH = "\n".join(f"# {line}" for line in sketch().splitlines())
@@ -87,3 +90,22 @@ side_conditions = true          # false: the match alone; or a list of those to 
 # supply = 0.02                 # each rail within ± 2 %
 # measured = "measured.csv"     # part,value[,tolerance][,board]
 """
+
+
+def new(path: Path | str = "model.toml") -> Path:
+    """The verb ``new``: write a commented model file to start from; its path.
+
+    Raises
+    ------
+    InputError : there is a file of this name, which is left alone, or none can be written there.
+    """
+    place = Path(path)
+    try:
+        with place.open("x", encoding="utf-8") as stream:
+            stream.write(TEXT)
+    except FileExistsError:
+        raise InputError(place, "PATH", "a file", "a name that is free") from None
+    except OSError as error:
+        expected = "a file that can be written"
+        raise InputError(place, "PATH", error.strerror or str(error), expected) from None
+    return place

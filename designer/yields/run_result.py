@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from designer.base.frames import table_html
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
@@ -50,6 +51,9 @@ class RunResult:
     def yields(self) -> tuple[Yield | None, ...]:
         """For each response; None where it was left out of the study."""
         return self.study.yields
+
+    def _repr_html_(self) -> str:
+        return table_html(self.modelfile.title, self.study.yield_rows())
 
     @property
     def satisfied(self) -> bool:

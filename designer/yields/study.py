@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
+from designer.base.frames import frame, table_html
 from designer.check.checked_design import CheckedResponse
 from designer.yields import two_engine_yield as combined
 from designer.yields.blame_analysis import Blame
@@ -20,6 +22,15 @@ from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
 from designer.yields.verdict import Answer, StudyPlan, Yield, count
 from designer.yields.yield_maps import YieldMap
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BOARD_COLUMNS = tuple(
+    "sample board number omega expected verdict response reason radius penetration miss "
+    "asymmetry periods waveform".split()
+)
+"""Of the table of boards."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +87,43 @@ class Study:
     def reached_of(self, index: int) -> tuple[PowerUpAnswer, ...]:
         """The rows of the reached layer of response number ``index``."""
         return tuple(r for r in self.reached or () if self.asked[r.question] == index)
+
+    def boards(self) -> pd.DataFrame:
+        """A row for each board and response, as built.
+
+        ``sample``, ``board`` (its name in a list of measured boards, else None), ``number`` of the
+        response in the model file, from 1, ``omega``, ``expected``, and what ``Answer`` has.
+        """
+        return frame(map(self._board, self.answers), BOARD_COLUMNS)
+
+    def yields_table(self) -> pd.DataFrame:
+        """A row for each response: ``number``, ``omega``, ``expected``, counts of boards as built,
+        ``rate`` and its 95 % interval ``low`` to ``high``, and why it was ``left_out``."""
+        return frame(self.yield_rows())
+
+    def _board(self, answer: Answer) -> dict[str, Any]:
+        index = self.asked[answer.question]
+        model = self.checked[index].model
+        values = asdict(answer) | {
+            "board": self.plan.label(answer.sample) if self.plan.labels else None,
+            "number": index + 1,
+            "omega": model.omega,
+            "expected": model.expected,
+            "verdict": str(answer.verdict),
+        }
+        return {name: values[name] for name in BOARD_COLUMNS}
+
+    def yield_rows(self) -> list[dict[str, Any]]:
+        """The rows of ``yields_table``."""
+        rows = []
+        for index, (checked, counted) in enumerate(zip(self.checked, self.yields, strict=True)):
+            model = checked.model
+            head = {"number": index + 1, "omega": model.omega, "expected": model.expected}
+            rows.append({**head, **_counts(counted), "left_out": self.left_out.get(index, "")})
+        return rows
+
+    def _repr_html_(self) -> str:
+        return table_html(f"{self.plan.samples} boards, as built", self.yield_rows())
 
     @property
     def yields(self) -> tuple[Yield | None, ...]:
@@ -139,3 +187,12 @@ class Study:
         for a in self.answers:
             by[self.asked[a.question]].append(a)
         return {index: tuple(rows) for index, rows in by.items()}
+
+
+def _counts(counted: Yield | None) -> dict[str, Any]:
+    """The counts of a yield, and its rate; None where it was not asked."""
+    names = ("ok", "lost", "grazing", "failed", "samples", "rate")
+    if counted is None:
+        return dict.fromkeys((*names, "low", "high"))
+    low, high = counted.interval
+    return {**{name: getattr(counted, name) for name in names}, "low": low, "high": high}

@@ -37,7 +37,7 @@ from designer.centering.cure_trial import Cure
 from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_parts_kept
 from designer.centering.cure_ways import ResponseWay, best_place
 from designer.jobs import rung_choice
-from designer.jobs.cure_job import CURE, STUDIES, cure
+from designer.jobs.cure_job import CURE, STUDIES, cure_into
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file
@@ -391,7 +391,7 @@ def test_bad_input_is_refused_and_nothing_is_written(design: Path) -> None:
     )
     for field, arguments in asked:
         with pytest.raises(InputError) as refused:
-            cure(design, **cast(Any, arguments))
+            cure_into(design, **cast(Any, arguments))
         assert refused.value.field == field
     assert sorted(p.name for p in design.iterdir()) == before
 
@@ -432,7 +432,7 @@ def test_a_trade_that_sends_every_board_to_ngspice_is_told(
     monkeypatch.setattr(rung_choice, "choose", lambda _: choice)
     said = _Notes()
     with pytest.raises(_Stopped):
-        cure(folder, target=0.99, progress=said)
+        cure_into(folder, target=0.99, progress=said)
     assert len(said.notes) == told
     assert all(choice.reason in note for note in said.notes)
 
@@ -445,7 +445,7 @@ def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
     synthesise_into(parse_model_file(SMALL), design, Options(), Progress())
     other = Path(shutil.copytree(design, tmp_path / "stopped"))
     out = tmp_path / "cured"
-    found = cure(design, target=0.99, without=WITHOUT, out=out)
+    found = cure_into(design, target=0.99, without=WITHOUT, out=out)
     answer = found.answer
     assert found.reached
     (response,) = answer["responses"]
@@ -454,15 +454,15 @@ def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
     assert answer["rounds"][-1]["measured"] == [response["after"]]
 
     with pytest.raises(_Stopped):
-        cure(other, target=0.99, without=WITHOUT, progress=_Stops())
+        cure_into(other, target=0.99, without=WITHOUT, progress=_Stops())
     with pytest.raises(InputError, match="unfinished"):
-        cure(other, target=0.99, without=WITHOUT)
-    cure(other, target=0.99, without=WITHOUT, options=Options(resume=True))
+        cure_into(other, target=0.99, without=WITHOUT)
+    cure_into(other, target=0.99, without=WITHOUT, options=Options(resume=True))
     for name in ("cure-front.csv", "cure-front.png", "cure-front.svg", STUDIES):
         assert (other / name).read_bytes() == (design / name).read_bytes()
     one, two = (json.loads((f / CURE).read_text()) for f in (design, other))
     assert {**one, "cost": 0} == {**two, "cost": 0}
-    assert cure(design, target=0.99, without=WITHOUT).reused
+    assert cure_into(design, target=0.99, without=WITHOUT).reused
 
     options = Options(seed=99, samples=1000, rung="exact")
     modelfile = parse_model_file((out / "model.toml").read_text(encoding="utf-8"), out / "m.toml")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import json
 import os
 import re
@@ -19,6 +20,7 @@ import pytest
 
 from designer.base.version import __version__
 from designer.cli import entry
+from designer.cli.app import VERBS
 from designer.jobs.bench_tables import COLUMNS
 from designer.spice.backends import open_simulator
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
@@ -414,9 +416,19 @@ def test_import_is_light() -> None:
     assert done.stdout.split() == ["False", __version__]
 
 
-def test_public_names_exist() -> None:
-    import designer
+def test_every_verb_is_registered() -> None:
+    code = (
+        "from typer.main import get_command; from designer.cli import command_line;"
+        "print(*get_command(command_line.application()).commands)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert sorted(done.stdout.split()) == sorted(VERBS)
 
+
+def test_public_names_exist() -> None:
+    designer = importlib.import_module("designer")
     assert all(getattr(designer, name) is not None for name in designer.__all__)
     assert set(designer.__all__) <= set(dir(designer))
     with pytest.raises(AttributeError):

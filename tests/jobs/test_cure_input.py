@@ -18,7 +18,7 @@ from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, kind_named
 from designer.centering.cure_upgrade import Upgrades, upgraded_file
 from designer.cli import entry, search
-from designer.jobs.cure_job import cure
+from designer.jobs.cure_job import cure_into
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.part_rules import spread_of
@@ -91,7 +91,7 @@ def test_kinds_by_either_name_are_the_same_inputs(design: Path, tmp_path: Path) 
     for name in ("dead-zone", "dead zone"):
         folder = Path(shutil.copytree(design, tmp_path / name))
         with pytest.raises(_Worked):
-            cure(folder, target=0.9, without=(name,), progress=_NoWork())
+            cure_into(folder, target=0.9, without=(name,), progress=_NoWork())
         manifest = json.loads((folder / "manifest.json").read_text())
         said.append(manifest["stages"]["cure"]["inputs"]["without"])
     assert said == [["dead zone"], ["dead zone"]]
@@ -104,16 +104,16 @@ def test_a_place_with_a_design_is_refused_before_the_work(
     before = {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()}
     own = Path(shutil.copytree(design, tmp_path / "own"))
     with pytest.raises(InputError) as refused:
-        cure(own, target=0.9, out=other, progress=_NoWork())
+        cure_into(own, target=0.9, out=other, progress=_NoWork())
     assert refused.value.field == "--out"
     assert "cure" not in json.loads((own / "manifest.json").read_text())["stages"]
     assert {p.name: p.read_bytes() for p in other.iterdir() if p.is_file()} == before
     # The user says that it may go, or the place is free: then work begins.
     with pytest.raises(_Worked):
-        cure(own, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork())
+        cure_into(own, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork())
     third = Path(shutil.copytree(design, tmp_path / "third"))
     with pytest.raises(_Worked):
-        cure(third, target=0.9, out=tmp_path / "free", progress=_NoWork())
+        cure_into(third, target=0.9, out=tmp_path / "free", progress=_NoWork())
 
 
 def test_a_file_in_the_way_is_refused_before_the_work(
@@ -125,7 +125,9 @@ def test_a_file_in_the_way_is_refused_before_the_work(
     del manifest["files"]["setup.csv"]
     (other / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(InputError, match="does not list"):
-        cure(design, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork())
+        cure_into(
+            design, target=0.9, out=other, options=Options(overwrite=True), progress=_NoWork()
+        )
     assert "cure" not in json.loads((design / "manifest.json").read_text())["stages"]
 
 

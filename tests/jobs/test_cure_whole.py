@@ -16,7 +16,7 @@ from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, PLACE, TRIMMER
 from designer.centering.cure_measure import asked, plan_of
-from designer.jobs.cure_job import cure
+from designer.jobs.cure_job import cure_into
 from designer.jobs.options import Options
 from designer.jobs.study_job import run_into
 from designer.jobs.synthesise_job import read_design, synthesise_into
@@ -64,7 +64,7 @@ def whole(where: Path, model: str, kind: str, target: float) -> Whole:
     """The cure of this model file's design by this kind alone."""
     design, cured = where / "design", where / "cured"
     synthesise_into(parse_model_file(model), design, Options(), Progress())
-    found = cure(design, target=target, without=set(KINDS) - {kind}, out=cured)
+    found = cure_into(design, target=target, without=set(KINDS) - {kind}, out=cured)
     assert found.reached, found.answer["why"]
     return Whole(design, cured, found.answer)
 

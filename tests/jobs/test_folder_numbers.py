@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from designer.base.default_counts import TRADE_BOARDS
 from designer.base.design_folder import Folder
-from designer.cli import entry, verbs
+from designer.cli import command_line, entry
 from designer.jobs import folder_numbers, search_job, study_job, synthesise_job, trade_job
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
@@ -54,13 +55,13 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study_job, "run_into", study)
     monkeypatch.setattr(search_job, "search_into", study)
     monkeypatch.setattr(trade_job, "answer", trade)
-    monkeypatch.setattr("designer.jobs.cure_job.cure", cured)
+    monkeypatch.setattr("designer.jobs.cure_job.cure_into", cured)
 
 
 def options_of(*words: object) -> Any:
     """What a command line would work with."""
     with pytest.raises(_Asked) as met:
-        verbs.dispatch([str(w) for w in words])
+        command_line.dispatch([str(w) for w in words])
     return met.value.options
 
 
@@ -152,7 +153,7 @@ def test_a_trade_has_the_folders_own_boards(tmp_path: Path) -> None:
     assert (options.seed, extent.boards) == (3, 5)
     none = folder(tmp_path / "none", design={})
     options, extent = options_of("trade", none, "-q")
-    assert (options.seed, extent.boards) == (1, 100)
+    assert (options.seed, extent.boards) == (1, TRADE_BOARDS)
 
 
 def test_limits_that_are_none_are_left_out(tmp_path: Path) -> None:

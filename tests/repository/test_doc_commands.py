@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from designer.cli import app, entry
+from designer.cli import command_line, entry
 from tests.shared.doc_commands import PAGES, ROOT, Command, Snippet, commands, snippets
 from tests.yields.test_study import SMALL
 
@@ -103,7 +103,7 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def verbs() -> dict[str, set[str]]:
     """Options of every verb, by the command line itself."""
 
-    group = get_command(app.app)
+    group = get_command(command_line.application())
     found = group.commands  # type: ignore[attr-defined]
     return {
         name: {o for p in verb.params for o in (*p.opts, *p.secondary_opts)} | {"-h", "--help"}

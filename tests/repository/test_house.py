@@ -66,6 +66,7 @@ def test_every_module_stands_in_a_package() -> None:
     assert {p.name for p in HOUSE.iterdir() if p.name != "__pycache__"} == {
         *ORDER,
         "__init__.py",
+        "__init__.pyi",
         "__main__.py",
         "py.typed",
     }

@@ -1,0 +1,85 @@
+from .base.errors import (
+    DesignerError as DesignerError,
+    EnvironmentMissing as EnvironmentMissing,
+    InputError as InputError,
+    Unreachable as Unreachable,
+)
+from .base.version import (
+    __version__ as __version__,
+)
+from .board.bill_frame import (
+    bill_of_materials as bill_of_materials,
+)
+from .catalog.catalog import (
+    Catalog as Catalog,
+    load_catalog as load_catalog,
+)
+from .check.simulation import (
+    Simulated as Simulated,
+    simulate as simulate,
+)
+from .check.simulation_frame import (
+    simulated_table as simulated_table,
+)
+from .check.synthesis_result import (
+    Synthesis as Synthesis,
+    synthesise as synthesise,
+    synthesize as synthesize,
+)
+from .jobs.bifurcation_job import (
+    BifurcationResult as BifurcationResult,
+    bifurcation as bifurcation,
+)
+from .jobs.cure_job import (
+    CureResult as CureResult,
+    cure as cure,
+)
+from .jobs.export_job import (
+    ExportResult as ExportResult,
+    export as export,
+)
+from .jobs.rules_job import (
+    RulesResult as RulesResult,
+    rules as rules,
+)
+from .jobs.search_job import (
+    search as search,
+)
+from .jobs.study_job import (
+    run as run,
+)
+from .jobs.synthesise_job import (
+    JobOutcome as JobOutcome,
+    read_design as read_design,
+)
+from .jobs.trade_job import (
+    TradeResult as TradeResult,
+    trade as trade,
+)
+from .model.model import (
+    Dimensionless as Dimensionless,
+    Mechanical as Mechanical,
+)
+from .model.model_file import (
+    ModelFile as ModelFile,
+    parse_model_file as parse_model_file,
+    read_model_file as read_model_file,
+)
+from .model.response_table import (
+    Response as Response,
+)
+from .model.template import (
+    new as new,
+)
+from .paper.paper_reports import (
+    reproduce as reproduce,
+)
+from .yields.run_result import (
+    RunResult as RunResult,
+)
+from .yields.study import (
+    Study as Study,
+)
+from .yields.tolerance_study import (
+    tolerance as tolerance,
+)

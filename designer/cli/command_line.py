@@ -1,0 +1,27 @@
+"""The whole command line: every verb is registered here, and a line of words finds its verb."""
+
+from __future__ import annotations
+
+import typer
+
+from designer.base.errors import InputError
+from designer.cli import bifurcation, export, reproduce, rules, search, tolerance, trade, verbs
+from designer.cli.app import VERBS, app
+
+REGISTERED = (verbs, tolerance, bifurcation, search, trade, export, rules, reproduce)
+"""The modules of the verbs: importing one registers what it has."""
+
+
+def application() -> typer.Typer:
+    """The application with every verb."""
+    return app
+
+
+def dispatch(arguments: list[str]) -> int:
+    """Run a command line; returns the exit status or raises what went wrong."""
+    if arguments and not arguments[0].startswith("-") and arguments[0] not in VERBS:
+        from designer.base.schema import one_of
+
+        raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
+    result = app(args=arguments, prog_name="designer", standalone_mode=False)
+    return result if isinstance(result, int) else 0

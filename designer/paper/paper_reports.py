@@ -1,0 +1,68 @@
+"""The verb ``reproduce``: a part of the paper measured again, as a report in a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, get_args
+
+from designer.base.checks import at_least, cores
+from designer.base.errors import InputError
+from designer.base.progress import Progress
+from designer.base.schema import one_of
+from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
+
+PaperPart = Literal["dynamics", "circuit", "tolerance"]
+PLACES: dict[PaperPart, Path] = {
+    "dynamics": Path("reports/paper-dynamics"),
+    "circuit": Path("reports/paper-circuit"),
+    "tolerance": Path("reports/tolerance"),
+}
+"""Where the reports go if nothing is said."""
+
+
+def reproduce(
+    what: PaperPart,
+    out: Path | str | None = None,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Make the report on one part of the paper; the folder that it stands in.
+
+    samples, seed : of the boards, which only "tolerance" has. resume : go on with the pieces that
+    are there; "dynamics" is made anew each time.
+
+    Raises
+    ------
+    InputError : an unknown part, a word that this part does not have, or a folder that holds
+        something else.
+    EnvironmentMissing : ngspice is missing.
+    """
+    if what not in get_args(PaperPart):
+        raise InputError(None, "the part", what, one_of(what, get_args(PaperPart)))
+    if jobs is not None:
+        at_least("--jobs", jobs, 1)
+    place = PLACES[what] if out is None else Path(out)
+    if what != "tolerance":
+        for name, value in (("--samples", samples), ("--seed", seed)):
+            if value is not None:
+                raise InputError(None, name, value, f"nothing: {what} draws no boards")
+    if what == "dynamics":
+        if resume:
+            raise InputError(None, "--resume", "given", "nothing: dynamics is made anew each time")
+        reproduce_dynamics.reproduce(place, jobs=jobs or cores(), progress=progress)
+    elif what == "circuit":
+        reproduce_circuit.reproduce(place, jobs=jobs, progress=progress, resume=resume)
+    else:
+        reproduce_tolerance.reproduce(
+            place,
+            samples=reproduce_tolerance.SAMPLES if samples is None else samples,
+            seed=reproduce_tolerance.SEED if seed is None else seed,
+            jobs=jobs,
+            progress=progress,
+            resume=resume,
+        )
+    return place
