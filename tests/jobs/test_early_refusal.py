@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,8 +49,9 @@ def with_opamp(name: str, **changes: object) -> Catalog:
 
 
 def would_do(error: InputError) -> list[str]:
-    names = error.expected.partition("that would do: ")[2]
-    return names.split(", ") if names else []
+    """The parts that the message names, of rails (would do) or of a case (have one)."""
+    names = re.split("that would do: |that have one: ", error.expected)[-1]
+    return names.split(", ") if names != error.expected else []
 
 
 def for_rails(volts: float, *, tht: bool = False) -> list[str]:
