@@ -18,10 +18,10 @@ from typing import Any
 
 CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
-    "linear_kernel": "search for parts",
-    "nodal_kernel": "equations of boards",
-    "circuit_kernel": "circuits",
-    "sweep_kernel": "sweeps",
+    "kernel_linear": "search for parts",
+    "kernel_nodal": "equations of boards",
+    "kernel_four_state": "circuits",
+    "kernel_sweep": "sweeps",
 }
 """What a kernel's module is for; all others are the ``MOTION``."""
 MOTION = "motion between the stops"
@@ -41,10 +41,10 @@ def announced(say: Callable[[str], None]) -> Iterator[None]:
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
-            package, _, module = str(event.data["dispatcher"].py_func.__module__).partition(".")
-            part = PARTS.get(module, MOTION)
+            name = str(event.data["dispatcher"].py_func.__module__)
+            part = PARTS.get(name.rpartition(".")[2], MOTION)
             with lock:
-                if part in said or package != "designer":
+                if part in said or not name.startswith("designer."):
                     return
                 said.add(part)
             say(TEXT.format(part=part))

@@ -2,9 +2,6 @@ from . import (
     board_notes as board_notes,
     schematic_drawing as schematic_drawing,
 )
-from .bill_frame import (
-    bill_of_materials as bill_of_materials,
-)
 from .board_check import (
     check_board as check_board,
 )

@@ -23,15 +23,10 @@ from .first_responses import (
 )
 from .simulation import (
     Simulated as Simulated,
-    simulate as simulate,
-)
-from .simulation_frame import (
-    simulated_table as simulated_table,
 )
 from .synthesis_result import (
     Synthesis as Synthesis,
     synthesise as synthesise,
-    synthesize as synthesize,
 )
 from .trust import (
     WORDS as WORDS,

@@ -78,7 +78,6 @@ from .swept_model import (
     ModelSubject as ModelSubject,
 )
 from .template import (
-    TEXT as TEXT,
     new as new,
 )
 from .tuning_bands import (

@@ -36,5 +36,5 @@ def test_each_part_is_announced_once_and_by_name() -> None:
     _compile(_of("designer.dynamics.kernel_sweep"))
     assert len(said) == 2
     assert MOTION in said[0]
-    assert PARTS["circuit_kernel"] in said[1]
+    assert PARTS["kernel_four_state"] in said[1]
     assert all("first use of this part" in line and "busy machine" in line for line in said)

@@ -13,6 +13,7 @@ from graphlib import TopologicalSorter
 
 import pytest
 
+from designer.base import jit
 from tests.shared.house import HOUSE, ORDER, ROOT, Import, arrows, imports, public, sources
 
 DRAWS = "matplotlib takes a second to import, and nothing before a picture needs it"
@@ -258,3 +259,10 @@ def test_the_picture_is_of_this_house() -> None:
 def test_the_page_has_a_paragraph_for_each_package() -> None:
     page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     assert re.findall(r"(?m)^- \*\*`(\w+)`\*\*", page) == list(ORDER)
+
+
+def test_a_changed_kernel_empties_the_cache() -> None:
+    """Every file with a compiled function is in the hash that names the cache's folder."""
+    hashed = {p for pattern in jit.KERNELS for p in jit.PACKAGE.glob(pattern)}
+    users = {p for p in HOUSE.rglob("*.py") if "base.jit import compiled" in p.read_text("utf-8")}
+    assert users == hashed
