@@ -406,7 +406,7 @@ def test_a_study_renews_the_bill_of_a_folder_of_that_time(
     def studied(*_: object) -> None:
         raise Studied
 
-    monkeypatch.setattr(study_job, "_studied", studied)
+    monkeypatch.setattr(study_job, "checks", studied)
     for bill in (old, new):
         assert (out / "bom.csv").read_text() == bill
         with pytest.raises(Studied):
