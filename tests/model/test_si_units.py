@@ -209,9 +209,10 @@ def test_a_dimensionless_model_has_no_si_keys(paper: Path, capfd: Captured) -> N
 
 def test_tables_show_hertz_and_millimetres(drill: Path, capfd: Captured) -> None:
     assert entry.status(["simulate", str(drill), "--frequency", "54.1 Hz"]) == 0
-    head, row = capfd.readouterr().err.rstrip().splitlines()[-2:]
+    head, row, starts = capfd.readouterr().err.rstrip().splitlines()[-3:]
     assert "mechanism" in head
     assert "x1 max (SI)" in head
+    assert starts.startswith("ω = 1.96253: of 200 starts")
     assert row.split()[:3] == ["1.96253", "54.1", "Hz"]
     assert "1.081 mm" in row  # x1_max is 0.6487
 
