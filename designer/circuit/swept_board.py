@@ -38,6 +38,7 @@ class BoardSubject:
 
     whose = "nominal board"
     parameters = BOARD_SETTINGS
+    si: Mapping[str, Unit] = NO_UNITS
 
     def __init__(
         self,
@@ -53,7 +54,6 @@ class BoardSubject:
         self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
         self.states = ("v1", "v2", "v3", "v4")
         self.units: Mapping[str, str] = UNITS
-        self.si: Mapping[str, Unit] = NO_UNITS
 
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""

@@ -129,7 +129,7 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("designer.jobs.search_job.look", lambda *_: ())
-    monkeypatch.setattr("designer.jobs.search_job.search", interrupted)
+    monkeypatch.setattr("designer.jobs.search_job.design_search", interrupted)
     words = ("search", model, "--out", out, "-q")
     assert run(*words) == 2  # the design is one that no search made
     assert run(*words, "--overwrite") == 130
@@ -195,7 +195,7 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
     found = SimpleNamespace(made=Found(file), final=SimpleNamespace(choice=None))
     for name, value in (
         ("look", ()),
-        ("search", found),
+        ("design_search", found),
         ("search_json", {"format": 1}),
         ("resolved", file),
     ):

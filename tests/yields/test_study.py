@@ -22,13 +22,12 @@ import pytest
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.check import checked_design
 from designer.cli import entry
 from designer.jobs import study_json, synthesise_job
 from designer.jobs.study_folder import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
-from designer.yields import layers, ngspice_runs, study_layers
+from designer.yields import layers, ngspice_runs, study_layers, study_plan
 from designer.yields.blame_analysis import blame
 from designer.yields.blame_pieces import StoredParts
 from designer.yields.layers import CHUNK, Here, Samples
@@ -278,7 +277,7 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
 ) -> None:
     p = plan(3)
     p = replace(p, spread=replace(p.spread, gain_bandwidth=spread))
-    monkeypatch.setattr(checked_design, "plan_study", lambda *_, **__: p)
+    monkeypatch.setattr(study_plan, "plan_study", lambda *_, **__: p)
     notes: list[str] = []
     said = Progress()
     monkeypatch.setattr(said, "note", notes.append)
