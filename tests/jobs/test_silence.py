@@ -166,10 +166,11 @@ class Walk(ProgressLines):
         self.clock = Clock()
         super().__init__(self.clock)
         self.stages: dict[str, list[str]] = {}
+        self._lines: list[str] = []
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
         step = super().stage(text, total)
-        self.stages[text] = []
+        self._lines = self.stages.setdefault(text, [])  # the report is written twice
         self._late()
         return step
 
@@ -182,8 +183,7 @@ class Walk(ProgressLines):
         self.beat()
 
     def _say(self, line: str) -> None:
-        if self.stages:
-            list(self.stages.values())[-1].append(line)
+        self._lines.append(line)
 
 
 STAGES = {
@@ -196,8 +196,8 @@ STAGES = {
     "ngspice, numerics gate": "step size 1 of at most 5: 3 of 3 runs",
     "tolerance study, 2 boards, responses: 1": "",
     "ngspice, 4 runs": "",
+    "report": "",  # the yields are written before the blame
     "blame": "",
-    "report": "",
 }
 """The stages of a run, and what is said within each, if there is more to say than how long."""
 
