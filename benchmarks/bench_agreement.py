@@ -18,7 +18,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.plain_json import dumps
 from designer.base.proportion import wilson
 from designer.check.synthesis_result import synthesise

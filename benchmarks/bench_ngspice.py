@@ -29,7 +29,7 @@ from benchmarks.ngspice_figures import (
     warm,
     warm_job,
 )
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit import nominal

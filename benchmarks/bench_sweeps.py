@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bench_flow import commit, machine, table
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.bifurcations import parameter_map, sweep
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.sweep import SweepPlan

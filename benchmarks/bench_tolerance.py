@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.bench_flow import commit, machine, table
 from benchmarks.spicelib_runs import seconds_a_board
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal

@@ -11,19 +11,17 @@ from .atomic_write import (
     appearing as appearing,
     write as write,
 )
-from .checks import (
-    at_least as at_least,
-    cores as cores,
-)
 from .csv_tables import (
     csv_text as csv_text,
 )
-from .default_counts import (
+from .defaults import (
     DRAWN_STARTS as DRAWN_STARTS,
     SAMPLES as SAMPLES,
     SEARCH_SAMPLES as SEARCH_SAMPLES,
     SEED as SEED,
     TRADE_BOARDS as TRADE_BOARDS,
+    at_least as at_least,
+    cores as cores,
 )
 from .design_folder import (
     COMPARISON as COMPARISON,
@@ -35,9 +33,6 @@ from .design_folder import (
     TOLERANCE as TOLERANCE,
     Folder as Folder,
     is_design_folder as is_design_folder,
-)
-from .doubt import (
-    Doubt as Doubt,
 )
 from .environment import (
     changed_environment as changed_environment,
@@ -86,20 +81,11 @@ from .guarded_reading import (
     UNREADABLE as UNREADABLE,
     csv_rows as csv_rows,
     decode as decode,
+    inside as inside,
     parse_json as parse_json,
     read_bytes as read_bytes,
     read_text as read_text,
     reading as reading,
-)
-from .hashing import (
-    sha256 as sha256,
-)
-from .inside_folder import (
-    inside as inside,
-)
-from .interruption import (
-    heed as heed,
-    interrupt as interrupt,
 )
 from .jit import (
     compiled as compiled,
@@ -127,7 +113,7 @@ from .manifest import (
     read_json as read_json,
 )
 from .natural_sort import (
-    natural as natural,
+    natural_key as natural_key,
 )
 from .netlist_guard import (
     check_netlist as check_netlist,
@@ -150,11 +136,12 @@ from .progress import (
 from .proportion import (
     wilson as wilson,
 )
-from .report_guard import (
-    check_ours as check_ours,
+from .reason import (
+    Reason as Reason,
 )
 from .report_pieces import (
     CaseStore as CaseStore,
+    check_ours as check_ours,
 )
 from .schema import (
     STRICT as STRICT,
@@ -179,6 +166,7 @@ from .schema import (
 )
 from .seal import (
     BLANK as BLANK,
+    sha256 as sha256,
 )
 from .sexpr import (
     Atom as Atom,
@@ -197,6 +185,8 @@ from .si_unit import (
     value_text as value_text,
 )
 from .threads import (
+    heed as heed,
+    interrupt as interrupt,
     parallel as parallel,
 )
 from .toml_writer import (

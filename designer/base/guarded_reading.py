@@ -134,6 +134,27 @@ def csv_rows(text: str, file: Path | str | None) -> Iterator[tuple[int, list[str
         raise InputError(file, f"line {reader.line_num}", str(error), "a CSV file") from None
 
 
+def inside(folder: Path, name: str, field: str) -> Path:
+    """The file of this name in a folder.
+
+    Raises
+    ------
+    InputError : no file, or not inside the folder (symbolic links count as outside); ``field`` is
+        where the name was found.
+    """
+    expected = f"a file inside {folder}, no symbolic link"
+    relative, root = Path(name), folder.resolve()
+    path = root / relative
+    outside = relative.is_absolute() or not relative.parts or ".." in relative.parts
+    if outside or path.resolve() != path:
+        raise InputError(None, field, name, expected)
+    if not path.exists():
+        raise InputError(None, field, f"{name}, which does not exist", f"a file in {folder}")
+    if not path.is_file():
+        raise InputError(None, field, name, expected)
+    return path
+
+
 def reason(error: BaseException) -> str:
     """What went wrong, in words for the writer of a file."""
     if isinstance(error, UnicodeError):

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import UNREADABLE, parse_json, read_bytes
-from designer.base.hashing import sha256
+from designer.base.seal import sha256
 
 FORMAT = 1
 MANIFEST = "manifest.json"

@@ -8,10 +8,11 @@ own files are made of the pieces; a file of somebody else's is not written over.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from designer.base.atomic_write import PART
 from designer.base.errors import InputError
 from designer.base.guarded_reading import parse_json, read_bytes
 from designer.base.keyed_store import SEAL, KeyedStore, Note, quiet
@@ -154,3 +155,34 @@ def read_key(path: Path, option: str, what: str = "a piece of this report") -> s
         found = "no key" if isinstance(known, dict) else type(known).__name__
         raise InputError(path, option, found, what)
     return str(known["key"])
+
+
+def check_ours(out: Path, names: Collection[str], data: str, command: str) -> None:
+    """Refuse a folder that is neither empty nor holds an earlier report and nothing else.
+
+    names : of the report's files. data : of these, the JSON file whose "command" is ``command``.
+
+    Raises
+    ------
+    InputError : files of others are there.
+    OSError : the folder cannot be read.
+    """
+    there = sorted(path.name for path in out.iterdir())
+    foreign = [name for name in there if name.removeprefix(".").removesuffix(PART) not in names]
+    if not there or not (foreign or _command(out / data) != command):
+        return
+    raise InputError(
+        out / (foreign or there)[0],
+        "--out",
+        "a file that is not of an earlier report",
+        "an empty folder, or one that this command made",
+    )
+
+
+def _command(path: Path) -> object:
+    """The command that the data of a report state; None where there are none."""
+    try:
+        data = parse_json(read_bytes(path, "JSON"), path)
+    except InputError:
+        return None
+    return data.get("command") if isinstance(data, dict) else None

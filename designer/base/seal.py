@@ -1,4 +1,4 @@
-"""Seals: bytes that carry their own SHA-256, so that damage shows without any other file.
+"""Hashes, and seals: bytes that carry their own SHA-256, so that damage shows without another file.
 
 Whoever writes puts ``BLANK`` into the content, anywhere that its format allows and after all other
 text. ``sealed`` puts the digest of everything, with the blank still in it, in its place.
@@ -13,6 +13,11 @@ DIGITS = 64
 BLANK = MARK + "0" * DIGITS
 
 
+def sha256(content: bytes) -> str:
+    """The hash of some bytes, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()
+
+
 def sealed(content: bytes) -> bytes:
     """The content with its last blank filled in.
 
@@ -21,8 +26,7 @@ def sealed(content: bytes) -> bytes:
     ValueError : there is no blank.
     """
     at = content.rindex(BLANK.encode("ascii")) + len(MARK)
-    digest = hashlib.sha256(content).hexdigest().encode("ascii")
-    return content[:at] + digest + content[at + DIGITS :]
+    return content[:at] + sha256(content).encode("ascii") + content[at + DIGITS :]
 
 
 def intact(content: bytes) -> bool | None:
@@ -32,4 +36,4 @@ def intact(content: bytes) -> bool | None:
         return None
     at += len(MARK)
     blank = content[:at] + b"0" * DIGITS + content[at + DIGITS :]
-    return content[at : at + DIGITS] == hashlib.sha256(blank).hexdigest().encode("ascii")
+    return content[at : at + DIGITS] == sha256(blank).encode("ascii")

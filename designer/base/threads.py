@@ -8,15 +8,19 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
-from designer.base.interruption import interrupt
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
-
+interrupt = threading.Event()
+"""Set to stop every flow of this process: compiled code hears no Ctrl-C by itself."""
 _lock = threading.Lock()
 _open = 0
 """Calls of ``parallel`` that are under way, one within another."""
+
+
+def heed() -> None:
+    """Stop here if ``interrupt`` is set."""
+    if interrupt.is_set():
+        raise KeyboardInterrupt
 
 
 def parallel(

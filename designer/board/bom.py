@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from designer.base.csv_tables import csv_text
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.base.views import View
 from designer.board.component import Component
 
@@ -99,7 +99,7 @@ def _line(here: Sequence[Component]) -> Line:
     said += [c.bought.note for c in here if c.bought is not None and c.bought.note]
     return Line(
         quantity=len(here),
-        designators=tuple(sorted((c.reference for c in here), key=natural)),
+        designators=tuple(sorted((c.reference for c in here), key=natural_key)),
         value=first.value,
         description="; ".join(dict.fromkeys(said)),
         manufacturer=bought.manufacturer,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
@@ -186,7 +186,7 @@ def joined(found: Iterable[Component]) -> dict[str, tuple[tuple[str, str], ...]]
             if pin.net:
                 out.setdefault(pin.net, []).append((component.reference, pin.number))
     return {
-        net: tuple(sorted(out[net], key=lambda pad: (natural(pad[0]), natural(pad[1]))))
+        net: tuple(sorted(out[net], key=lambda pad: (natural_key(pad[0]), natural_key(pad[1]))))
         for net in sorted(out)
     }
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from designer.base.errors import InputError
 from designer.base.guarded_reading import read_bytes, reading
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
@@ -178,8 +178,8 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
                 board.path, "footprints", f"{footprint.reference} twice", "each designator once"
             )
         there[footprint.reference] = footprint
-    missing = sorted(wanted.keys() - there.keys(), key=natural)
-    foreign = sorted((n for n in there.keys() - wanted.keys() if there[n].wired), key=natural)
+    missing = sorted(wanted.keys() - there.keys(), key=natural_key)
+    foreign = sorted((n for n in there.keys() - wanted.keys() if there[n].wired), key=natural_key)
     if missing or foreign:
         said = [f"without {_few(missing)}"] if missing else []
         said += [f"with {_few(foreign)}"] if foreign else []

@@ -20,8 +20,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from designer.base.errors import InputError
-from designer.base.guarded_reading import read_bytes
-from designer.base.inside_folder import inside
+from designer.base.guarded_reading import inside, read_bytes
 from designer.base.netlist_guard import check_netlist
 
 PINS = ("inp", "inn", "out", "vcc", "vee")

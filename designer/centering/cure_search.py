@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.progress import Progress
 from designer.centering.cure_branch import TRIMMER, CureBranch, Refused, branches
 from designer.centering.cure_couplings import finest

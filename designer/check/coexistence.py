@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.checks import at_least
-from designer.base.default_counts import DRAWN_STARTS, SEED
+from designer.base.defaults import DRAWN_STARTS, SEED, at_least
 from designer.base.errors import InputError
 from designer.base.proportion import wilson
 from designer.dynamics import step_budget

@@ -13,8 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.checks import cores
-from designer.base.default_counts import DRAWN_STARTS, SEED
+from designer.base.defaults import DRAWN_STARTS, SEED, cores
 from designer.base.errors import InputError
 from designer.base.frames import table_html
 from designer.base.progress import Progress

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.doubt import Doubt
+from designer.base.reason import Reason
 from designer.dynamics.attractors import STROBE_TOLERANCE, peaks_near
 from designer.dynamics.flow import Flow, FlowResult, FlowStatus
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
@@ -51,7 +51,7 @@ class Trust:
     """Bound of the state's error; nan where nothing was measured."""
     multiplier_error: float = math.nan
     """Bound of the error of the largest multiplier's modulus; nan where nothing was measured."""
-    doubts: tuple[Doubt, ...] = ()
+    doubts: tuple[Reason, ...] = ()
     """Why the result is not to be trusted."""
     answered: bool = False
     """Whether there is a result."""
@@ -108,7 +108,7 @@ def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
     laps = [run.tangent * peak / peak[:, None] for run in runs if run.tangent is not None]
     ended = [run.status for run in runs if run.status is not FlowStatus.DONE]
     if ended:
-        return Trust(doubts=(Doubt(f"a lap computed anew ends with: {ended[0]}"),))
+        return Trust(doubts=(Reason(f"a lap computed anew ends with: {ended[0]}"),))
     ends = np.array([run.strobes[-1] for run in runs]) / peak
     magnification = float(np.linalg.norm(laps[0], 2))
     rounding = float(np.ptp(ends, axis=0).max())
@@ -170,33 +170,33 @@ def _at_strobe(orbit: Orbit, span: float) -> bool:
     return bool((np.minimum(times, np.abs(span - times)) < STROBE_TOLERANCE * span).any())
 
 
-def _doubts_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[Doubt, ...]:
+def _doubts_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[Reason, ...]:
     doubts = []
     if not error <= STROBE_TOLERANCE:
         said = (
             "rounding errors, as the flow magnifies them, leave the state open by more than the "
             f"{STROBE_TOLERANCE:.0e} of its peak that to call a response periodic asks for"
         )
-        doubts.append(Doubt(said, f"{error:.1g}"))
+        doubts.append(Reason(said, f"{error:.1g}"))
     counts = {tuple(int(c) for c in run.counts.sum(axis=(0, 1))) for run in runs}
     if counted and len(counts) > 1:
         said = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
-        doubts.append(Doubt("computed with other steps a lap has other impacts", said))
+        doubts.append(Reason("computed with other steps a lap has other impacts", said))
     return tuple(doubts)
 
 
-def _doubts_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) -> tuple[Doubt, ...]:
+def _doubts_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) -> tuple[Reason, ...]:
     doubts = []
     nearest = min(orbit.penetration, orbit.miss) / peak
     if nearest <= error:
         said = "a contact or a miss lies within the error: the count of impacts is open"
-        doubts.append(Doubt(said, f"{nearest:.1g} of the peak, error {error:.1g}"))
+        doubts.append(Reason(said, f"{nearest:.1g} of the peak, error {error:.1g}"))
     if abs(1.0 - orbit.radius) <= open_by:
         said = (
             "its largest multiplier cannot be told from 1: whether the response is stable is not "
             "known"
         )
-        doubts.append(Doubt(said, f"it is open by {open_by:.1g}"))
+        doubts.append(Reason(said, f"it is open by {open_by:.1g}"))
     return tuple(doubts)
 
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array, Mask
-from designer.base.interruption import heed
-from designer.base.threads import parallel
+from designer.base.threads import heed, parallel
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.reduction import FloatingCircuit, Reduction

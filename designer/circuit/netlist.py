@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.base.views import View
 from designer.catalog.diode_curve import DiodeModel
 from designer.catalog.entries import OpAmp
@@ -330,7 +330,7 @@ class Circuit:
     @property
     def packages(self) -> tuple[str, ...]:
         """Op-amp packages in the order of their numbers."""
-        return tuple(sorted({s.package for s in self.sections}, key=natural))
+        return tuple(sorted({s.package for s in self.sections}, key=natural_key))
 
     @property
     def nets(self) -> tuple[str, ...]:

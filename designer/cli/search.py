@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from designer.base.default_counts import SEARCH_SAMPLES
+from designer.base.defaults import SEARCH_SAMPLES
 from designer.base.errors import MISSING, InputError
 from designer.cli.app import (
     Jobs,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from designer.base.default_counts import TRADE_BOARDS
+from designer.base.defaults import TRADE_BOARDS
 from designer.cli.app import (
     Jobs,
     Json,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from designer.base.default_counts import DRAWN_STARTS, SEED
+from designer.base.defaults import DRAWN_STARTS, SEED
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.cli.app import (

@@ -21,7 +21,7 @@ from scipy.linalg import matrix_balance
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
-from designer.base.interruption import heed
+from designer.base.threads import heed
 from designer.dynamics import (
     kernel_four_state,
     kernel_general as kernel,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.interruption import interrupt
+from designer.base.threads import interrupt
 from designer.dynamics import attractors, kernel_classify, kernel_modal, kernel_sweep
 from designer.dynamics.attractors import CHAOS, lyapunov, peaks_near, settle
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.arrays import Array
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.base.checks import at_least
+from designer.base.defaults import at_least
 from designer.base.errors import MISSING, InputError
 from designer.base.manifest import StageName
 from designer.base.schema import one_of

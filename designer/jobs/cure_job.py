@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.default_counts import SEED
+from designer.base.defaults import SEED
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
 from designer.base.frames import flat_frame, table_html

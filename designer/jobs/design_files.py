@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.design_folder import DESIGN, MODEL, Folder
 from designer.base.errors import InputError
 from designer.base.guarded_reading import csv_rows, read_text, reading

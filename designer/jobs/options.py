@@ -7,8 +7,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from designer.base.checks import at_least
-from designer.base.default_counts import SAMPLES, SEED
+from designer.base.defaults import SAMPLES, SEED, at_least
 from designer.base.errors import InputError
 from designer.yields.study_layers import RungName
 from designer.yields.yield_maps import Over

@@ -15,10 +15,10 @@ from designer.base import atomic_write
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.hashing import sha256
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
+from designer.base.seal import sha256
 from designer.base.version import __version__
 from designer.board.board_parts import board_circuit
 from designer.board.component import components

@@ -14,8 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer.base.checks import cores
-from designer.base.default_counts import SEARCH_SAMPLES, SEED
+from designer.base.defaults import SEARCH_SAMPLES, SEED, cores
 from designer.base.design_folder import DESIGN, DESIGN_FILES, MODEL, TOLERANCE, Folder
 from designer.base.errors import MISSING, InputError
 from designer.base.manifest import MANIFEST, StageName

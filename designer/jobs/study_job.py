@@ -11,8 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from designer.base.checks import at_least, cores
-from designer.base.default_counts import SAMPLES, SEED
+from designer.base.defaults import SAMPLES, SEED, at_least, cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName
 from designer.base.progress import Progress

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
 from designer.base.keyed_store import Note
 from designer.base.manifest import StageName

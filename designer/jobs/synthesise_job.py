@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.default_counts import DRAWN_STARTS, SEED
+from designer.base.defaults import DRAWN_STARTS, SEED
 from designer.base.design_folder import (
     COMPARISON,
     DESIGN,

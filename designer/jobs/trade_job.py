@@ -10,8 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.checks import at_least, cores
-from designer.base.default_counts import SEED, TRADE_BOARDS
+from designer.base.defaults import SEED, TRADE_BOARDS, at_least, cores
 from designer.base.design_folder import Folder
 from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage

@@ -25,8 +25,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import read_text
-from designer.base.inside_folder import inside
+from designer.base.guarded_reading import inside, read_text
 from designer.base.schema import (
     STRICT,
     Accepts,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal, get_args
 
-from designer.base.checks import at_least, cores
+from designer.base.defaults import at_least, cores
 from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.base.schema import one_of

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.atomic_write import write
-from designer.base.checks import at_least, cores
+from designer.base.defaults import at_least, cores
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.base.version import __version__

@@ -22,7 +22,7 @@ from designer.base.atomic_write import write
 from designer.base.errors import InputError
 from designer.base.figure_style import to_png, to_svg
 from designer.base.progress import Progress
-from designer.base.report_guard import check_ours
+from designer.base.report_pieces import check_ours
 from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
 from designer.bifurcations.continuation import End

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.atomic_write import write
-from designer.base.checks import at_least, cores
+from designer.base.defaults import at_least, cores
 from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.catalog.catalog import load_catalog

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.atomic_write import write
-from designer.base.checks import cores
+from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import DesignerError
 from designer.base.manifest import read_json

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.circuit.netlist import Circuit
 from designer.model.distributions import Binned, Law, Normal, Split, Uniform
 from designer.report.words import quantity
@@ -37,11 +37,11 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
         said.append(f"temperature uniform from {low:g} to {high:g} °C")
     if spread.ageing:
         said.append(f"ageing of {_ageing(spread)}")
-    better = sorted(spread.asked, key=natural)
+    better = sorted(spread.asked, key=natural_key)
     for grade in sorted({spread.grades[name] for name in better}):
         names = ", ".join(name for name in better if spread.grades[name] == grade)
         said.append(f"bought, and drawn, at a better grade of {_percent(grade)}: {names}")
-    own = sorted({*spread.grades, *spread.shapes} - {*better}, key=natural)
+    own = sorted({*spread.grades, *spread.shapes} - {*better}, key=natural_key)
     said += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
     networks = [g for g in spread.groups if not g.reel]
     said += [f"{', '.join(g.parts)} share {_percent(g.share)} of a deviation" for g in networks]
@@ -58,7 +58,7 @@ def _ageing(spread: Spread) -> str:
     """Ranges of ageing, and the kinds of part that have each."""
     kinds = {"R": "resistors", "C": "capacitors", "V": "references"}
     by: dict[tuple[str, str], list[str]] = {}
-    for part, law in sorted(spread.ageing.items(), key=lambda item: natural(item[0])):
+    for part, law in sorted(spread.ageing.items(), key=lambda item: natural_key(item[0])):
         low, high = (f"{100 * end:.4g}" for end in _ends(law))
         by.setdefault((kinds.get(part[0], part), f"from {low} to {high} %"), []).append(part)
     of = [kind for kind, _ in by]

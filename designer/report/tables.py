@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from designer.base.default_counts import DRAWN_STARTS
+from designer.base.defaults import DRAWN_STARTS
 from designer.base.design_folder import TOLERANCE
 from designer.check.checked_design import CheckedResponse
 from designer.check.coexistence import beside

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from designer.base.arrays import Array
-from designer.base.doubt import Doubt
 from designer.base.progress import doing
+from designer.base.reason import Reason
 from designer.circuit.netlist import Board, Circuit, Excitation
 from designer.circuit.noise_gains import stages
 from designer.circuit.reduction import Reduction
@@ -95,20 +95,20 @@ class GateResult:
         return ", ".join(map(str, self.doubts))
 
     @property
-    def doubts(self) -> tuple[Doubt, ...]:
+    def doubts(self) -> tuple[Reason, ...]:
         """What the runs that there are were found not to do; none where they passed."""
         if self.passed or isinstance(self.read, SimulationFailed):
             return ()
         said = []
         if self.difference > BOUND:
             differ = f"strobes differ by more than {BOUND:g} of the peak"
-            said.append(Doubt(differ, f"by {self.difference:.1g}"))
+            said.append(Reason(differ, f"by {self.difference:.1g}"))
         if self.wave > self.wave_bound:
             off = f"by {self.wave:.1g} of the peak, bound {self.wave_bound:.1g}"
-            said.append(Doubt("the wave is off the exact circuit's by more than its bound", off))
+            said.append(Reason("the wave is off the exact circuit's by more than its bound", off))
         other = "its runs do not all show the exact circuit's response"
         shown = f"the coarsest shows {self.read.orbit.response}"
-        return tuple(said) or (Doubt(other, shown),)
+        return tuple(said) or (Reason(other, shown),)
 
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from designer.base.errors import Unreachable
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind
 from designer.circuit.netlist import Capacitor, Circuit, Resistor
@@ -36,7 +36,7 @@ def better_grades(
     spread = spread_of(modelfile, circuit, catalog)
     return {
         name: BetterGrade(asked, spread.grades[name])
-        for name, asked in sorted(spread.asked.items(), key=lambda item: natural(item[0]))
+        for name, asked in sorted(spread.asked.items(), key=lambda item: natural_key(item[0]))
     }
 
 

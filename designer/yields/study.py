@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
+from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED
 from designer.base.frames import frame, table_html
 from designer.check.checked_design import CheckedResponse
 from designer.yields import two_engine_yield as combined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from designer.base.doubt import Doubt
+from designer.base.reason import Reason
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
 from designer.check.trust import Trust
@@ -53,7 +53,7 @@ def yields(plan: StudyPlan, answers: Sequence[Answer]) -> tuple[Yield, ...]:
 def of_yield(counted: Yield, nominal: Trust) -> Trust:
     """Of a yield: not better than the nominal orbit's that each board starts on, nor with so many
     boards without an answer that they could move it out of its own interval."""
-    doubts = [Doubt(f"the nominal response: {d.words}", d.figures) for d in nominal.doubts]
+    doubts = [Reason(f"the nominal response: {d.words}", d.figures) for d in nominal.doubts]
     if counted.failed:
         least = counted.ok / counted.samples
         most = (counted.ok + counted.failed) / counted.samples
@@ -64,5 +64,5 @@ def of_yield(counted: Yield, nominal: Trust) -> Trust:
                 f"{counted.failed} of {counted.samples} boards have no answer; whatever they "
                 f"were, the yield lies between {100 * least:.3g} and {100 * most:.3g} %"
             )
-            doubts.append(Doubt(said))
+            doubts.append(Reason(said))
     return Trust(error=nominal.error, doubts=tuple(doubts), answered=True)

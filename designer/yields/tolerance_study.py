@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from designer.base.checks import at_least, cores
-from designer.base.default_counts import SAMPLES as SAMPLES, SEED as SEED
+from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED, at_least, cores
 from designer.base.progress import Progress
 from designer.check import checked_design
 from designer.check.checked_design import CheckedResponse

@@ -11,7 +11,7 @@ import pytest
 
 from designer import parse_model_file, simulate
 from designer.base.arrays import Array
-from designer.base.default_counts import SEED
+from designer.base.defaults import SEED
 from designer.base.proportion import wilson
 from designer.check import coexistence
 from designer.cli import entry

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from benchmarks.references import Problem, truth
-from designer.base.doubt import Doubt
+from designer.base.reason import Reason
 from designer.check import checked_design, trust
 from designer.check.trust import Trust
 from designer.circuit.netlist import Excitation
@@ -192,7 +192,7 @@ def test_a_yield_that_boards_without_an_answer_could_move(counted: Yield, truste
 
 
 def test_a_yield_is_no_better_than_the_nominal_response() -> None:
-    said = study_plan.of_yield(Yield(200, 0, 0, 0), Trust(doubts=(Doubt("so it is", "by 2"),)))
+    said = study_plan.of_yield(Yield(200, 0, 0, 0), Trust(doubts=(Reason("so it is", "by 2"),)))
     assert said.reasons == ("the nominal response: so it is",)
     assert said.as_dict()["reasons"] == ["the nominal response: so it is (by 2)"]
 
@@ -283,7 +283,7 @@ def test_simulate_says_it(
 
 def test_the_tables_name_what_is_not_to_be_trusted() -> None:
     fine = Trust(answered=True).as_dict()
-    open_ = Trust(doubts=(Doubt("first"), Doubt("second"))).as_dict()
+    open_ = Trust(doubts=(Reason("first"), Reason("second"))).as_dict()
     assert tables.doubts({"circuit": fine, "ngspice": None}) == []
     assert tables.doubts({"circuit": fine, "yield": open_}) == [
         "yield not to be trusted here: first; second"
@@ -339,7 +339,7 @@ def test_a_study_ends_with_it(
     """A distrusted exact circuit, everything else as it should be: the row, and exit status 1,
     also where the folder is shown again; of the result in memory likewise."""
     measured = trust.of_orbit
-    doubt = Doubt("so it is", "by 2e-07")
+    doubt = Reason("so it is", "by 2e-07")
 
     def doubted(flow: Flow, orbit: Orbit) -> Trust:
         said = measured(flow, orbit)

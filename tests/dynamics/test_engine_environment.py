@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.base.interruption import interrupt
-from designer.base.threads import parallel
+from designer.base.threads import interrupt, parallel
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless

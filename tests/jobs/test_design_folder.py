@@ -16,7 +16,7 @@ from designer.base.csv_tables import csv_text, safe_cell
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.manifest import MANIFEST, StageName, file_hash
-from designer.base.natural_sort import natural
+from designer.base.natural_sort import natural_key
 from designer.base.plain_json import dumps
 from designer.check import synthesis_result
 from designer.check.synthesis_result import synthesise
@@ -252,7 +252,7 @@ def test_cells_cannot_start_a_formula() -> None:
         assert safe_cell(text) == text
     text = csv_text(("a", "b"), [{"a": '=1,"x"', "b": "2"}])
     assert list(csv.reader(io.StringIO(text))) == [["a", "b"], ['\'=1,"x"', "2"]]
-    assert sorted(["R10", "R2", "C1", "R203A"], key=natural) == ["C1", "R2", "R10", "R203A"]
+    assert sorted(["R10", "R2", "C1", "R203A"], key=natural_key) == ["C1", "R2", "R10", "R203A"]
 
 
 def test_json_is_strict() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from designer.base.default_counts import TRADE_BOARDS
+from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
 from designer.cli import command_line, entry
 from designer.jobs import folder_numbers, search_job, study_job, synthesise_job, trade_job

@@ -20,7 +20,7 @@ from designer.base.guarded_reading import csv_rows, parse_json, read_bytes, read
 from designer.base.keyed_store import KeyedStore
 from designer.base.manifest import MANIFEST, read_json
 from designer.base.parquet_entry import ParquetForm
-from designer.base.report_guard import check_ours
+from designer.base.report_pieces import check_ours
 from designer.board.bom_layouts import layouts
 from designer.board.kicad_reader import read_board
 from designer.catalog.catalog import load_catalog

@@ -18,7 +18,7 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.base.progress import Progress
-from designer.base.report_guard import check_ours
+from designer.base.report_pieces import check_ours
 from designer.bifurcations.doubling_cascade import cascade
 from designer.bifurcations.points import PointKind
 from designer.bifurcations.windows import BranchWindow, WindowEnd

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from designer.base import default_counts, design_folder
+from designer.base import defaults, design_folder
 from designer.base.progress import SILENCE
 from designer.bifurcations import parameter_map
 from designer.board.bom_layouts import file_of
@@ -81,10 +81,10 @@ SEEDED = sorted(verb for verb in VERBS if "--seed" in options(verb) and verb != 
 @pytest.mark.parametrize(
     ("verb", "option", "default"),
     [
-        ("run", "--samples", default_counts.SAMPLES),
-        ("tolerance", "--samples", default_counts.SAMPLES),
-        ("trade", "--boards", default_counts.TRADE_BOARDS),
-        *((verb, "--seed", default_counts.SEED) for verb in SEEDED),
+        ("run", "--samples", defaults.SAMPLES),
+        ("tolerance", "--samples", defaults.SAMPLES),
+        ("trade", "--boards", defaults.TRADE_BOARDS),
+        *((verb, "--seed", defaults.SEED) for verb in SEEDED),
     ],
 )
 def test_a_default_is_one_constant(verb: str, option: str, default: int) -> None:
@@ -98,16 +98,16 @@ def test_the_defaults_of_the_library_are_those_of_the_commands() -> None:
     from designer.jobs.options import Options
     from designer.jobs.trade_job import TradeExtent
 
-    assert TradeExtent().boards == default_counts.TRADE_BOARDS
-    assert (Options().samples, Options().seed) == (default_counts.SAMPLES, default_counts.SEED)
+    assert TradeExtent().boards == defaults.TRADE_BOARDS
+    assert (Options().samples, Options().seed) == (defaults.SAMPLES, defaults.SEED)
 
 
 SAID: list[tuple[str, str, object]] = [
-    ("contract.md", r"`--seed N` \((\d+)\)", default_counts.SEED),
-    ("contract.md", r"`--samples N` \((\d+); `search`", default_counts.SAMPLES),
-    ("contract.md", r"`--samples N` \(\d+; `search` (\d+)\)", default_counts.SEARCH_SAMPLES),
-    ("contract.md", r"fresh boards \(`--samples`, (\d+)\)", default_counts.SEARCH_SAMPLES),
-    ("contract.md", r"`--boards` of each response \((\d+)\)", default_counts.TRADE_BOARDS),
+    ("contract.md", r"`--seed N` \((\d+)\)", defaults.SEED),
+    ("contract.md", r"`--samples N` \((\d+); `search`", defaults.SAMPLES),
+    ("contract.md", r"`--samples N` \(\d+; `search` (\d+)\)", defaults.SEARCH_SAMPLES),
+    ("contract.md", r"fresh boards \(`--samples`, (\d+)\)", defaults.SEARCH_SAMPLES),
+    ("contract.md", r"`--boards` of each response \((\d+)\)", defaults.TRADE_BOARDS),
     ("contract.md", r"exact circuit, in blocks of (\d+)", BLOCK),
     ("contract.md", r"about samples, in blocks of (\d+)", layers.CHUNK),
     ("contract.md", r"their rows, in blocks of (\d+)\b", layers.SEARCH),
@@ -115,8 +115,8 @@ SAID: list[tuple[str, str, object]] = [
     ("contract.md", r"`omega` is from [\d.]+ to (\d+)\.", find_responses.FASTEST),
     ("contract.md", r"above (\d+) times the model's highest", si_units.FAR_ABOVE),
     ("contract.md", r"at least every (\w+) seconds", {10.0: "ten"}[SILENCE]),
-    ("trade.md", r"spread \((\d+) of each response if", default_counts.TRADE_BOARDS),
-    ("tolerance.md", r"`--samples N` says it, (\d+) if", default_counts.SAMPLES),
+    ("trade.md", r"spread \((\d+) of each response if", defaults.TRADE_BOARDS),
+    ("tolerance.md", r"`--samples N` says it, (\d+) if", defaults.SAMPLES),
     ("tolerance.md", r"the first (\d+) boards of each", ngspice_sampling.OWN_SAMPLES),
     ("tolerance.md", r"the first (\d+) from the nominal", ngspice_sampling.NOMINAL_SAMPLES),
     ("tolerance.md", r"the (\d+) boards that are nearest", ngspice_sampling.BOUNDARY_SAMPLES),

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """Why a result is in doubt."""
+class Reason:
+    """Why a result is not to be trusted."""
 
     words: str
     """The reason, without what was measured: two machines say the same."""
     figures: str = ""
-    """What was measured, whose last digits they do not share; empty where there is none."""
+    """What was measured, whose last digits two machines do not share; empty where there is none."""
 
     def __str__(self) -> str:
         return f"{self.words} ({self.figures})" if self.figures else self.words
