@@ -55,7 +55,6 @@ from .eseries import (
 from .figure_style import (
     CIRCUIT_COLOUR as CIRCUIT_COLOUR,
     CONTACT as CONTACT,
-    EXACT as EXACT,
     GRID as GRID,
     IMPACT_COLOUR as IMPACT_COLOUR,
     INK as INK,

@@ -35,9 +35,6 @@ MODEL_COLOUR, CIRCUIT_COLOUR, NGSPICE_COLOUR, IMPACT_COLOUR = (
 ON_DARK, ON_LIGHT = "#fefefe", "#1b1b1b"
 """Ink on areas that are filled with a colour: the same on a page of any colour."""
 
-EXACT = 1e-12
-"""A coefficient error below this is rounding: the parts give the coefficient exactly."""
-
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same everywhere
     "font.size": 8.5,

@@ -21,8 +21,8 @@ from designer.circuit.scale_fit import minimax
 from designer.model.mechanics import SecondOrderSystem
 
 EXACT = 1e-6
-"""Errors that differ by less count as equal: one up to it as none, one this close to its lower
-bound as proved, and a condition that costs less as one that does not bind."""
+"""What a coefficient error means: one up to this is none ("exact"), two that differ by no more are
+equal, one this close to its lower bound is proved, a condition that costs less does not bind."""
 
 
 @dataclass(frozen=True)

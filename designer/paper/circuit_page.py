@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from designer.circuit.coefficients import EXACT
 from designer.paper.circuit_clock import BASE, CLAIM, PERIODS
 from designer.paper.circuits import TITLES
-from designer.report.compare_table import EXACT
 
 Piece = Mapping[str, Any]
 CIRCUIT = "ngspice, ideal op-amps"
@@ -130,7 +130,7 @@ def _dc(circuits: Sequence[Piece]) -> list[str]:
         dc = one["dc"]
         lines.append(
             f"| {one['title']} | {1e3 * one['threshold']:.4g} mV | {dc['slope_contact']:.5g} | "
-            f"{_percent(dc['slope_inside'] / dc['slope_contact'])} | {dc['difference']:.1e} V |"
+            f"{100.0 * dc['slope_inside'] / dc['slope_contact']:.3g} % | {dc['difference']:.1e} V |"
         )
     return lines
 
@@ -241,4 +241,4 @@ def _patterns(pieces: Sequence[Piece]) -> str:
 def _percent(value: float | None) -> str:
     if value is None:
         return "–"
-    return "0" if abs(value) < EXACT else f"{100.0 * value:.3g} %"
+    return "0" if abs(value) <= EXACT else f"{100.0 * value:.3g} %"

@@ -16,9 +16,6 @@ from .compare_json import (
     file_json as file_json,
     in_answer as in_answer,
 )
-from .compare_table import (
-    EXACT as EXACT,
-)
 from .comparison import (
     compare as compare,
 )

@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from designer.base.figure_style import GRID, INK, new_figure, say, styled
-from designer.report.compare_table import EXACT, peaks
+from designer.circuit.coefficients import EXACT
+from designer.report.compare_table import peaks
 
 MARKS = (
     ("#d55e00", "s"),
@@ -59,7 +60,7 @@ def _errors(
         say(axes, "no coefficient could be compared")
         return
     sizes = [[100.0 * abs((c["errors"] or {}).get(n, np.nan)) for n in names] for c in columns]
-    real = [v for row in sizes for v in row if np.isfinite(v) and v >= 100.0 * EXACT]
+    real = [v for row in sizes for v in row if np.isfinite(v) and v > 100.0 * EXACT]
     high = 10.0 ** np.ceil(np.log10(max(real)) + 0.05) if real else 1.0
     low = 10.0 ** (np.floor(np.log10(min(real))) - 1.0) if real else 1e-3
     _rows(axes, names)
@@ -73,7 +74,7 @@ def _errors(
     axes.set_xticks(ticks, ["exact", *(f"{t:.10g}" for t in ticks[1:])])
     axes.xaxis.set_minor_locator(NullLocator())
     for i, (row, mark) in enumerate(zip(sizes, marks, strict=True)):
-        drawn = [edge if v < 100.0 * EXACT else v for v in row]
+        drawn = [edge if v <= 100.0 * EXACT else v for v in row]
         _dots(axes, drawn, i, len(columns), mark)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from designer.circuit.coefficients import EXACT
+
 NONE = "-"
-EXACT = 1e-9
-"""An error below this is shown as none: what remains of solving for the scales."""
 
 
 def rows(answer: Mapping[str, Any]) -> list[tuple[str, ...]]:
@@ -83,7 +83,7 @@ def _largest(column: Mapping[str, Any]) -> str:
 def _percent(value: float | None) -> str:
     if value is None:
         return NONE
-    return f"{100 * value:+.3g} %" if abs(value) >= EXACT else "0"
+    return f"{100 * value:+.3g} %" if abs(value) > EXACT else "0"
 
 
 def _number(value: float | None, unit: str = "") -> str:

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from designer.base.figure_style import EXACT
+from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Diode, Reference, Resistor, Section
 from designer.report import words
@@ -175,7 +175,7 @@ def _thresholds(design: Design) -> str:
         return upper
     if design.circuit.stops[0].upper is None:
         return lower
-    return f"± {upper}" if abs(scales.offcentre) < EXACT else f"{upper} and {lower}"
+    return f"± {upper}" if abs(scales.offcentre) <= EXACT else f"{upper} and {lower}"
 
 
 def condition_table(design: Design) -> Table:

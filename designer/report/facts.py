@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from designer.base.figure_style import EXACT
+from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.model.ascii_sketch import sketch
 from designer.report import (
@@ -133,8 +133,8 @@ def _summary(data: ReportData) -> list[str]:
             )
     passives = len(circuit.resistors) + len(circuit.capacitors)
     worst = design.errors.max_error
-    match = "every coefficient of the equations is met exactly, to rounding"
-    if worst >= EXACT:
+    match = "every coefficient of the equations is met exactly"
+    if worst > EXACT:
         match = f"the largest coefficient error is {words.error(worst)}"
         if design.certificate.status == "optimal":
             match += ", proved to be the least that these parts allow"
@@ -206,8 +206,8 @@ def _tiles(data: ReportData) -> list[tuple[str, str]]:
         what = "response" if len(data.checked) == 1 else "responses"
         out.append((f"{good} of {len(data.checked)}", f"{what} found, {asked}"))
     worst = data.design.errors.max_error
-    if worst < EXACT:
-        out.append(("exact", "every coefficient of the equations, to rounding"))
+    if worst <= EXACT:
+        out.append(("exact", "every coefficient of the equations"))
     else:
         out.append((words.error(worst), "largest coefficient error"))
     out.append((str(data.design.distinct_values), "different R and C values"))
@@ -271,7 +271,7 @@ def _parts_note(data: ReportData) -> str:
 
 def _error_note(design: Design) -> str:
     worst = design.errors.max_error
-    said = "All are exact to rounding." if worst < EXACT else f"Largest: {words.error(worst)}."
+    said = "All are exact." if worst <= EXACT else f"Largest: {words.error(worst)}."
     return (
         "Of the finished circuit, reduced by nodal analysis with ideal op-amps, at the time and "
         f"voltage scales that suit it best. {said} The clearance and the force are set at the "
@@ -306,7 +306,7 @@ def _certificate(design: Design) -> str:
         said = (
             "Proved optimal: under the conditions kept, no choice of parts from this catalogue "
             f"has a largest error below {reached}."
-            if design.errors.max_error >= EXACT
+            if design.errors.max_error > EXACT
             else "Proved optimal: an exact match cannot be improved on."
         )
     elif c.status == "bound":

@@ -8,9 +8,10 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from designer.base.figure_style import EXACT, to_svg
+from designer.base.figure_style import to_svg
 from designer.board import schematic_drawing
 from designer.check.checked_design import traces
+from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.report import blame_plots, map_plots, model_page, orbit_plots, study_plots, words
 from designer.report.data import ReportData
@@ -181,7 +182,7 @@ def _map_pictures(data: ReportData, page: InlineSvg) -> list[ReportPicture]:
 
 
 def _error_picture(design: Design, page: InlineSvg) -> ReportPicture | None:
-    if design.errors.max_error < EXACT:
+    if design.errors.max_error <= EXACT:
         return None  # a row of "exact" says nothing that the sentence above it does not
     errors = {words.coefficient(k): v for k, v in design.errors.errors.items()}
     return _picture(

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from designer.base.figure_style import (
-    EXACT,
     GRID,
     INK,
     MUTED,
@@ -20,6 +19,7 @@ from designer.base.figure_style import (
     new_figure,
     styled,
 )
+from designer.circuit.coefficients import EXACT
 from designer.yields.verdict import Answer, Verdict, Yield
 
 VERDICTS = {
@@ -67,11 +67,11 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
 
 @styled
 def coefficient_chart(errors: Mapping[str, float]) -> Figure:
-    """|error| of each coefficient on a logarithmic axis; below ``EXACT`` it stands as "exact"."""
+    """|error| of each coefficient on a logarithmic axis; up to ``EXACT`` it stands as "exact"."""
     figure = new_figure(7.4, 0.24 * max(len(errors), 1) + 0.8)
     axes = figure.subplots()
     percent = {k: 100.0 * abs(v) for k, v in errors.items()}
-    real = [v for v in percent.values() if v >= 100.0 * EXACT and np.isfinite(v)]
+    real = [v for v in percent.values() if v > 100.0 * EXACT and np.isfinite(v)]
     high = 10.0 ** np.ceil(np.log10(max(real)) + 0.05) if real else 1.0
     low = 10.0 ** (np.floor(np.log10(min(real))) - 1.0) if real else 1e-2
     edge = low * (high / low) ** 0.05
@@ -82,7 +82,7 @@ def coefficient_chart(errors: Mapping[str, float]) -> Figure:
     for i, (name, value) in enumerate(percent.items()):
         if not np.isfinite(value):
             axes.text(edge, i, "not known", va="center", color=MUTED, size=8)
-        elif value < 100.0 * EXACT:
+        elif value <= 100.0 * EXACT:
             axes.plot([edge], [i], "o", mfc="white", mec=VERDICTS[Verdict.OK], ms=5.5)
             axes.annotate(
                 "exact", (edge, i), (7, 0), textcoords="offset points", va="center", size=8

@@ -6,17 +6,14 @@ import math
 import re
 from dataclasses import replace
 
-from designer.base.figure_style import EXACT
 from designer.base.units import format_quantity
 from designer.check.checked_design import CheckedResponse
 from designer.check.trust import WORDS
+from designer.circuit.coefficients import EXACT
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.yields.verdict import Yield
 
 NONE = "–"
-
-SMALLEST = 1e-6
-"""Coefficient errors below this have no digits of their own."""
 
 TERM = re.compile(r"x(\d)('{1,2}) x(\d)('?)")
 
@@ -107,9 +104,7 @@ def error(value: float) -> str:
     """A coefficient error, a logarithm, in per cent."""
     if not math.isfinite(value):
         return NONE
-    if abs(value) < EXACT:
-        return "exact (< 1e-12)"
-    return f"{100 * value:.3g} %" if abs(value) >= SMALLEST else f"< {100 * SMALLEST:.4f} %"
+    return f"{100 * value:.3g} %" if abs(value) > EXACT else "exact (up to 1e-6)"
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
