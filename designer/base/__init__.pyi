@@ -117,6 +117,21 @@ from .natural_sort import (
 from .netlist_guard import (
     check_netlist as check_netlist,
 )
+from .page import (
+    Block as Block,
+    Columns as Columns,
+    Gallery as Gallery,
+    Items as Items,
+    Page as Page,
+    Picture as Picture,
+    Section as Section,
+    SmallPrint as SmallPrint,
+    Table as Table,
+    Verbatim as Verbatim,
+    bullets as bullets,
+    markdown as markdown,
+    table as table,
+)
 from .parquet_entry import (
     ParquetForm as ParquetForm,
     Rows as Rows,

@@ -193,7 +193,7 @@ class StudyStage:
         from designer.report.data import ReportData
         from designer.report.write import write_report  # matplotlib is not needed before this
 
-        data = ReportData.of(result, self.command, design_files.starts(folder))
+        data = ReportData(result, self.command, tuple(design_files.starts(folder)))
         write_report(data, *(folder / name for name in place.names(REPORTS)))
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 from designer.board.board_parts import board_circuit
 from designer.board.bom import bill
@@ -14,110 +13,74 @@ from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import OrbitStatus
-from designer.model.model_file import ModelFile
-from designer.report.layers import Layers
+from designer.model.model import Dimensionless, Mechanical
 from designer.spread.part_grades import BetterGrade, better_grades
-from designer.yields.joint_yield import all_on_one
-from designer.yields.ngspice_sampling import Hearing
-from designer.yields.verdict import Answer, StudyPlan, Yield
-
-if TYPE_CHECKING:
-    from designer.spice.equation_check import EquationCheck
-    from designer.yields.run_result import RunResult
+from designer.yields.blame_analysis import ResponseBlame
+from designer.yields.run_result import RunResult
+from designer.yields.study import Study
+from designer.yields.verdict import StudyPlan, Yield
 
 
 @dataclass(frozen=True)
 class ReportData:
-    """What a report is made from."""
+    """A finished run, and how it was asked for."""
 
-    modelfile: ModelFile
-    """The model file."""
-    design: Design
-    """The design."""
-    checked: tuple[CheckedResponse, ...]
-    """Every wanted response."""
-    yields: tuple[Yield | None, ...] | None
-    """One for each response (None where it was left out) or one for each question of the plan; None
-    where there was no study."""
-    answers: tuple[Answer, ...]
-    """Rows of the study, of some or all of the responses."""
-    plan: StudyPlan | None
-    """What decides the study's samples; None where there was no study."""
-    bom: Sequence[Mapping[str, str]]
-    """Rows of ``bom.csv``."""
-    provenance: Mapping[str, Any]
-    """Versions, seed and settings."""
+    result: RunResult
+    """What the run found."""
     command: str
-    """The command line that makes these results again."""
-    equations: EquationCheck | None = None
-    """The equation check; None where it was not made."""
-    heard: tuple[Hearing, ...] = ()
-    """What ngspice said about boards of the study."""
-    layers: Layers = field(default_factory=Layers)
-    """What else the study has."""
+    """The command line that makes these results again; "" where there is none."""
     starts: tuple[str, ...] = ()
     """How to start each response, from ``setup.csv``; empty where there is none."""
-    board: Circuit | None = None
-    """The circuit with its fittings, to be drawn; None for no drawing."""
-    pins: Numbers = field(default_factory=dict)
-    """Pins of the board's op-amps."""
-    better_grades: Mapping[str, BetterGrade] = field(default_factory=dict)
-    """Parts that are bought at a better grade than was asked for."""
-
-    @classmethod
-    def of(cls, result: RunResult, command: str, starts: Sequence[str] = ()) -> ReportData:
-        """The data of a finished run."""
-        circuit, choice = board_circuit(result)
-        found = components(circuit, result.catalog, choice)
-        return cls(
-            modelfile=result.modelfile,
-            design=result.design,
-            checked=result.checked,
-            yields=result.yields,
-            answers=result.answers,
-            plan=result.plan,
-            bom=[line.cells() for line in bill(to_buy(found, choice))],
-            provenance=result.provenance,
-            command=command,
-            equations=result.equations,
-            heard=result.study.heard,
-            starts=tuple(starts),
-            board=circuit,
-            pins=pin_numbers(found),
-            better_grades=better_grades(result.modelfile, result.design.circuit, result.catalog),
-            layers=Layers(
-                tuned=result.study.tuned,
-                trimmed=result.study.trimmed,
-                reached=result.study.reached,
-                combined=result.study.combined,
-                recipes=result.study.recipes or (),
-                blame=result.study.blame,
-                maps=result.study.maps,
-                status=result.study.blame_status,
-            ),
-        )
-
-    @cached_property
-    def question_of(self) -> tuple[int | None, ...]:
-        """For each response its question in the plan; None where it was left out."""
-        free = dict(enumerate(self.plan.questions)) if self.plan is not None else {}
-        found: list[int | None] = []
-        for c in self.checked:
-            same = (
-                i
-                for i, q in free.items()
-                if q.spec == c.model.spec and q.excitation == c.excitation
-            )
-            number = next(same, None)
-            if number is not None:
-                del free[number]
-            found.append(number)
-        return tuple(found)
 
     @property
-    def census(self) -> bool:
-        """Whether the study's boards are all the boards there are."""
-        return self.plan is not None and self.plan.census
+    def design(self) -> Design:
+        return self.result.design
+
+    @property
+    def checked(self) -> tuple[CheckedResponse, ...]:
+        """Every wanted response."""
+        return self.result.checked
+
+    @property
+    def study(self) -> Study:
+        return self.result.study
+
+    @property
+    def plan(self) -> StudyPlan:
+        return self.study.plan
+
+    @property
+    def mechanical(self) -> Mechanical | None:
+        """The SI parameters; None where the model file is dimensionless."""
+        return self.result.modelfile.mechanical
+
+    @property
+    def given(self) -> Dimensionless | Mechanical:
+        """The parameters as the model file gives them."""
+        return self.mechanical or self.design.model
+
+    @cached_property
+    def yields(self) -> tuple[Yield | None, ...]:
+        """For each response; None where it was left out of the study."""
+        return self.study.yields
+
+    @cached_property
+    def bom(self) -> list[Mapping[str, str]]:
+        """Rows of ``bom.csv``."""
+        circuit, choice = board_circuit(self.result)
+        parts = to_buy(components(circuit, self.result.catalog, choice), choice)
+        return [line.cells() for line in bill(parts)]
+
+    @cached_property
+    def board(self) -> tuple[Circuit, Numbers]:
+        """The circuit with its fittings, and the pins of its op-amps."""
+        circuit, choice = board_circuit(self.result)
+        return circuit, pin_numbers(components(circuit, self.result.catalog, choice))
+
+    @property
+    def better_grades(self) -> Mapping[str, BetterGrade]:
+        """Parts that are bought at a better grade than was asked for."""
+        return better_grades(self.result.modelfile, self.design.circuit, self.result.catalog)
 
     @property
     def ngspice_asked(self) -> bool:
@@ -127,28 +90,13 @@ class ReportData:
             c.gate is not None for c in shown
         )
 
-    def answers_to(self, response: int) -> tuple[Answer, ...]:
-        """Answers for response number ``response``, by sample."""
-        number = self.question_of[response]
-        return tuple(a for a in self.answers if number is not None and a.question == number)
+    def question_of(self, response: int) -> int | None:
+        """The question of the plan that asks for a response; None where it was left out."""
+        asked = self.study.asked
+        return asked.index(response) if response in asked else None
 
-    def heard_of(self, response: int) -> tuple[Hearing, ...]:
-        """What ngspice said about response number ``response``, by sample."""
-        number = self.question_of[response]
-        return tuple(h for h in self.heard if number is not None and h.question == number)
-
-    def yield_of(self, response: int) -> Yield | None:
-        """Its yield; None where it was left out or there was no study."""
-        if self.yields is None:
-            return None
-        if len(self.yields) == len(self.checked):
-            return self.yields[response]
-        number = self.question_of[response]
-        return self.yields[number] if number is not None and number < len(self.yields) else None
-
-    @cached_property
-    def all_on_one_board(self) -> Yield | None:
-        """Boards that show every response; None unless each was asked of each board."""
-        if len(self.checked) < 2 or None in self.question_of or not self.answers:
-            return None
-        return all_on_one(self.answers, self.census)
+    def blame_of(self, response: int) -> ResponseBlame | None:
+        """The blame of a response."""
+        blame, question = self.study.blame, self.question_of(response)
+        rows = () if blame is None else blame.responses
+        return next((b for b in rows if b.question == question), None)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from designer.base.page import Table, table
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
-from designer.circuit.netlist import Capacitor, Diode, Reference, Resistor, Section
+from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
+from designer.model.model import Dimensionless, Mechanical
 from designer.report import words
-from designer.report.data import ReportData
-from designer.report.tables import Table
 
 _PARAMETERS = {
     "m": "mass ratio M2/(M1 + M2)",
@@ -25,7 +26,7 @@ _PARAMETERS = {
     "sides": "sides of M1 with a stop",
 }
 
-_UNITS = {
+MECHANICAL_UNITS = {
     "M1": "kg", "M2": "kg", "C1": "N s/m", "C2": "N s/m", "K0": "N/m", "K1": "N/m", "K2": "N/m",
     "B": "m", "P1": "N", "P2": "N",
 }  # fmt: skip
@@ -33,6 +34,12 @@ _UNITS = {
 _MEANINGS = {
     "M": "mass", "C": "damper", "K": "spring", "K0": "stop's spring", "B": "clearance",
     "P": "force amplitude on mass",
+}  # fmt: skip
+
+_BOM = {
+    "quantity": "qty", "designators": "designators", "value": "value",
+    "part_number": "part number", "manufacturer": "manufacturer", "footprint": "footprint",
+    "rating": "rating", "grade": "grade", "price_class": "price class",
 }  # fmt: skip
 
 _CONDITIONS = {
@@ -59,48 +66,36 @@ _CONDITIONS = {
 _QUANTITY = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)([fpnµmkM]?[ΩFVW])(?!\w)")
 
 
-def model_table(data: ReportData) -> Table:
-    model = data.design.model
+def model_table(model: Dimensionless) -> Table | None:
     rows = [
         ("ζ" if k == "zeta" else k, words.number(getattr(model, k)), t)
         for k, t in _PARAMETERS.items()
     ]
-    return Table(("parameter", "value", "what it is"), tuple(rows), (1,))
+    return table(("parameter", "value", "what it is"), rows, (1,))
 
 
-def mechanical_table(data: ReportData) -> Table | None:
-    given = data.modelfile.mechanical
-    if given is None:
-        return None
+def mechanical_table(given: Mechanical) -> Table | None:
     rows = []
-    for name, unit in _UNITS.items():
+    for name, unit in MECHANICAL_UNITS.items():
         kind = _MEANINGS.get(name) or f"{_MEANINGS[name[0]]} {name[1:]}"
         rows.append((name, words.quantity(getattr(given, name), unit), kind))
-    return Table(("parameter", "value", "what it is"), tuple(rows), (1,))
+    return table(("parameter", "value", "what it is"), rows, (1,))
 
 
-def bom_table(data: ReportData) -> Table | None:
-    if not data.bom:
-        return None
-    shown = {
-        "quantity": "qty", "designators": "designators", "value": "value",
-        "part_number": "part number", "manufacturer": "manufacturer", "footprint": "footprint",
-        "rating": "rating", "grade": "grade", "price_class": "price class",
-    }  # fmt: skip
-    keys = [k for k in shown if any(k in row for row in data.bom)]
-    rows = tuple(tuple(_bom_cell(k, str(row.get(k, ""))) for k in keys) for row in data.bom)
-    return Table(
-        tuple(shown[k] for k in keys), rows, (0, keys.index("value")) if "value" in keys else (0,)
-    )
+def bom_table(bom: Sequence[Mapping[str, str]]) -> Table | None:
+    keys = [k for k in _BOM if any(k in row for row in bom)]
+    rows = [[_bom_cell(k, row.get(k, "")) for k in keys] for row in bom]
+    numeric = [keys.index(k) for k in ("quantity", "value") if k in keys]
+    return table([_BOM[k] for k in keys], rows, numeric)
 
 
-def part_table(data: ReportData) -> Table:
+def part_table(circuit: Circuit) -> Table | None:
     """Everything but the op-amps, by what it does."""
     roles: dict[str, list[str]] = {}
-    for part in data.design.circuit.parts:
+    for part in circuit.parts:
         if not isinstance(part, Section):
             roles.setdefault(part.role, []).append(f"{part.name}\u00a0=\u00a0{_value(part)}")
-    return Table(("role", "parts"), tuple((r, ", ".join(p)) for r, p in roles.items()))
+    return table(("role", "parts"), [(r, ", ".join(p)) for r, p in roles.items()])
 
 
 def _value(part: Resistor | Capacitor | Diode | Reference) -> str:
@@ -115,14 +110,12 @@ def _value(part: Resistor | Capacitor | Diode | Reference) -> str:
             return words.quantity(part.value, "F")
 
 
-def opamp_table(data: ReportData) -> Table:
-    sections = data.design.circuit.sections
-    return Table(
-        ("section", "package", "role"), tuple((s.name, s.package, s.role) for s in sections)
-    )
+def opamp_table(circuit: Circuit) -> Table | None:
+    rows = [(s.name, s.package, s.role) for s in circuit.sections]
+    return table(("section", "package", "role"), rows)
 
 
-def error_table(design: Design) -> Table:
+def error_table(design: Design) -> Table | None:
     wanted = design.model.second_order().state_matrix()
     rows = []
     for name, error in design.errors.errors.items():
@@ -134,12 +127,11 @@ def error_table(design: Design) -> Table:
         elif name.endswith("stop slope"):
             want = words.number(design.model.mu)
         rows.append((words.coefficient(name), want, words.error(error)))
-    return Table(("coefficient", "wanted", "ln(realised/wanted)"), tuple(rows), (1, 2))
+    return table(("coefficient", "wanted", "ln(realised/wanted)"), rows, (1, 2))
 
 
-def scale_table(data: ReportData) -> Table:
-    design, scales = data.design, data.design.errors.scales
-    mechanical = data.modelfile.mechanical
+def scale_table(design: Design, mechanical: Mechanical | None) -> Table | None:
+    scales = design.errors.scales
     rows = [
         ("one unit of model time", words.quantity(scales.seconds, "s")),
         ("generator frequency at ω = 1", words.quantity(scales.frequency(1.0), "Hz")),
@@ -163,7 +155,7 @@ def scale_table(data: ReportData) -> Table:
         )
         if mechanical is not None:
             rows.append(("one generator volt", words.quantity(gain * mechanical.force_scale, "N")))
-    return Table(("scale", "value"), tuple(rows), (1,))
+    return table(("scale", "value"), rows, (1,))
 
 
 def _thresholds(design: Design) -> str:
@@ -178,9 +170,9 @@ def _thresholds(design: Design) -> str:
     return f"± {upper}" if abs(scales.offcentre) <= EXACT else f"{upper} and {lower}"
 
 
-def condition_table(design: Design) -> Table:
-    rows = tuple(_condition(k, v) for k, v in design.conditions.items())
-    return Table(("condition", "value"), rows, (1,))
+def condition_table(design: Design) -> Table | None:
+    rows = [_condition(k, v) for k, v in design.conditions.items()]
+    return table(("condition", "value"), rows, (1,))
 
 
 def _bom_cell(key: str, text: str) -> str:

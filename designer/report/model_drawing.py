@@ -9,11 +9,8 @@ from matplotlib.patches import Rectangle
 from designer.base.figure_style import CONTACT, INK, MUTED, new_figure, styled
 from designer.model.model import Dimensionless, Mechanical
 from designer.report import words
+from designer.report.design_tables import MECHANICAL_UNITS
 
-_UNITS = {
-    "M1": "kg", "M2": "kg", "K0": "N/m", "K1": "N/m", "K2": "N/m", "C1": "N s/m", "C2": "N s/m",
-    "B": "m", "P1": "N", "P2": "N",
-}  # fmt: skip
 _SUBSCRIPTS = str.maketrans("012", "₀₁₂")
 
 WIDTH, HEIGHT = 18.5, 7.0
@@ -81,7 +78,7 @@ class _Page:
         if self.model is None:
             return shown
         value = getattr(self.model, name)
-        text = words.quantity(value, _UNITS[name]) if self.units else words.number(value)
+        text = words.quantity(value, MECHANICAL_UNITS[name]) if self.units else words.number(value)
         return f"{shown}{join}{text}"
 
     def link(self, x0: float, x1: float, spring: str, damper: str) -> None:

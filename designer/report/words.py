@@ -24,6 +24,11 @@ def name(c: CheckedResponse) -> str:
     return f"ω = {number(c.model.omega)} ({c.model.expected or c.model.orbit.response})"
 
 
+def label(c: CheckedResponse, join: str = "   ") -> str:
+    """The same in a picture, where n-p-q may stand on a line of its own."""
+    return f"ω = {number(c.model.omega)}{join}{c.model.expected or c.model.orbit.response}"
+
+
 def orbit(met: Orbit) -> str:
     return f"{met.response} ({met.reason})" if met.reason else met.response
 
@@ -31,21 +36,21 @@ def orbit(met: Orbit) -> str:
 def problem(c: CheckedResponse) -> str:
     """What is wrong with a response, in words; "" where it was found, all engines agree, and the
     exact ones can be trusted."""
-    said = []
+    parts = []
     ngspice, without = c.ngspice, replace(c, gate=None)
     if not c.model.found:
-        said.append(f"the model shows {orbit(c.model.orbit)} instead")
+        parts.append(f"the model shows {orbit(c.model.orbit)} instead")
     if not without.agrees:
-        said.append(f"model {orbit(c.model.orbit)} and exact circuit {orbit(c.circuit)} differ")
+        parts.append(f"model {orbit(c.model.orbit)} and exact circuit {orbit(c.circuit)} differ")
     exact = {"model": c.model_trust, "exact circuit": c.circuit_trust}
     for engine, trust in exact.items():
         if trust.reasons:  # without figures: equal studies are equal reports
-            said.append(f"{engine} {WORDS}: {'; '.join(trust.reasons)}")
+            parts.append(f"{engine} {WORDS}: {'; '.join(trust.reasons)}")
     if ngspice is not None and ngspice.status is OrbitStatus.FAILED:
-        said.append(f"ngspice gave no answer: {ngspice.reason or 'no reason given'}")
+        parts.append(f"ngspice gave no answer: {ngspice.reason or 'no reason given'}")
     elif ngspice is not None and without.agrees and not c.agrees:
-        said.append(f"ngspice shows {orbit(ngspice)}, the exact circuit {orbit(c.circuit)}")
-    return f"{name(c)}: {'; '.join(said)}" if said else ""
+        parts.append(f"ngspice shows {orbit(ngspice)}, the exact circuit {orbit(c.circuit)}")
+    return f"{name(c)}: {'; '.join(parts)}" if parts else ""
 
 
 def coefficient(name: str) -> str:

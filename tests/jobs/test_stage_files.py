@@ -10,9 +10,6 @@ import pytest
 
 from designer.base.design_folder import Folder
 from designer.base.plain_json import dumps
-from designer.board.board_parts import board_circuit
-from designer.board.bom import bill
-from designer.board.component import components
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
@@ -31,6 +28,8 @@ from designer.yields import study_plan
 from designer.yields.layers import Samples
 from designer.yields.ngspice_runs import hear
 from designer.yields.ngspice_sampling import ask_random
+from designer.yields.run_result import RunResult
+from designer.yields.study import Study
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
 
@@ -116,21 +115,10 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
     known = {(a.sample, a.question): a for a in answers}
     assert len(heard) == 2 * len(answers)
     assert all(h.agrees(known[h.sample, h.question]) is not False for h in heard)
-    circuit, choice = board_circuit(first)
-    data = ReportData(
-        modelfile=first.modelfile,
-        design=first.design,
-        checked=checked,
-        yields=study_plan.yields(plan, answers),
-        answers=tuple(answers),
-        plan=plan,
-        bom=[
-            line.cells() for line in bill(components(circuit, CATALOG, choice))
-        ],
-        provenance=provenance(first.modelfile, CATALOG.hash, seed=1, spread={}),
-        command="designer run model.toml",
-        heard=tuple(heard),
-    )  # fmt: skip
+    study = Study(checked, plan, tuple(range(len(checked))), {}, tuple(answers), heard=tuple(heard))
+    source = provenance(first.modelfile, CATALOG.hash, seed=1, spread={})
+    result = RunResult(first.modelfile, CATALOG, first.found, first.design, checked, study, source)
+    data = ReportData(result, "designer run model.toml")
     page = render_html(data)
     assert render_markdown(data)
     if CASES[name][0] == "rectifier":

@@ -8,13 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from designer.base.page import Table
 from designer.check import checked_design
 from designer.report import words
 from designer.report.data import ReportData
 from designer.report.design_tables import condition_table
-from designer.report.layers import Layers
-from designer.report.tables import provenance_table
-from designer.report.tolerance import facts
+from designer.report.response_tables import provenance_table
+from designer.report.tolerance_tables import (
+    avoided,
+    boards,
+    corners,
+    differences,
+    kinds,
+    limits,
+    maps,
+    recipes,
+)
 from designer.report.write import render_html, render_markdown
 from designer.yields import study_plan
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
@@ -22,11 +31,14 @@ from designer.yields.blame_replay import BlamedPart
 from designer.yields.corners import Corner
 from designer.yields.exact_rung import block
 from designer.yields.margins import Prediction
+from designer.yields.run_result import RunResult
 from designer.yields.sobol import Index
+from designer.yields.study import Study
 from designer.yields.verdict import Verdict
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.report.test_write import Page
 from tests.shared.paper_cases import synthesised
+from tests.shared.report_data import changed
 
 HOSTILE = "<b>x</b> | `y`"
 
@@ -81,17 +93,8 @@ def plain() -> ReportData:
     checked = checked_design.check(design, found, None)
     plan = study_plan.plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
     answers = tuple(block(plan, range(3), 2))
-    return ReportData(
-        modelfile,
-        design,
-        checked,
-        study_plan.yields(plan, answers),
-        answers,
-        plan,
-        [],
-        {},
-        "designer",
-    )
+    study = Study(checked, plan, (0, 1), {}, answers)
+    return ReportData(RunResult(modelfile, made.catalog, found, design, checked, study), "designer")
 
 
 def blamed(question: int, lost: int) -> ResponseBlame:
@@ -131,21 +134,25 @@ def full(plain: ReportData) -> ReportData:
         for q in (0, 1)
     ]
     reached = [Row(s, 0, Verdict.OK) for s in range(4)] + [Row(9, 1, Verdict.FAILED)]
-    return replace(
+    return changed(
         plain,
-        layers=Layers(
-            tuned=tuned,
-            reached=reached,
-            combined=(Together(), None),
-            recipes=(Recipe(), Recipe("dwell for 2 s")),
-            blame=Blame((blamed(0, 10), blamed(1, 0)), 100, 1, 500, 300, 1.0),
-            maps=(mapped(1),),
-        ),
+        tuned=tuple(tuned),
+        reached=tuple(reached),
+        combined=(Together(), None),
+        recipes=(Recipe(), Recipe("dwell for 2 s")),
+        blame=Blame((blamed(0, 10), blamed(1, 0)), 100, 1, 500, 300, 1.0),
+        maps=(mapped(1),),
     )
 
 
+def rows_of(table: Table | None) -> tuple[tuple[str, ...], ...]:
+    assert table is not None
+    return table.rows
+
+
 def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
-    assert {k: v for k, v in facts(plain).items() if v} == {}
+    for part in (kinds, differences, recipes, limits, avoided, corners, maps, boards):
+        assert part(plain) is None
     page = Page(render_html(plain))
     text = page.text + render_markdown(plain)
     for heading in ("Which part is to blame", "Where to sit", "and both engines", "How to reach"):
@@ -154,7 +161,8 @@ def test_without_layers_there_is_no_trace_of_them(plain: ReportData) -> None:
 
 
 def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
-    table = facts(full)["kinds_table"]
+    table = kinds(full)
+    assert table is not None
     assert table.columns == (
         "response", "as built", "tuned", "tuned on the bench", "reached", "both engines together",
     )  # fmt: skip
@@ -170,16 +178,14 @@ def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
 
 
 def test_the_heading_names_the_kinds_that_there_are(full: ReportData) -> None:
-    layers = Layers(combined=(Together(), None))
-    assert facts(replace(full, layers=layers))["kinds_heading"] == (
-        "As built and both engines together"
-    )
+    data = changed(full, tuned=None, reached=None, combined=(Together(), None))
+    assert "### As built and both engines together" in render_markdown(data)
 
 
 def test_without_a_loss_nobody_is_to_blame(full: ReportData) -> None:
     one, other = (replace(blamed(q, 0), prediction=Prediction(100, 0, 0, 0)) for q in (0, 1))
     none = Blame((one, other), 100, 1, 500, 300, 1.0)
-    text = render_markdown(replace(full, layers=replace(full.layers, blame=none)))
+    text = render_markdown(changed(full, blame=none))
     assert "foretold by the margin" not in text
     assert "## What comes nearest to a loss" in text
     assert "No board was lost, so none was asked again." in text
@@ -188,14 +194,14 @@ def test_without_a_loss_nobody_is_to_blame(full: ReportData) -> None:
 
 
 def test_a_difference_says_where_ngspice_started(full: ReportData) -> None:
-    row = facts(full)["difference_table"].rows[0]
+    row = rows_of(differences(full))[0]
     assert row[2] == (
         "board 7 from its own orbit: exact circuit 1-1-1, ngspice 3-3-3 (grazing margin)"
     )
 
 
 def test_every_response_has_its_start_recipe_without_power_ups(plain: ReportData) -> None:
-    assert facts(plain)["recipe_table"] is None
+    assert recipes(plain) is None
     text = render_markdown(replace(plain, starts=("sweep down to 500 Hz", "switch on there")))
     assert "How to reach a response" in text
     assert "sweep down to 500 Hz" in text
@@ -203,15 +209,15 @@ def test_every_response_has_its_start_recipe_without_power_ups(plain: ReportData
 
 
 def test_conditions_have_words_and_units(plain: ReportData) -> None:
-    rows = condition_table(plain.design).rows
+    rows = rows_of(condition_table(plain.design))
     assert rows
     assert not {name for name, _ in rows} & {k.replace("_", " ") for k in plain.design.conditions}
 
 
 def test_the_provenance_has_the_spread_in_words(plain: ReportData) -> None:
     assert plain.plan is not None
-    data = replace(plain, provenance={"seed": 1, "spread": plain.plan.spread.as_dict()})
-    rows = {row[0]: row[1] for row in provenance_table(data).rows}
+    data = changed(plain, provenance={"seed": 1, "spread": plain.plan.spread.as_dict()})
+    rows = {row[0]: row[1] for row in rows_of(provenance_table(data))}
     assert set(rows) == {"seed", "spread"}
     assert rows["spread"].startswith("bench-1: resistors uniform within ± 1 %")
 
@@ -228,19 +234,18 @@ def test_an_interval_near_the_end_keeps_its_ends_apart() -> None:
 
 
 def test_the_blame_says_who_and_how_sure_it_is(full: ReportData) -> None:
-    said = facts(full)
-    assert len(said["avoided_table"].rows) == 1
-    (_, lost, groups, parts) = said["avoided_table"].rows[0]
+    assert len(rows_of(avoided(full))) == 1
+    (_, lost, groups, parts) = rows_of(avoided(full))[0]
     assert lost == "10"
     assert groups == "all offsets: 9 of 10 (60 to 98 %), 1 of 4 ok boards lost"
     assert parts == "U3C: 6 of 10 (31 to 83 %)"
-    assert said["limit_table"].rows[0][2] == "95 of 100 (lost boards missed: 2, false alarms: 3)"
-    assert said["corner_table"].rows[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
-    assert "500 attractors" in said["blame_note"]
+    assert rows_of(limits(full))[0][2] == "95 of 100 (lost boards missed: 2, false alarms: 3)"
+    assert rows_of(corners(full))[0][1:] == ("U3C.offset high", "lost: 2-2-2", "1 of 2")
+    assert "500 attractors" in render_markdown(full)
 
 
 def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:
-    row = facts(full)["map_table"].rows[0]
+    row = rows_of(maps(full))[0]
     assert row[1] == "ω"
     assert row[2] == "0.82 to 0.9 (as far as was looked)"
     assert row[3].startswith("0.85: 80 %")
@@ -249,8 +254,8 @@ def test_a_map_says_what_is_in_use_and_what_is_better(full: ReportData) -> None:
 
 def test_a_response_that_survives_nowhere_has_no_recommended_setting(full: ReportData) -> None:
     none = replace(mapped(1), ok=np.zeros(3, dtype=np.int64), lost=np.array([0, 10, 10]))
-    data = replace(full, layers=replace(full.layers, maps=(none,)))
-    row = facts(data)["map_table"].rows[0]
+    data = changed(full, maps=(none,))
+    row = rows_of(maps(data))[0]
     assert row[-1] == "nowhere"
     assert row[-2].startswith("0.85: 0")
     assert "nowhere" in render_markdown(data)

@@ -12,12 +12,9 @@ import pytest
 
 from designer.base import figure_style
 from designer.base.errors import InputError
-from designer.board.board_parts import board_circuit
-from designer.board.bom import bill
-from designer.board.component import components
+from designer.base.page import Table
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
-from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
 from designer.model.ascii_sketch import sketch
@@ -25,7 +22,7 @@ from designer.model.model import Sides
 from designer.model.model_file import parse_model_file
 from designer.model.response_table import Expect
 from designer.report.data import ReportData
-from designer.report.tables import Table, ngspice_table
+from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
@@ -37,6 +34,7 @@ from designer.yields.run_result import RunResult
 from designer.yields.study import Study
 from designer.yields.verdict import Verdict
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
+from tests.shared.report_data import changed
 
 HOSTILE = "<script>alert(1)</script> {{7*7}} {% raw %} \"q\" 'a' | `x` <img src=x onerror=y> & ]]>"
 VOID = {"meta", "img", "link", "br", "hr", "input"}
@@ -58,19 +56,10 @@ def whole(catalog: Catalog) -> ReportData:
         plan = study_plan.plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
         answers = Samples(plan, range(4))(2, lambda: None)
         heard = hear(plan, ask_random(answers), pool, 2)
-    circuit, choice = board_circuit(Synthesis(modelfile, catalog, found, design))
-    return ReportData(
-        modelfile=modelfile,
-        design=design,
-        checked=checked,
-        yields=study_plan.yields(plan, answers),
-        answers=tuple(answers),
-        plan=plan,
-        bom=[line.cells() for line in bill(components(circuit, catalog, choice))],
-        provenance=provenance(modelfile, catalog.hash, seed=1, spread=plan.spread.as_dict()),
-        command="designer run model.toml --samples 4 --seed 1 --out out",
-        heard=tuple(heard),
-    )
+    study = Study(checked, plan, (0, 1, 2), {}, tuple(answers), heard=tuple(heard))
+    source = provenance(modelfile, catalog.hash, seed=1, spread=plan.spread.as_dict())
+    result = RunResult(modelfile, catalog, found, design, checked, study, source)
+    return ReportData(result, "designer run model.toml --samples 4 --seed 1 --out out")
 
 
 @pytest.fixture(scope="session")
@@ -128,16 +117,11 @@ def _broken(data: ReportData) -> ReportData:
     spec = replace(second.model.spec, expect=Expect(3, 4, 5))
     second = replace(second, model=replace(second.model, spec=spec, found=False))
     third = replace(third, circuit=Orbit(OrbitStatus.APERIODIC, start=third.circuit.start))
-    assert data.plan is not None
     plan = replace(data.plan, questions=data.plan.questions[:1])
-    answers = tuple(a for a in data.answers if a.question == 0)
-    return replace(
-        data,
-        checked=(first, second, third),
-        plan=plan,
-        answers=answers,
-        yields=study_plan.yields(plan, answers),
-    )
+    left_out = {1: "the model does not show it", 2: "the nominal circuit is aperiodic"}
+    answers = tuple(a for a in data.study.answers if a.question == 0)
+    study = Study((first, second, third), plan, (0,), left_out, answers)
+    return changed(data, checked=study.checked, study=study)
 
 
 def test_page_is_balanced_and_loads_nothing(html: str) -> None:
@@ -234,7 +218,7 @@ def test_what_is_wide_scrolls_in_a_box_of_its_own(html: str) -> None:
 @pytest.mark.parametrize("sides", ["both", "upper"])
 def test_the_model_is_drawn_with_its_equations(whole: ReportData, sides: Sides) -> None:
     model = replace(whole.design.model, sides=sides)
-    data = replace(whole, design=replace(whole.design, model=model))
+    data = changed(whole, design=replace(whole.design, model=model))
     page, markdown = Page(render_html(data)), render_markdown(data)
     (label,) = [text for text in page.pictures() if text.startswith("The model: ground")]
     assert ("both sides" in label) == (sides == "both")
@@ -250,7 +234,9 @@ def test_the_model_is_drawn_with_its_equations(whole: ReportData, sides: Sides) 
 def test_every_image_says_what_it_shows(whole: ReportData, html: str) -> None:
     page = Page(html)
     assert all(len(label) > 20 for label in page.pictures())
-    assert len(page.pictures()) == 2 * len(whole.checked) + 4  # model, legend, yields, margins
+    assert (
+        len(page.pictures()) == 2 * len(whole.checked) + 5
+    )  # model, legend, yields, margins, schematic
 
 
 @pytest.mark.parametrize("kind", ["html", "markdown"])
@@ -270,7 +256,7 @@ def test_every_response_appears_with_its_facts(whole: ReportData, html: str, kin
         "Proved optimal",
         "4 simulated boards",
         "all on one board",
-        whole.modelfile.sha256,
+        whole.result.modelfile.sha256,
         whole.command,
     ):
         assert wanted in text, wanted
@@ -292,16 +278,17 @@ def test_the_same_data_give_the_same_bytes(whole: ReportData, html: str, tmp_pat
 
 
 def test_no_time_and_no_path_of_this_machine_stands_in_it(whole: ReportData, html: str) -> None:
-    slow = replace(whole, design=replace(whole.design, seconds=123456.0))
-    told = dict(whole.provenance) | {"cost": {"seconds": 99.5}}
-    assert render_markdown(replace(slow, provenance=told)) == render_markdown(whole)
+    slow = changed(whole, design=replace(whole.design, seconds=123456.0))
+    told = dict(whole.result.provenance) | {"cost": {"seconds": 99.5}}
+    assert render_markdown(changed(slow, provenance=told)) == render_markdown(whole)
     assert str(EXAMPLE.parent) not in html + render_markdown(whole)
 
 
 def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     bom = [{**whole.bom[0], "manufacturer": HOSTILE, "part_number": "x" * 70}]
-    modelfile = replace(whole.modelfile, title=HOSTILE)
-    data = replace(whole, modelfile=modelfile, bom=bom, command=f"run\n{HOSTILE}")
+    modelfile = replace(whole.result.modelfile, title=HOSTILE)
+    data = changed(whole, modelfile=modelfile, command=f"run\n{HOSTILE}")
+    vars(data)["bom"] = bom
     plain, hostile = Page(html), Page(render_html(data))
     assert hostile.text.count(HOSTILE) == 5  # title, heading, summary, BOM, command
     assert {tag for tag, _ in plain.tags} == {tag for tag, _ in hostile.tags}
@@ -314,20 +301,15 @@ def test_hostile_text_is_inert(whole: ReportData, html: str) -> None:
     assert f"    run {' '.join(HOSTILE.split())}" in markdown.splitlines()
 
 
-def test_the_result_of_a_run_gives_the_data(whole: ReportData, catalog: Catalog) -> None:
-    assert whole.plan is not None
+def test_a_response_that_is_left_out_of_the_study(whole: ReportData) -> None:
     plan = replace(whole.plan, questions=whole.plan.questions[:2])
-    answers = tuple(a for a in whole.answers if a.question < 2)
-    study = Study(whole.checked, plan, (0, 1), {2: "the nominal circuit is aperiodic"}, answers)
-    found = tuple(c.model for c in whole.checked)
-    result = RunResult(whole.modelfile, catalog, found, whole.design, whole.checked, study)
-    data = ReportData.of(result, whole.command)
-    assert [y is None for y in data.yields or ()] == [False, False, True]
-    assert data.question_of == (0, 1, None)
-    assert data.bom == whole.bom
-    assert data.board is not None
+    answers = tuple(a for a in whole.study.answers if a.question < 2)
+    left_out = {2: "the nominal circuit is aperiodic"}
+    study = Study(whole.checked, plan, (0, 1), left_out, answers)
+    data = changed(whole, study=study)
+    assert [y is None for y in data.yields] == [False, False, True]
+    assert [data.question_of(i) for i in range(3)] == [0, 1, None]
     assert 'aria-label="Schematic: ' in render_html(data)
-    assert data.command == whole.command
     assert "1 response could not be studied" in render_markdown(data)
 
 
@@ -349,77 +331,55 @@ def test_what_went_wrong_is_said_with_its_reason(whole: ReportData) -> None:
     assert "timestep too small &lt;at> 1 ms" in render_markdown(data)
 
 
-def test_yields_may_be_given_for_each_response(whole: ReportData) -> None:
-    data = _broken(whole)
-    assert data.yields is not None
-    padded = replace(data, yields=(data.yields[0], None, None))
-    assert render_markdown(padded) == render_markdown(data)
-
-
 def test_lost_boards_are_counted_by_reason(whole: ReportData) -> None:
     kinds = [("to 1-3-3", "1-3-3"), ("asymmetric by 0.01 of the peak", "1-2-2")]
     answers = []
-    for a in whole.answers:
+    for a in whole.study.answers:
         lost = a.question == 2
         reason, met = kinds[a.sample % 2]
         answers.append(replace(a, verdict=Verdict.LOST, reason=reason, response=met) if lost else a)
-    assert whole.plan is not None
-    heard = [replace(h, response="1-9-9") if h.question == 2 else h for h in whole.heard]
-    data = replace(
-        whole,
-        answers=tuple(answers),
-        yields=study_plan.yields(whole.plan, answers),
-        heard=tuple(heard),
-    )
+    heard = [replace(h, response="1-9-9") if h.question == 2 else h for h in whole.study.heard]
+    data = changed(whole, answers=tuple(answers), heard=tuple(heard))
     text = render_markdown(data)
     assert "lost to 1-3-3 (2), lost: asymmetric (2)" in text
     assert "1-2-2 but 1-9-9 (2), 1-3-3 but 1-9-9 (2)" in text
     assert "2 of 3 responses survive on every one" in text
     assert "shown by 0 of 4: of a thousand boards, about 0 (95 % interval 0 to 490)" in text
-    assert data.all_on_one_board is not None
-    assert (data.all_on_one_board.ok, data.all_on_one_board.lost) == (0, 4)
+    assert data.study.all_on_one_board is not None
+    assert (data.study.all_on_one_board.ok, data.study.all_on_one_board.lost) == (0, 4)
 
 
 def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
-    answers = [replace(a, verdict=Verdict.FAILED, reason="no mode holds") for a in whole.answers]
-    assert whole.plan is not None
-    data = replace(whole, answers=tuple(answers), yields=study_plan.yields(whole.plan, answers))
+    answers = [
+        replace(a, verdict=Verdict.FAILED, reason="no mode holds") for a in whole.study.answers
+    ]
+    data = changed(whole, answers=tuple(answers))
     text = Page(render_html(data)).text
     assert "failed: no mode holds (4)" in text
     assert "4 simulated boards: not one gave an answer" in text
     assert not re.search(r"\b(nan|inf)\b", text)
-    some = [replace(a, verdict=Verdict.FAILED) if a.sample == 3 else a for a in whole.answers]
-    data = replace(whole, answers=tuple(some), yields=study_plan.yields(whole.plan, some))
+    some = [replace(a, verdict=Verdict.FAILED) if a.sample == 3 else a for a in whole.study.answers]
+    data = changed(whole, answers=tuple(some))
     text = render_markdown(data)
     assert "All 3 responses on one and the same board: 3 of 3; of a thousand, about 1000" in text
     assert "3 runs gave no answer, which the yields leave out" in text
 
 
-def test_without_a_study(whole: ReportData) -> None:
-    data = replace(whole, yields=None, answers=(), plan=None, bom=[], provenance={})
-    for text in (Page(render_html(data)).text, render_markdown(data)):
-        assert "There is no tolerance study: none was made." in text
-        assert "No bill of materials was made." in text
-    nameless = replace(data, command="")  # of a script
+def test_results_of_a_script_have_no_command(whole: ReportData) -> None:
+    nameless = replace(whole, command="")
     for text in (Page(render_html(nameless)).text, render_markdown(nameless)):
         assert "To make these results again" not in text
 
 
 def test_where_no_board_was_lost_nothing_is_told_of_losses(whole: ReportData) -> None:
-    assert whole.plan is not None
-    answers = [replace(a, verdict=Verdict.OK, reason="") for a in whole.answers]
+    answers = [replace(a, verdict=Verdict.OK, reason="") for a in whole.study.answers]
     agreed = [
         replace(h, response=a.response, reason="")
-        for h in whole.heard
+        for h in whole.study.heard
         for a in answers
         if (a.sample, a.question) == (h.sample, h.question)
     ]
-    data = replace(
-        whole,
-        answers=tuple(answers),
-        yields=study_plan.yields(whole.plan, answers),
-        heard=tuple(agreed),
-    )
+    data = changed(whole, answers=tuple(answers), heard=tuple(agreed))
     text = render_markdown(data)
     assert "every one shows all 3 responses: of a thousand, about 1000" in text
     assert "on one and the same board" not in text  # said already
@@ -435,7 +395,7 @@ def test_an_exact_match_does_not_read_as_an_error(whole: ReportData) -> None:
 
 def test_without_ngspice(whole: ReportData) -> None:
     checked = tuple(replace(c, gate=None) for c in whole.checked)
-    text = Page(render_html(replace(whole, checked=checked, heard=()))).text
+    text = Page(render_html(changed(whole, checked=checked, heard=()))).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text
     assert "steps per period" not in text
@@ -449,7 +409,9 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
         word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(h.sample, h.response)
         return replace(h, response=word, reason=f"why {word}")
 
-    data = replace(whole, heard=tuple(said(h) for h in whole.heard if h.kind is StartKind.OWN))
+    data = changed(
+        whole, heard=tuple(said(h) for h in whole.study.heard if h.kind is StartKind.OWN)
+    )
     table = ngspice_table(data)
     assert table is not None
     for row in table.rows:
@@ -459,7 +421,8 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
 
 
 def test_without_responses(whole: ReportData) -> None:
-    data = replace(whole, checked=(), yields=(), answers=(), plan=None)
+    plan = replace(whole.plan, questions=())
+    data = changed(whole, checked=(), answers=(), heard=(), asked=(), plan=plan)
     for text in (Page(render_html(data)).text, render_markdown(data)):
         assert "no response is named" in text
         assert "None was asked for." in text
@@ -468,17 +431,17 @@ def test_without_responses(whole: ReportData) -> None:
 def test_engine_that_has_no_orbit_at_all(whole: ReportData) -> None:
     first = whole.checked[0]
     broken = replace(first, model=replace(first.model, orbit=failed("diverged"), found=False))
-    text = Page(render_html(replace(whole, checked=(broken, *whole.checked[1:])))).text
+    text = Page(render_html(changed(whole, checked=(broken, *whole.checked[1:])))).text
     assert "the model shows failed (diverged) instead" in text
 
 
 def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) -> None:
     errors = {**whole.design.errors.errors, "stop slope": 0.0123}
-    changed = replace(whole.design.errors, errors=errors, max_error=0.0123)
+    larger = replace(whole.design.errors, errors=errors, max_error=0.0123)
     certificate = replace(whole.design.certificate, status="bound", lower_bound=0.004)
-    design = replace(whole.design, errors=changed, certificate=certificate)
-    page = Page(render_html(replace(whole, design=design)))
-    assert len(page.pictures()) == 2 * len(whole.checked) + 5
+    design = replace(whole.design, errors=larger, certificate=certificate)
+    page = Page(render_html(changed(whole, design=design)))
+    assert len(page.pictures()) == 2 * len(whole.checked) + 6
     assert "this design reaches 1.23 %" in page.text
     assert "stays below 0.4 %" in page.text
 
@@ -505,7 +468,11 @@ def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
     modelfile = parse_model_file(text)
     found, design = checked_design.design_for(modelfile, catalog)
     checked = checked_design.check(design, found, None)
-    data = ReportData(modelfile, design, checked, None, (), None, [], {}, "designer run x")
+    plan = study_plan.plan_study(modelfile, design, (), catalog, samples=1, seed=1)
+    study = Study(checked, plan, (), {0: "not asked"}, ())
+    data = ReportData(
+        RunResult(modelfile, catalog, found, design, checked, study), "designer run x"
+    )
     page = Page(render_html(data))
     assert "The response was found" in page.text
     assert "1 of 1response found, ngspice was not asked" in page.text

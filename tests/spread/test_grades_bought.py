@@ -28,8 +28,8 @@ from designer.jobs.options import Options
 from designer.jobs.synthesise_job import bills_are_of_old, design_inputs
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.report.data import ReportData
-from designer.report.facts import facts
 from designer.report.spread_words import words_of
+from designer.report.write import render_markdown
 from designer.spread.part_grades import better_grades, better_grades_text, bought, once_otherwise
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
@@ -144,7 +144,7 @@ def test_the_table_and_the_report_say_so(capfd: pytest.CaptureFixture[str]) -> N
         plan = plan_study(made.modelfile, made.design, (), made.catalog, samples=1, seed=1)
         study = Study((), plan, (), {}, ())
         result = RunResult(made.modelfile, made.catalog, (), made.design, (), study)
-        page = facts(ReportData.of(result, ""))["parts_note"]
+        page = " ".join(render_markdown(ReportData(result, "")).split())
         for said in (" ".join(capfd.readouterr().err.split()), page):
             assert ("drawn, at a better one: R50 R203 (1 % for 5 %)" in said) is there
 

@@ -1,0 +1,209 @@
+"""A page of prose, tables and pictures as data: ``markdown`` and ``report.write`` write it.
+
+Text is plain and is escaped. ``Markup`` is Markdown already: pages that are never HTML may have it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from markupsafe import Markup
+
+PHRASE = 60
+"""Characters of a cell that may stand in lines of a few words each."""
+
+
+class SmallPrint(str):
+    """A paragraph of small print."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts."""
+
+    columns: tuple[str, ...]
+    """Headings of the columns."""
+    rows: tuple[tuple[str, ...], ...]
+    """Cells, row by row."""
+    numeric: tuple[int, ...] = ()
+    """Indices of the columns that are set flush right."""
+
+    @property
+    def broad(self) -> bool:
+        """Whether it needs more than a phone's width: many columns, or long text."""
+        longest = max((len(cell) for row in self.rows for cell in row), default=0)
+        return len(self.columns) > 3 or longest > PHRASE
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure: a file beside the page, or an element of it."""
+
+    label: str = ""
+    """What it shows, in words; an ``svg`` says so itself."""
+    caption: str = ""
+    """The caption."""
+    file: str = ""
+    """Name of the file; "" for a picture that Markdown leaves out."""
+    svg: str = ""
+    """The ``<svg>`` elements of HTML, as ``Markup``."""
+    sketch: tuple[str, ...] = ()
+    """Verbatim of characters that show the same in Markdown."""
+    warning: str = ""
+    """What is wrong with what it shows, or ""."""
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Small pictures side by side, in HTML alone."""
+
+    intro: str
+    """What they show."""
+    key: Picture
+    """Their common legend."""
+    pictures: tuple[Picture, ...]
+    """The pictures."""
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list."""
+
+    items: tuple[tuple[str, str], ...]
+    """(head, text); a head may be ""."""
+    kind: Literal["bullets", "tiles", "warnings", "terms"] = "bullets"
+    """How HTML sets it."""
+
+
+@dataclass(frozen=True)
+class Verbatim:
+    """Verbatim that stay as they are, such as a command or equations."""
+
+    lines: tuple[str, ...]
+    """The lines."""
+    equations: bool = False
+    """Whether HTML sets them as formulas."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with what stands below it."""
+
+    title: str
+    """The heading."""
+    blocks: Sequence[Block]
+    """Paragraphs, tables, pictures, sections of the next level; None stands for nothing."""
+    anchor: str = ""
+    """Name of the section in links."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Sections side by side, where there is room."""
+
+    sections: tuple[Section, ...]
+    """The sections."""
+
+
+Block = str | Table | Picture | Gallery | Items | Verbatim | Section | Columns | None
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page."""
+
+    title: str
+    """Its title."""
+    head: Sequence[Block]
+    """What stands before the first section."""
+    sections: Sequence[Section]
+    """The sections."""
+
+
+def bullets(texts: Iterable[str]) -> Items:
+    """A list of texts without heads."""
+    return Items(tuple(("", text) for text in texts))
+
+
+def table(
+    columns: Sequence[str], rows: Iterable[Sequence[str]], numeric: Sequence[int] = ()
+) -> Table | None:
+    """A table, or None where there are no rows. A last column that says nothing is left out."""
+    cells = [tuple(row) for row in rows]
+    if not cells:
+        return None
+    end = len(columns) if any(row[-1] for row in cells) else len(columns) - 1
+    return Table(tuple(columns[:end]), tuple(row[:end] for row in cells), tuple(numeric))
+
+
+def markdown(page: Page) -> str:
+    """The page as Markdown. A section of pictures alone is left out."""
+    return "\n\n".join([f"# {plain(page.title)}", *_texts([*page.head, *page.sections], 2)]) + "\n"
+
+
+def _texts(blocks: Sequence[Block], level: int) -> list[str]:
+    return [text for block in blocks for text in _block(block, level)]
+
+
+def _block(block: Block, level: int) -> list[str]:
+    match block:
+        case str():
+            return [str(plain(block))]
+        case Table():
+            return [_table(block)]
+        case Picture():
+            return _picture(block)
+        case Items():
+            return ["\n".join(_item(head, text) for head, text in block.items)] * bool(block.items)
+        case Verbatim():
+            return [_verbatim(" ".join(line.split()) for line in block.lines)]
+        case Section():
+            below = _texts(block.blocks, level + 1)
+            return [f"{'#' * level} {plain(block.title)}", *below] if below else []
+        case Columns():
+            return _texts(block.sections, level)
+    return []
+
+
+def _item(head: str, text: str) -> str:
+    return f"- **{plain(head)}**: {plain(text)}" if head else f"- {plain(text)}"
+
+
+def _picture(picture: Picture) -> list[str]:
+    if not picture.file and not picture.sketch:
+        return []
+    shown = f"![{plain(picture.label)}]({picture.file})"
+    if picture.sketch:
+        shown = _verbatim(picture.sketch)
+    return [shown, str(plain(picture.caption))] if picture.caption else [shown]
+
+
+def _verbatim(lines: Iterable[str]) -> str:
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def plain(text: str) -> str:
+    """Any text in Markdown: one line, and nothing in it is markup."""
+    if isinstance(text, Markup):
+        return text
+    flat = " ".join(text.split())
+    flat = flat.replace("\\", "\\\\").replace("&", "&amp;").replace("<", "&lt;")
+    return re.sub(r"([`*_\[\]|])", r"\\\1", flat)
+
+
+def _table(table: Table) -> str:
+    """A Markdown table whose columns line up in plain text too."""
+    rows = [[plain(cell) for cell in row] for row in (table.columns, *table.rows)]
+    widths = [max(3, *(len(row[i]) for row in rows)) for i in range(len(table.columns))]
+    right = [i in table.numeric for i in range(len(widths))]
+    rule = ["-" * (w - 1) + (":" if r else "-") for w, r in zip(widths, right, strict=True)]
+    lines = [
+        [c.rjust(w) if r else c.ljust(w) for c, w, r in zip(row, widths, right, strict=True)]
+        for row in (rows[0], rule, *rows[1:])
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,477 @@
+"""The page of a design: what was asked for, what was found, how many boards work, what to buy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from markupsafe import Markup
+
+from designer.base.page import (
+    Block,
+    Columns,
+    Gallery,
+    Items,
+    Page,
+    Picture,
+    Section,
+    SmallPrint,
+    Table,
+    Verbatim,
+)
+from designer.circuit.coefficients import EXACT
+from designer.circuit.design import Design
+from designer.model import equations as forms
+from designer.model.ascii_sketch import sketch
+from designer.report import design_tables, response_tables, tolerance_tables, words
+from designer.report.data import ReportData
+from designer.report.spread_words import words_of
+from designer.spread.part_grades import better_grades_text
+from designer.yields.blame_analysis import Blame
+from designer.yields.verdict import Yield
+
+FORMAT = 1
+
+FEW = 100
+"""Below so many samples the report says that the intervals are wide."""
+
+Pictures = Mapping[str, Picture | Gallery]
+
+GLOSSARY = (
+    (
+        "n-p-q",
+        "a response that repeats after n periods of the drive, with p impacts on the upper stop "
+        "and q on the lower one in that time; n-q-p is its mirror twin",
+    ),
+    ("ω", "frequency of the drive, dimensionless; ω = 1 is one radian per unit of model time"),
+    ("model", "the mechanical model, solved exactly piece by piece"),
+    (
+        "exact circuit",
+        "the circuit's own equations (nodal analysis, finite op-amp gain, limits), solved likewise",
+    ),
+    (
+        "ngspice",
+        "the SPICE deck, at solver settings that passed a gate first: two step sizes and two "
+        "integration methods have to agree",
+    ),
+    ("ok", "started on the nominal design's orbit, the board settles on the wanted response"),
+    ("lost", "the board settles on something else, or on nothing periodic, or an op-amp clips"),
+    ("grazing", "too close to call: a contact too shallow or a miss too near to count"),
+    ("failed", "no answer; such boards are not part of the yield"),
+    (
+        "tuned",
+        "a setting of the generator within the stated bands was found that works. Where none was "
+        "found among the settings tried the board counts as lost, though there may be one: the "
+        "yield is a lower bound. On the bench: what the bench procedure finds works",
+    ),
+    (
+        "trimmed",
+        "the trimmer on the board is set once, by the bench procedure, and every response is "
+        "judged at that setting with the generator as in setup.csv",
+    ),
+    ("reached", "switched on by the recipe, from discharged capacitors, the board ends on it"),
+    (
+        "both engines together",
+        "the yield of the exact circuit, corrected by the boards that ngspice was asked about",
+    ),
+)
+
+
+def design_page(data: ReportData, pictures: Pictures) -> Page:
+    """The page of a run. pictures : those of ``pictures.pictures``; none for Markdown."""
+    problems = [words.problem(c) for c in data.checked]
+    if data.result.equations is not None:
+        problems.append(data.result.equations.problem)
+    head: list[Block] = [
+        *_summary(data),
+        Items(tuple(_tiles(data)), "tiles"),
+        Items(tuple(("Attention", text) for text in problems if text), "warnings"),
+    ]
+    sections = [
+        _model(data, pictures.get("model")),
+        Section("Phase portraits", [pictures.get("portraits")], "portraits"),
+        _responses(data),
+        _yields(data, pictures),
+        _blame(data, pictures),
+        Section(
+            "Where to sit",
+            [tolerance_tables.maps(data), *(p for n, p in pictures.items() if n[:4] == "map ")],
+            "maps",
+        ),
+        _parts(data, pictures.get("schematic")),
+        _errors(data, pictures.get("errors")),
+        _scales(data),
+        _provenance(data),
+        Section("Words", [Items(GLOSSARY, "terms")], "words"),
+    ]
+    if not pictures:
+        head.append(Markup("The pictures stand in `report.html`."))
+    return Page(data.result.modelfile.title, head, [s for s in sections if any(s.blocks)])
+
+
+def _model(data: ReportData, drawing: Picture | Gallery | None) -> Section:
+    model, mechanical = data.design.model, data.mechanical
+    assert not isinstance(drawing, Gallery)
+    picture = replace(
+        drawing or Picture(), sketch=tuple(sketch(model).splitlines()), caption=_drawing_note(data)
+    )
+    equations: list[Block] = []
+    if mechanical is not None:
+        lines = tuple(forms.mechanical_equations(mechanical))
+        equations += [SmallPrint("As given, in SI units:"), Verbatim(lines, equations=True)]
+    for title, lines in (
+        ("Dimensionless:", tuple(forms.dimensionless_equations(model))),
+        ("With the numbers of this model:", tuple(forms.equations_with_numbers(model))),
+    ):
+        equations += [SmallPrint(title), Verbatim(lines, equations=True)]
+    tables = [Section("Dimensionless", [design_tables.model_table(model)])]
+    if mechanical is not None:
+        tables.append(Section("As given", [design_tables.mechanical_table(mechanical)]))
+    blocks: list[Block] = [
+        picture,
+        Section("Equations of motion", equations),
+        Columns(tuple(tables)),
+    ]
+    return Section("The model", blocks, "model")
+
+
+def _drawing_note(data: ReportData) -> str:
+    """The units of the drawing's values, and the words that the equations use."""
+    text = "Values as the model file gives them. "
+    if data.mechanical is None:
+        text = (
+            "Values in units of M₁ and K₁, lengths in units of (P₁ + P₂)/K₁, dampers in units of "
+            "√(K₁ M₁), forces in units of P₁ + P₂. "
+        )
+    if data.design.model.k0 and data.design.model.sides == "both":
+        text += "clip(x, −b, b) is x, but no less than −b and no more than b. "
+    return text + "t = T √(K₁/M₁), x = X K₁/(P₁ + P₂), ω = Ω √(M₁/K₁)."
+
+
+def _responses(data: ReportData) -> Section:
+    blocks: list[Block] = ["None was asked for."]
+    if data.checked:
+        settings = [SmallPrint(_settings_note(data)), response_tables.settings_table(data)]
+        blocks = [
+            response_tables.response_table(data),
+            Section("Generator and solver settings", settings),
+        ]
+    return Section("Responses", blocks, "responses")
+
+
+def _settings_note(data: ReportData) -> str:
+    text = (
+        "Amplitudes into a high impedance; a generator set for 50 Ω shows half. No DC. Shortest "
+        "contact and nearest grazing (the smaller of shallowest contact and nearest miss) are "
+        "those of the nominal circuit."
+    )
+    if any(c.gate is not None for c in data.checked):
+        text += (
+            " The largest difference is between ngspice's runs at the strobes, in per cent of "
+            "the peak."
+        )
+    return text
+
+
+def _yields(data: ReportData, pictures: Pictures) -> Section:
+    blocks: list[Block] = [_study_note(data)]
+    if data.checked:
+        ngspice = response_tables.ngspice_table(data)
+        note = SmallPrint(
+            "From its own orbit ngspice starts on the attractor that the exact circuit reached; "
+            "from the nominal orbit it has to find the way, over at least 5/(1 − ρ) periods (ρ: "
+            "largest multiplier)."
+        )
+        asked: list[Block] = [note, ngspice]
+        if ngspice is None:
+            asked = ["ngspice was not asked about any board."]
+        blocks += [
+            response_tables.yield_table(data),
+            pictures.get("yields"),
+            _one("Board by board", tolerance_tables.boards(data)),
+            Section("Does ngspice confirm?", asked),
+            _one("How near the boards are to the edge", pictures.get("margins")),
+        ]
+    kinds = tolerance_tables.kinds(data)
+    if kinds is not None:
+        *others, last = kinds.columns[1:]
+        title = f"{', '.join(others)} and {last}"
+        within = "of all the boards" if data.plan.census else "with their 95 % intervals"
+        blocks.append(
+            Section(f"{title[0].upper()}{title[1:]}", [SmallPrint(f"Yields {within}."), kinds])
+        )
+    blocks.append(_one("Where the engines differ", tolerance_tables.differences(data)))
+    blocks.append(_one("How to reach a response", tolerance_tables.recipes(data)))
+    return Section("Yields", blocks, "yields")
+
+
+def _study_note(data: ReportData) -> str:
+    limits = "Intervals are Wilson's, at 95 %."
+    if data.plan.census:
+        limits = "These are all the boards there are, so their shares have no interval."
+    varies = words_of(data.plan.spread, data.design.circuit)
+    blame = data.study.blame_status.sentence
+    return (
+        f"{words.plural(data.plan.samples, 'board')}, seed {data.plan.seed}: {varies}. "
+        "Boards run as built: the generator stays at the settings above. Verdicts are those of "
+        f"the exact circuit. {limits}" + (f" {blame}" if blame else "")
+    )
+
+
+def _blame(data: ReportData, pictures: Pictures) -> Section:
+    limits, blame = tolerance_tables.limits(data), data.study.blame
+    if limits is None or blame is None:
+        return Section("", [])
+    lost = any(b.lost for b in blame.responses)
+    avoided = tolerance_tables.avoided(data)
+    blocks: list[Block] = [SmallPrint(_blame_note(blame, lost=lost)), limits]
+    if avoided is not None:
+        blocks.append(Section("Losses avoided", [avoided, pictures.get("avoided")]))
+    blocks += [
+        _one("Whose spread moves the margin", pictures.get("indices")),
+        _one("Worst corners", tolerance_tables.corners(data)),
+    ]
+    title = "Which part is to blame" if lost else "What comes nearest to a loss"
+    return Section(title, blocks, "blame")
+
+
+def _blame_note(blame: Blame, *, lost: bool) -> str:
+    asked = "No board was lost, so none was asked again. "
+    if lost:
+        asked = (
+            "Lost boards were asked again with one part or one group exact and all else as drawn; "
+            "shares do not add up, since a board can be lost by several parts together. "
+        )
+    return asked + (
+        "The margin is the distance to the loss, linear in the parts; its indices tell whose "
+        "spread moves it, and are worth as much as the verdicts that it foretells. Cost: "
+        f"{words.plural(blame.attractors, 'attractor')} and "
+        f"{words.plural(blame.orbits, 'step')} of following orbits."
+    )
+
+
+def _parts(data: ReportData, schematic: Picture | Gallery | None) -> Section:
+    blocks: list[Block] = [
+        _parts_note(data),
+        Section("To buy", [design_tables.bom_table(data.bom)]),
+        _one("Schematic", schematic),
+        Columns(
+            (
+                Section("Values by role", [design_tables.part_table(data.design.circuit)]),
+                Section("Op-amp sections", [design_tables.opamp_table(data.design.circuit)]),
+            )
+        ),
+    ]
+    return Section("Parts", blocks, "parts")
+
+
+def _parts_note(data: ReportData) -> str:
+    c = data.design.circuit
+    better = better_grades_text(data.better_grades)
+    return (
+        f"Supply ± {c.supply:g} V, op-amp output limits ± {c.saturation:g} V nominal. "
+        f"{words.plural(len(c.sections), 'section')} of {c.opamp} in "
+        f"{words.plural(len(c.packages), 'package')}; {len(c.resistors)} resistors, "
+        f"{len(c.capacitors)} capacitors, {data.design.distinct_values} different values."
+        + (f" {better}" if better else "")
+    )
+
+
+def _errors(data: ReportData, picture: Picture | Gallery | None) -> Section:
+    worst, check = data.design.errors.max_error, data.result.equations
+    largest = "All are exact." if worst <= EXACT else f"Largest: {words.error(worst)}."
+    blocks: list[Block] = [
+        "Of the finished circuit, reduced by nodal analysis with ideal op-amps, at the time and "
+        f"voltage scales that suit it best. {largest} The clearance and the force are set at the "
+        "generator and do not count.",
+        _certificate(data.design),
+        picture,
+        design_tables.error_table(data.design),
+    ]
+    if check is not None:
+        low, high = (words.quantity(f, "Hz", 3) for f in (check.low, check.high))
+        note = SmallPrint(
+            f"ngspice on the deck itself, by .ac from {low} to {high} from the generator to v1, "
+            "the clearance held open and closed by a constant force, and by .dc through the dead "
+            "zone and into contact; against the model at the scales below. The bounds follow from "
+            "the coefficient errors."
+        )
+        table = response_tables.equation_table(check)
+        blocks.append(Section("Does the netlist compute this equation?", [note, table]))
+    return Section("Coefficient errors", blocks, "errors")
+
+
+def _certificate(design: Design) -> str:
+    c, largest = design.certificate, words.error(design.errors.max_error)
+    text = f"Status {c.status}; lower bound {words.error(c.lower_bound)}."
+    if c.status == "bound":
+        text = (
+            f"Not proved optimal: this design reaches {largest}; what is proved is that no choice "
+            f"from this catalogue stays below {words.error(c.lower_bound)}. Whether a choice in "
+            "between exists is open."
+        )
+    elif c.status == "optimal" and design.errors.max_error <= EXACT:
+        text = "Proved optimal: an exact match cannot be improved on."
+    elif c.status == "optimal":
+        text = (
+            "Proved optimal: under the conditions kept, no choice of parts from this catalogue "
+            f"has a largest error below {largest}."
+        )
+    return f"{text} Basis: {c.proof}."
+
+
+def _scales(data: ReportData) -> Section:
+    model, conditions = data.design.model, design_tables.condition_table(data.design)
+    note = f"For the model's own clearance b = {words.number(model.b)}."
+    if any(c.model.b != model.b for c in data.checked):
+        note += (
+            " A response wanted at another b is driven with the amplitude times b(model)/b, and "
+            "its volts stand for other lengths by the same factor; the threshold stays."
+        )
+    scales = design_tables.scale_table(data.design, data.mechanical)
+    columns = Columns(
+        (
+            Section("What a volt and a second stand for", [scales]),
+            Section("Conditions kept", [conditions or "None."]),
+        )
+    )
+    return Section("Scales and conditions", [SmallPrint(note), columns], "scales")
+
+
+def _provenance(data: ReportData) -> Section:
+    blocks: list[Block] = []
+    if data.command:
+        again = "To make these results again, with the same versions:"
+        blocks += [again, Verbatim((data.command,))]
+    blocks += [response_tables.provenance_table(data), f"Format of this file: {FORMAT}."]
+    return Section("Provenance", blocks, "provenance")
+
+
+def _one(title: str, block: Table | Picture | Gallery | None) -> Section | None:
+    """A section of one block; None where there is none."""
+    return None if block is None else Section(title, [block])
+
+
+def _summary(data: ReportData) -> list[str]:
+    design, circuit = data.design, data.design.circuit
+    number = len(data.checked)
+    wanted = words.plural(number, "response")
+    title = data.result.modelfile.title
+    asked = f"Asked for: an op-amp circuit that behaves like the model “{title}”"
+    out = [f"{asked} and shows {wanted} of it." if number else f"{asked}; no response is named."]
+    if number:
+        bad = [c for c in data.checked if words.problem(c)]
+        engines = (
+            "the model, the exact circuit and ngspice"
+            if data.ngspice_asked
+            else "the model and the exact circuit (ngspice was not asked)"
+        )
+        if not bad:
+            every = "The response was" if number == 1 else f"{words.all_of(number)} responses were"
+            out.append(f"{every} found, and {engines} agree on {'it' if number == 1 else 'each'}.")
+        else:
+            good = number - len(bad)
+            rest = "the other is" if len(bad) == 1 else f"the other {len(bad)} are"
+            out.append(
+                f"{good} of {wanted} {'was' if good == 1 else 'were'} found with {engines} in "
+                f"agreement; {rest} named below with what went wrong."
+            )
+    passives = len(circuit.resistors) + len(circuit.capacitors)
+    worst = design.errors.max_error
+    match = "every coefficient of the equations is met exactly"
+    if worst > EXACT:
+        match = f"the largest coefficient error is {words.error(worst)}"
+        if design.certificate.status == "optimal":
+            match += ", proved to be the least that these parts allow"
+    out.append(
+        f"The circuit takes {passives} resistors and capacitors of {design.distinct_values} "
+        f"different values and {words.plural(len(circuit.packages), 'package')} of the op-amp "
+        f"{circuit.opamp}; {match}."
+    )
+    return [*out, _yield_words(data)]
+
+
+def _yield_words(data: ReportData) -> str:
+    rows = [
+        (c, y)
+        for c, y in zip(data.checked, data.yields, strict=True)
+        if y is not None and y.samples
+    ]
+    if not rows:
+        return "There is no tolerance study: no response could be asked."
+    samples = max(y.samples for _, y in rows)
+    decided = [(c, y) for c, y in rows if math.isfinite(y.rate)]
+    if not decided:
+        return f"Component spread, {samples} simulated boards: not one gave an answer."
+    out = []
+    safe = sum(y.ok == y.samples for _, y in rows)
+    worst, least = min(decided, key=lambda row: row[1].rate)
+    if safe == len(rows):
+        shown = "it" if len(rows) == 1 else f"{words.all_of(len(rows)).lower()} responses"
+        out.append(f"every one shows {shown}: of a thousand, {_of_a_thousand(least)}.")
+    else:
+        if safe:
+            verb = "survives" if safe == 1 else "survive"
+            out.append(f"{safe} of {words.plural(len(rows), 'response')} {verb} on every one;")
+        out.append(
+            f"the most delicate is {words.name(worst)}, shown by {least.ok} of "
+            f"{least.samples - least.failed}: of a thousand boards, {_of_a_thousand(least)}."
+        )
+    whole = data.study.all_on_one_board
+    if whole is not None and math.isfinite(whole.rate) and safe < len(rows):
+        out.append(
+            f"{words.all_of(len(data.checked))} responses on one and the same board: {whole.ok} of "
+            f"{whole.samples - whole.failed}; of a thousand, {_of_a_thousand(whole)}."
+        )
+    failed = sum(y.failed for _, y in rows)
+    if failed:
+        out.append(f"{words.plural(failed, 'run')} gave no answer, which the yields leave out.")
+    if samples < FEW and not data.plan.census:
+        out.append(f"So few samples ({samples}) leave wide intervals.")
+    left = len(data.checked) - len(rows)
+    if left:
+        out.append(f"{words.plural(left, 'response')} could not be studied.")
+    boards = f"Component spread, {samples} simulated boards:"
+    if data.plan.census:
+        boards = "The measured board, simulated:"
+        if samples > 1:
+            boards = f"All {samples} measured boards, simulated:"
+    return f"{boards} {' '.join(out)}"
+
+
+def _of_a_thousand(y: Yield) -> str:
+    low, high = (round(1000 * v) for v in y.interval)
+    if y.census:
+        return f"{round(1000 * y.rate)} by share"
+    return f"about {round(1000 * y.rate)} (95 % interval {low} to {high})"
+
+
+def _tiles(data: ReportData) -> list[tuple[str, str]]:
+    """(figure, what it is) for the head of the page."""
+    good = sum(not words.problem(c) for c in data.checked)
+    out = []
+    if data.checked:
+        asked = "all engines agree" if data.ngspice_asked else "ngspice was not asked"
+        what = "response" if len(data.checked) == 1 else "responses"
+        out.append((f"{good} of {len(data.checked)}", f"{what} found, {asked}"))
+    worst = data.design.errors.max_error
+    if worst <= EXACT:
+        out.append(("exact", "every coefficient of the equations"))
+    else:
+        out.append((words.error(worst), "largest coefficient error"))
+    out.append((str(data.design.distinct_values), "different R and C values"))
+    known = [y for y in data.yields if y and math.isfinite(y.rate)]
+    if known:
+        what = "yield" if len(known) == 1 else "least yield"
+        out.append(_yield_tile(what, min(known, key=lambda y: y.rate)))
+    whole = data.study.all_on_one_board
+    if whole is not None and math.isfinite(whole.rate):
+        out.append(_yield_tile("all on one board", whole))
+    return out
+
+
+def _yield_tile(what: str, counted: Yield) -> tuple[str, str]:
+    low, high = words.span(*counted.interval)
+    within = words.limits(counted, f"{low} to {high}\u00a0%")
+    return f"{100 * counted.rate:.0f} %", f"{what} ({within})"

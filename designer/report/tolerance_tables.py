@@ -1,0 +1,243 @@
+"""Tables of a report about what a study has beside its boards as built: other kinds of yield,
+disagreements, start recipes, blame, maps. None for what it does not have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from designer.base.page import Table, table
+from designer.report import words
+from designer.report.data import ReportData
+from designer.report.measured_table import table as measured_boards
+from designer.report.response_tables import STARTED
+from designer.yields.blame_analysis import ResponseBlame
+from designer.yields.blame_replay import BlamedPart
+from designer.yields.joint_yield import all_on_one
+from designer.yields.two_engine_yield import Combined
+from designer.yields.verdict import Yield, count
+from designer.yields.yield_maps import YieldMap
+
+PARTS_SHOWN = 4
+DIFFERENCES_SHOWN = 20
+NO_LOSS = "no board was lost"
+
+
+def boards(data: ReportData) -> Table | None:
+    """Every board of a list with its verdict for each response."""
+    if not data.plan.census:
+        return None
+    answers = [data.study.answers_to(i) for i in range(len(data.checked))]
+    rows = [
+        (b["board"], *(cell or words.NONE for cell in b["cells"]), b["all"] or words.NONE)
+        for b in measured_boards(data.plan, answers)
+    ]
+    return table(("board", *(words.name(c) for c in data.checked), "all of them"), rows)
+
+
+def kinds(data: ReportData) -> Table | None:
+    """As built, tuned, trimmed, reached and both engines together, side by side."""
+    study, census = data.study, data.plan.census
+    bench = [replace(t, verdict=t.bench_verdict) for t in study.tuned or ()]
+    columns: dict[str, tuple[Callable[[int], str], Yield | None]] = {
+        "as built": (lambda i: _share(data.yields[i]), study.all_on_one_board)
+    }
+    if study.tuned is not None:
+        bench_all = None if study.all_tuned is None else all_on_one(bench, census)
+        columns["tuned"] = (lambda i: _share(count(study.tuned_of(i), census)), study.all_tuned)
+        columns["tuned on the bench"] = (
+            lambda i: _share(count([t for t in bench if study.asked[t.question] == i], census)),
+            bench_all,
+        )
+    if study.trimmed is not None:
+        columns["trimmed"] = (
+            lambda i: _share(count(study.trimmed_of(i), census)),
+            study.all_trimmed,
+        )
+    if study.reached is not None:
+        columns["reached"] = (
+            lambda i: _share(count(study.reached_of(i), census)),
+            study.all_reached,
+        )
+    if any(study.combined):
+        columns["both engines together"] = (lambda i: _both(study.combined[i]), None)
+    if len(columns) == 1 or not data.checked:
+        return None
+    rows = [(words.name(c), *(cell(i) for cell, _ in columns.values()))
+            for i, c in enumerate(data.checked)]  # fmt: skip
+    if study.all_on_one_board is not None:
+        rows.append(("all on one board", *(_share(whole) for _, whole in columns.values())))
+    return table(("response", *columns), rows, range(1, len(columns) + 1))
+
+
+def _share(counted: Yield | None) -> str:
+    if counted is None or not math.isfinite(counted.rate):
+        return words.NONE
+    low, high = counted.interval
+    within = words.limits(counted, f"{100 * low:.3g} to {100 * high:.3g}")
+    text = f"{100 * counted.rate:.3g} % ({within})"
+    return text + (f", {counted.failed} failed" if counted.failed else "")
+
+
+def _both(both: Combined | None) -> str:
+    if both is None:
+        return words.NONE
+    text = f"{100 * both.estimate:.3g} %"
+    if both.low < both.high:  # not so where all the boards there are were asked
+        text += f" ({100 * both.low:.3g} to {100 * both.high:.3g})"
+    if both.undecided:
+        text += (
+            f", {both.undecided} without an answer in ngspice: {100 * both.if_lost:.3g} % if these "
+            f"are lost, {100 * both.if_ok:.3g} % if ok"
+        )
+    return text
+
+
+def differences(data: ReportData) -> Table | None:
+    """Boards on which the engines disagree."""
+    rows = []
+    for c, both in zip(data.checked, data.study.combined, strict=True):
+        if both is None:
+            continue
+        d = both.disagreement
+        low, high = d.interval
+        shown = [
+            f"board {x.sample} from {STARTED[x.kind]}: exact circuit {x.exact}, "
+            f"ngspice {x.ngspice} ({x.explanation})"
+            for x in both.differences[:DIFFERENCES_SHOWN]
+        ]
+        more = len(both.differences) - len(shown)
+        shown += [f"{more} more"] if more > 0 else []
+        rate = f"{d.count} of {d.of} ({100 * low:.2g} to {100 * high:.2g} %)"
+        rows.append((words.name(c), rate, "; ".join(shown) or "none"))
+    columns = (
+        "response",
+        "another n-p-q in ngspice, of the random boards",
+        "boards, and where ngspice started",
+    )
+    return table(columns, rows)
+
+
+def recipes(data: ReportData) -> Table | None:
+    rows = [(words.name(c), text) for c, text in zip(data.checked, data.starts, strict=False)]
+    if not data.starts:
+        rows = [
+            (words.name(data.checked[i]), recipe.text)
+            for i, recipe in zip(data.study.asked, data.study.recipes or (), strict=False)
+        ]
+    return table(("response", "how to reach it"), [row for row in rows if row[1]])
+
+
+def _blamed(data: ReportData) -> list[tuple[str, ResponseBlame]]:
+    """Name and blame of each response that has one."""
+    found = ((words.name(c), data.blame_of(i)) for i, c in enumerate(data.checked))
+    return [(name, blame) for name, blame in found if blame is not None]
+
+
+def limits(data: ReportData) -> Table | None:
+    """What limits each response, and how many verdicts the margin foretells."""
+    rows = []
+    for name, blame in _blamed(data):
+        p = blame.prediction
+        decided = p.ok + p.lost
+        foretold = words.NONE
+        if decided:
+            foretold = f"{p.right} of {decided}" if p.lost else NO_LOSS
+            if p.right < decided:
+                foretold += f" (lost boards missed: {p.missed}, false alarms: {p.alarms})"
+        rows.append((name, blame.limited_by, foretold))
+    if all(row[-1] in (NO_LOSS, words.NONE) for row in rows):
+        rows = [(*row[:-1], "") for row in rows]
+    return table(("response", "what limits it", "verdicts foretold by the margin"), rows)
+
+
+def avoided(data: ReportData) -> Table | None:
+    """Losses that are avoided if one group of parts, or one part, were exact."""
+    rows = []
+    for name, blame in _blamed(data):
+        if not blame.subjects:
+            continue
+        groups = [s for s in blame.subjects if s.kind == "group"]
+        parts = [s for s in blame.subjects if s.kind != "group" and s.avoided][:PARTS_SHOWN]
+        rows.append(
+            (
+                name,
+                str(blame.lost),
+                ", ".join(map(_saved, groups)) or words.NONE,
+                ", ".join(map(_saved, parts)) or blame.skipped or "none by itself",
+            )
+        )
+    columns = ("response", "lost", "losses avoided if a group were exact", "if one part were")
+    return table(columns, rows, (1,))
+
+
+def _saved(subject: BlamedPart) -> str:
+    low, high = (100 * v for v in subject.interval)
+    text = f"{subject.name}: {subject.avoided} of {subject.replayed}"
+    if subject.avoided:
+        text += f" ({low:.0f} to {high:.0f} %)"
+    if subject.caused:
+        text += f", {subject.caused} of {subject.kept} ok boards lost"
+    return text
+
+
+def corners(data: ReportData) -> Table | None:
+    """The worst corner of each response."""
+    rows = []
+    for name, blame in _blamed(data):
+        k = blame.corner
+        if k is not None:
+            worst = ", ".join(f"{n} {end}" for n, end in zip(k.coordinates, k.worst, strict=True))
+            board = f"{k.verdict}: {k.response}"
+            rows.append((name, worst, board, f"{k.survived} of {k.corners}"))
+    columns = (
+        "response", "worst corner, all else in the middle", "the board there", "corners survived",
+    )  # fmt: skip
+    return table(columns, rows, (3,))
+
+
+def maps(data: ReportData) -> Table | None:
+    """Window, setting in use and recommended setting of each yield map."""
+    rows = [
+        (
+            words.name(data.checked[data.study.asked[one.question]]),
+            " × ".join("ω" if axis.name == "omega" else axis.name for axis in one.axes),
+            _window(one),
+            _in_use(one),
+            _recommended(one),
+        )
+        for one in data.study.maps
+    ]
+    return table(("response", "over", "nominal window", "in use", "recommended"), rows)
+
+
+def _window(one: YieldMap) -> str:
+    if one.window is None:
+        return words.NONE
+    return " to ".join(
+        f"{words.number(edge)}{' (as far as was looked)' if open_ else ''}"
+        for edge, open_ in zip(one.window, one.open, strict=True)
+    )
+
+
+def _in_use(one: YieldMap) -> str:
+    if one.over == "grade" or one.used not in one.axes[0].values:
+        return words.NONE
+    place = [one.axes[0].values.index(one.used)]
+    if len(one.axes) > 1:
+        best = one.recommended
+        place.append(0 if best is None else one.axes[1].values.index(best[1]))
+    return f"{words.number(one.used)}: {_share(one.at(*place))}"
+
+
+def _recommended(one: YieldMap) -> str:
+    best = one.recommended
+    if best is None:
+        return "nowhere"
+    place = tuple(axis.values.index(v) for axis, v in zip(one.axes, best, strict=True))
+    setting = ", ".join(
+        f"{100 * v:g} % parts" if axis.name == "grade" else words.number(v)
+        for axis, v in zip(one.axes, best, strict=True)
+    )
+    return f"{setting}: {_share(one.at(*place))}"
