@@ -91,7 +91,7 @@ class Verbatim:
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A heading with what stands below it."""
 
     title: str
@@ -106,11 +106,11 @@ class Section:
 class Columns:
     """Sections side by side, where there is room."""
 
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
     """The sections."""
 
 
-Block = str | Table | Picture | Gallery | Items | Verbatim | Section | Columns | None
+Block = str | Table | Picture | Gallery | Items | Verbatim | PageSection | Columns | None
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Page:
     """Its title."""
     head: Sequence[Block]
     """What stands before the first section."""
-    sections: Sequence[Section]
+    sections: Sequence[PageSection]
     """The sections."""
 
 
@@ -162,7 +162,7 @@ def _block(block: Block, level: int) -> list[str]:
             return ["\n".join(_item(head, text) for head, text in block.items)] * bool(block.items)
         case Verbatim():
             return [_verbatim(" ".join(line.split()) for line in block.lines)]
-        case Section():
+        case PageSection():
             below = _texts(block.blocks, level + 1)
             return [f"{'#' * level} {plain(block.title)}", *below] if below else []
         case Columns():

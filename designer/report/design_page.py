@@ -15,7 +15,7 @@ from designer.base.page import (
     Items,
     Page,
     Picture,
-    Section,
+    PageSection,
     SmallPrint,
     Table,
     Verbatim,
@@ -90,11 +90,11 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
     ]
     sections = [
         _model(data, pictures.get("model")),
-        Section("Phase portraits", [pictures.get("portraits")], "portraits"),
+        PageSection("Phase portraits", [pictures.get("portraits")], "portraits"),
         _responses(data),
         _yields(data, pictures),
         _blame(data, pictures),
-        Section(
+        PageSection(
             "Where to sit",
             [tolerance_tables.maps(data), *(p for n, p in pictures.items() if n[:4] == "map ")],
             "maps",
@@ -103,14 +103,14 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
         _errors(data, pictures.get("errors")),
         _scales(data),
         _provenance(data),
-        Section("Words", [Items(GLOSSARY, "terms")], "words"),
+        PageSection("Words", [Items(GLOSSARY, "terms")], "words"),
     ]
     if not pictures:
         head.append(Markup("The pictures stand in `report.html`."))
     return Page(data.result.modelfile.title, head, [s for s in sections if any(s.blocks)])
 
 
-def _model(data: ReportData, drawing: Picture | Gallery | None) -> Section:
+def _model(data: ReportData, drawing: Picture | Gallery | None) -> PageSection:
     model, mechanical = data.design.model, data.mechanical
     assert not isinstance(drawing, Gallery)
     picture = replace(
@@ -125,15 +125,15 @@ def _model(data: ReportData, drawing: Picture | Gallery | None) -> Section:
         ("With the numbers of this model:", tuple(forms.equations_with_numbers(model))),
     ):
         equations += [SmallPrint(title), Verbatim(lines, equations=True)]
-    tables = [Section("Dimensionless", [design_tables.model_table(model)])]
+    tables = [PageSection("Dimensionless", [design_tables.model_table(model)])]
     if mechanical is not None:
-        tables.append(Section("As given", [design_tables.mechanical_table(mechanical)]))
+        tables.append(PageSection("As given", [design_tables.mechanical_table(mechanical)]))
     blocks: list[Block] = [
         picture,
-        Section("Equations of motion", equations),
+        PageSection("Equations of motion", equations),
         Columns(tuple(tables)),
     ]
-    return Section("The model", blocks, "model")
+    return PageSection("The model", blocks, "model")
 
 
 def _drawing_note(data: ReportData) -> str:
@@ -149,15 +149,15 @@ def _drawing_note(data: ReportData) -> str:
     return text + "t = T √(K₁/M₁), x = X K₁/(P₁ + P₂), ω = Ω √(M₁/K₁)."
 
 
-def _responses(data: ReportData) -> Section:
+def _responses(data: ReportData) -> PageSection:
     blocks: list[Block] = ["None was asked for."]
     if data.checked:
         settings = [SmallPrint(_settings_note(data)), response_tables.settings_table(data)]
         blocks = [
             response_tables.response_table(data),
-            Section("Generator and solver settings", settings),
+            PageSection("Generator and solver settings", settings),
         ]
-    return Section("Responses", blocks, "responses")
+    return PageSection("Responses", blocks, "responses")
 
 
 def _settings_note(data: ReportData) -> str:
@@ -174,7 +174,7 @@ def _settings_note(data: ReportData) -> str:
     return text
 
 
-def _yields(data: ReportData, pictures: Pictures) -> Section:
+def _yields(data: ReportData, pictures: Pictures) -> PageSection:
     blocks: list[Block] = [_study_note(data)]
     if data.checked:
         ngspice = response_tables.ngspice_table(data)
@@ -190,7 +190,7 @@ def _yields(data: ReportData, pictures: Pictures) -> Section:
             response_tables.yield_table(data),
             pictures.get("yields"),
             _one("Board by board", tolerance_tables.boards(data)),
-            Section("Does ngspice confirm?", asked),
+            PageSection("Does ngspice confirm?", asked),
             _one("How near the boards are to the edge", pictures.get("margins")),
         ]
     kinds = tolerance_tables.kinds(data)
@@ -199,11 +199,11 @@ def _yields(data: ReportData, pictures: Pictures) -> Section:
         title = f"{', '.join(others)} and {last}"
         within = "of all the boards" if data.plan.census else "with their 95 % intervals"
         blocks.append(
-            Section(f"{title[0].upper()}{title[1:]}", [SmallPrint(f"Yields {within}."), kinds])
+            PageSection(f"{title[0].upper()}{title[1:]}", [SmallPrint(f"Yields {within}."), kinds])
         )
     blocks.append(_one("Where the engines differ", tolerance_tables.differences(data)))
     blocks.append(_one("How to reach a response", tolerance_tables.recipes(data)))
-    return Section("Yields", blocks, "yields")
+    return PageSection("Yields", blocks, "yields")
 
 
 def _study_note(data: ReportData) -> str:
@@ -219,21 +219,21 @@ def _study_note(data: ReportData) -> str:
     )
 
 
-def _blame(data: ReportData, pictures: Pictures) -> Section:
+def _blame(data: ReportData, pictures: Pictures) -> PageSection:
     limits, blame = tolerance_tables.limits(data), data.study.blame
     if limits is None or blame is None:
-        return Section("", [])
+        return PageSection("", [])
     lost = any(b.lost for b in blame.responses)
     avoided = tolerance_tables.avoided(data)
     blocks: list[Block] = [SmallPrint(_blame_note(blame, lost=lost)), limits]
     if avoided is not None:
-        blocks.append(Section("Losses avoided", [avoided, pictures.get("avoided")]))
+        blocks.append(PageSection("Losses avoided", [avoided, pictures.get("avoided")]))
     blocks += [
         _one("Whose spread moves the margin", pictures.get("indices")),
         _one("Worst corners", tolerance_tables.corners(data)),
     ]
     title = "Which part is to blame" if lost else "What comes nearest to a loss"
-    return Section(title, blocks, "blame")
+    return PageSection(title, blocks, "blame")
 
 
 def _blame_note(blame: Blame, *, lost: bool) -> str:
@@ -251,19 +251,19 @@ def _blame_note(blame: Blame, *, lost: bool) -> str:
     )
 
 
-def _parts(data: ReportData, schematic: Picture | Gallery | None) -> Section:
+def _parts(data: ReportData, schematic: Picture | Gallery | None) -> PageSection:
     blocks: list[Block] = [
         _parts_note(data),
-        Section("To buy", [design_tables.bom_table(data.bom)]),
+        PageSection("To buy", [design_tables.bom_table(data.bom)]),
         _one("Schematic", schematic),
         Columns(
             (
-                Section("Values by role", [design_tables.part_table(data.design.circuit)]),
-                Section("Op-amp sections", [design_tables.opamp_table(data.design.circuit)]),
+                PageSection("Values by role", [design_tables.part_table(data.design.circuit)]),
+                PageSection("Op-amp sections", [design_tables.opamp_table(data.design.circuit)]),
             )
         ),
     ]
-    return Section("Parts", blocks, "parts")
+    return PageSection("Parts", blocks, "parts")
 
 
 def _parts_note(data: ReportData) -> str:
@@ -278,7 +278,7 @@ def _parts_note(data: ReportData) -> str:
     )
 
 
-def _errors(data: ReportData, picture: Picture | Gallery | None) -> Section:
+def _errors(data: ReportData, picture: Picture | Gallery | None) -> PageSection:
     worst, check = data.design.errors.max_error, data.result.equations
     largest = "All are exact." if worst <= EXACT else f"Largest: {words.error(worst)}."
     blocks: list[Block] = [
@@ -298,8 +298,8 @@ def _errors(data: ReportData, picture: Picture | Gallery | None) -> Section:
             "the coefficient errors."
         )
         table = response_tables.equation_table(check)
-        blocks.append(Section("Does the netlist compute this equation?", [note, table]))
-    return Section("Coefficient errors", blocks, "errors")
+        blocks.append(PageSection("Does the netlist compute this equation?", [note, table]))
+    return PageSection("Coefficient errors", blocks, "errors")
 
 
 def _certificate(design: Design) -> str:
@@ -321,7 +321,7 @@ def _certificate(design: Design) -> str:
     return f"{text} Basis: {c.proof}."
 
 
-def _scales(data: ReportData) -> Section:
+def _scales(data: ReportData) -> PageSection:
     model, conditions = data.design.model, design_tables.condition_table(data.design)
     note = f"For the model's own clearance b = {words.number(model.b)}."
     if any(c.model.b != model.b for c in data.checked):
@@ -332,25 +332,25 @@ def _scales(data: ReportData) -> Section:
     scales = design_tables.scale_table(data.design, data.mechanical)
     columns = Columns(
         (
-            Section("What a volt and a second stand for", [scales]),
-            Section("Conditions kept", [conditions or "None."]),
+            PageSection("What a volt and a second stand for", [scales]),
+            PageSection("Conditions kept", [conditions or "None."]),
         )
     )
-    return Section("Scales and conditions", [SmallPrint(note), columns], "scales")
+    return PageSection("Scales and conditions", [SmallPrint(note), columns], "scales")
 
 
-def _provenance(data: ReportData) -> Section:
+def _provenance(data: ReportData) -> PageSection:
     blocks: list[Block] = []
     if data.command:
         again = "To make these results again, with the same versions:"
         blocks += [again, Verbatim((data.command,))]
     blocks += [response_tables.provenance_table(data), f"Format of this file: {FORMAT}."]
-    return Section("Provenance", blocks, "provenance")
+    return PageSection("Provenance", blocks, "provenance")
 
 
-def _one(title: str, block: Table | Picture | Gallery | None) -> Section | None:
+def _one(title: str, block: Table | Picture | Gallery | None) -> PageSection | None:
     """A section of one block; None where there is none."""
-    return None if block is None else Section(title, [block])
+    return None if block is None else PageSection(title, [block])
 
 
 def _summary(data: ReportData) -> list[str]:
