@@ -37,7 +37,7 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.model.model_file import read_model_file
 from designer.spice import numerics_gate as gate
-from designer.spice.backends import ngspice_version
+from designer.spice.batch_backend import program_version
 from designer.spice.numerics_gate import WAVE_BOUND, GateResult, GateSubject
 from designer.spice.opamp_model import RUNGS
 from designer.spice.pool import SpicePool
@@ -189,7 +189,7 @@ def report(m: Measured) -> str:
         "Made by `python -m benchmarks ngspice` (a part of `make bench`).",
         "",
         f"- Commit: {commit()}",
-        f"- Machine: {machine()}; ngspice {ngspice_version()}; {m.jobs} workers",
+        f"- Machine: {machine()}; ngspice {program_version()}; {m.jobs} workers",
         f"- Took {m.seconds:.0f} s.",
         "",
         "The design of `examples/paper.toml` on its 1-p-p responses. Starts are on the exact",
@@ -320,7 +320,7 @@ def as_dict(m: Measured) -> dict[str, Any]:
         "format": 1,
         "commit": commit(),
         "machine": machine(),
-        "ngspice": ngspice_version(),
+        "ngspice": program_version(),
         "jobs": m.jobs,
         "cases": [
             {

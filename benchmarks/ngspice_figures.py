@@ -17,11 +17,10 @@ from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import MAX_PERIOD
 from designer.spice import numerics_gate, settling_periods
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import STROBE_TOLERANCE, Read
-from designer.spice.simulator import SimulationFailed, Waveforms
+from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
 from designer.spread.spread import Spread, draw_many
 
 SETTLED = 400
@@ -167,7 +166,7 @@ def memory(subject: GateSubject, settings: SolverSettings, runs: int) -> list[fl
     """Resident memory [MB] of one worker after each of so many runs."""
     todo = numerics_gate.job(subject, settings)
     look = partial(resident_megabytes, reduce=todo.reduce)
-    one = SpiceJob(todo.netlist, todo.signals, todo.stop_time, look)
+    one = SpiceJob(todo.netlist, todo.signals, todo.stop, look)
     out = []
     with SpicePool(1) as pool:
         for _, size in pool.map(one for _ in range(runs)):

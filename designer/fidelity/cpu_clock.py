@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed, Waveforms
+from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
 
 LEAST = 0.02
 """CPU seconds of a run at least, where a method can be repeated: the clock is coarse."""
@@ -67,7 +66,7 @@ class SpiceClock:
 
         def work() -> float:
             before = self._reading(_TRIVIAL)
-            after = self._reading(SpiceJob(job.netlist, job.signals, job.stop_time, _now))
+            after = self._reading(SpiceJob(job.netlist, job.signals, job.stop, _now))
             if before is None or after is None or before[0] != after[0]:
                 return float("nan")
             return after[1] - before[1]

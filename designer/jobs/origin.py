@@ -57,9 +57,9 @@ def provenance(
 
 
 def _ngspice() -> str | None:
-    from designer.spice.backends import ngspice_version
+    from designer.spice.batch_backend import program_version
 
     try:
-        return ngspice_version()
+        return program_version()
     except EnvironmentMissing:
         return None

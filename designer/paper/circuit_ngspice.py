@@ -14,10 +14,9 @@ from designer.dynamics.kernel_four_state import POINTS
 from designer.paper.circuits import Built, SettledResponse
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.numerics_gate import GateResult, GateSubject
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed, SpiceSweep
+from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
 
 FINE = 8 * POINTS
 """Points of a drive period of a portrait: a contact of p = 8 still is a curve."""
@@ -134,5 +133,5 @@ def _stage(circuit: Circuit) -> set[str]:
         nets |= {net for p in met for net in p.nets} - ends
 
 
-def _whole(sweep: SpiceSweep) -> SpiceSweep:
+def _whole(sweep: Waveforms) -> Waveforms:
     return sweep

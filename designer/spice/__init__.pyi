@@ -7,9 +7,6 @@ from . import (
     read_orbit as read_orbit,
     simulator_decks as simulator_decks,
 )
-from .backends import (
-    ngspice_version as ngspice_version,
-)
 from .batch_backend import (
     program_version as program_version,
 )
@@ -19,9 +16,6 @@ from .deck import (
 from .equation_check import (
     EquationCheck as EquationCheck,
     EquationFinding as EquationFinding,
-)
-from .job import (
-    SpiceJob as SpiceJob,
 )
 from .numerics_gate import (
     GateResult as GateResult,
@@ -48,7 +42,7 @@ from .read_orbit import (
 )
 from .simulator import (
     SimulationFailed as SimulationFailed,
-    SpiceSweep as SpiceSweep,
+    SpiceJob as SpiceJob,
     Waveforms as Waveforms,
 )
 from .simulator_decks import (

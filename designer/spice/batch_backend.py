@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,11 @@ from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Analysis,
     SimulationFailed,
-    SpiceSweep,
     Waveforms,
     accept,
-    accept_sweep,
     offending_line,
+    quoted,
     require_version,
-    said,
 )
 
 
@@ -49,30 +47,17 @@ class BatchNgspice:
         self._program = _program()
         self.version = program_version()
 
-    def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
+    def run(
+        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis = "tran"
+    ) -> Waveforms:
         """See `designer.spice.simulator.Simulator.run`."""
-        vectors, log, seconds, status = self._vectors_of(netlist, "tran")
-        waveforms = accept(vectors, signals, stop_time, log, seconds)
-        _check_status(status, log)
-        return waveforms
-
-    def sweep(
-        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis
-    ) -> SpiceSweep:
-        """See `designer.spice.simulator.Simulator.sweep`."""
-        vectors, log, seconds, status = self._vectors_of(netlist, analysis)
-        found = accept_sweep(vectors, signals, stop, analysis, log, seconds)
-        _check_status(status, log)
-        return found
-
-    def _vectors_of(
-        self, netlist: str, analysis: Analysis
-    ) -> tuple[dict[str, NDArray[Any]], str, float, int]:
-        """Run a deck: vectors of its last analysis of this kind, log, wall time, exit status."""
         started = time.perf_counter()
         plots, log, status = self._plots(netlist)
-        wanted = [plot.phasors or plot.vectors for plot in plots if plot.name == PLOTS[analysis]]
-        return wanted[-1] if wanted else {}, log, time.perf_counter() - started, status
+        last = next((p.vectors for p in reversed(plots) if p.name == PLOTS[analysis]), {})
+        waveforms = accept(last, signals, stop, log, time.perf_counter() - started, analysis)
+        if status != 0:
+            raise SimulationFailed(f"ngspice exit {status}", log)
+        return waveforms
 
     def analyse(self, netlist: str) -> list[RawPlot]:
         """Every plot of a deck of any analysis: operating point, ``.dc``, ``.ac``, ``.noise``.
@@ -85,7 +70,7 @@ class BatchNgspice:
         plots, log, status = self._plots(netlist)
         line = offending_line(log)
         if line is not None:
-            raise SimulationFailed(said(line), log)
+            raise SimulationFailed(quoted(line), log)
         if status != 0 or not plots:
             raise SimulationFailed(f"{len(plots)} plots, ngspice exit {status}", log)
         return plots
@@ -103,16 +88,8 @@ class BatchNgspice:
             return read_raw(content), log, done.returncode
         except ValueError as error:
             line = offending_line(log)
-            reason = f"{error} (ngspice exit {done.returncode})" if line is None else said(line)
+            reason = f"{error} (ngspice exit {done.returncode})" if line is None else quoted(line)
             raise SimulationFailed(reason, log) from error
-
-    def close(self) -> None:
-        """Nothing to do: nothing outlives a run."""
-
-
-def _check_status(status: int, log: str) -> None:
-    if status != 0:
-        raise SimulationFailed(f"ngspice exit {status}", log)
 
 
 def _program() -> str:
@@ -176,10 +153,8 @@ class RawPlot:
 
     name: str
     """Name of the analysis, such as ``Transient Analysis``."""
-    vectors: dict[str, NDArray[np.float64]]
+    vectors: dict[str, NDArray[Any]]
     """By the names that a session uses: ``v1`` for v(v1), ``vm1#branch`` for i(vm1)."""
-    phasors: dict[str, NDArray[np.complex128]] = field(default_factory=dict)
-    """Likewise, of a plot of complex numbers (``.ac``), whose ``vectors`` are empty."""
 
 
 def read_raw(content: bytes) -> list[RawPlot]:
@@ -211,18 +186,14 @@ def read_raw(content: bytes) -> list[RawPlot]:
             raise ValueError(f"raw file: bad header ({error})") from error
         if len(names) != columns or columns < 0 or rows < 0:
             raise ValueError(f"raw file: {columns} variables announced, {len(names)} named")
-        width = 2 if "complex" in flags else 1
-        size = rows * columns * width * 8
+        number = np.dtype(np.complex128 if "complex" in flags else np.float64)
+        size = rows * columns * number.itemsize
         if position + size > len(content):
             raise ValueError("raw file: cut short")
-        block, shape = content[position : position + size], (rows, columns)
-        keys = [_session_name(n) for n in names]
-        if width == 1:
-            real = np.frombuffer(block, np.float64).reshape(shape).T.copy()
-            plots.append(RawPlot(name, dict(zip(keys, real, strict=True))))
-        else:
-            phasors = np.frombuffer(block, np.complex128).reshape(shape).T.copy()
-            plots.append(RawPlot(name, {}, dict(zip(keys, phasors, strict=True))))
+        block = np.frombuffer(content, number, rows * columns, position)
+        keys = (_session_name(n) for n in names)
+        vectors = block.reshape(rows, columns).T.copy()
+        plots.append(RawPlot(name, dict(zip(keys, vectors, strict=True))))
         position += size
     return plots
 

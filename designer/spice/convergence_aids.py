@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 from typing import Generic, Literal, TypeVar
 
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed
+from designer.spice.simulator import SimulationFailed, SpiceJob
 
 T = TypeVar("T")
 

@@ -15,14 +15,29 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.diode_curve import card
 from designer.circuit.dead_zone_parts import OUTPUT
-from designer.circuit.netlist import Board, Circuit, Excitation
+from designer.circuit.netlist import Board, Circuit, Excitation, Reference
 from designer.circuit.reduction import FloatingCircuit, Reduction
-from designer.spice import opamp_model, reference_model
-from designer.spice.opamp_model import Parameters, Rung
+from designer.spice import opamp_model
+from designer.spice.opamp_model import Rung, literal
 
 FORMAT = 1
 IDEAL_GAIN = 1e9
 """Open-loop gain that stands for an infinite one."""
+
+
+SHUNT_REFERENCE = [
+    ".subckt reference cathode anode volts=5 least=1e-4 impedance=1",
+    "Rleast cathode anode {volts/least}",
+    "Ashunt %vd(cathode anode) %id(cathode anode) shunt",
+    ".model shunt limit(in_offset={-volts} gain={1/impedance} out_lower_limit=0 "
+    "out_upper_limit=10.0 limit_range={least/100} fraction=FALSE)",
+    ".ends reference",
+]
+"""A shunt voltage reference, from the catalogue's least current and dynamic impedance.
+
+It draws its least current at its voltage, below in proportion to the voltage: fed too little, it
+does not reach its voltage. Any current beyond that raises the voltage by the impedance. The upper
+limit [A] is beyond anything that a feed resistor lets through."""
 
 
 @dataclass(frozen=True)
@@ -70,33 +85,25 @@ def write(
     ------
     ValueError : a rung above ``ideal`` for a circuit without the figures of its op-amp.
     """
+    drive = excitation
     lines = [
         title_line(title),
         f"* designer deck, format {FORMAT}",
         *map(comment_line, notes),
         f"{circuit.generator.name} {circuit.generator.net} 0 "
-        f"SIN({_n(excitation.offset)} {_n(excitation.amplitude)} {_n(excitation.frequency)} "
+        f"SIN({literal(drive.offset)} {literal(drive.amplitude)} {literal(drive.frequency)} "
         "0 0 180)",
     ]
     lines += _sources(circuit, board, rung)
-    voltages = dict(zip(circuit.states, initial if initial is not None else (), strict=False))
-    lines += [f"{r.name} {r.a} {r.b} {_n(board.values[r.name])}" for r in circuit.resistors]
-    for c in circuit.capacitors:
-        start = float(voltages.get(c.name, 0.0))
-        lines.append(f"{c.name} {c.plus} {c.minus} {_n(board.values[c.name])} IC={_n(start)}")
-    lines += _diodes(circuit, rung)
+    lines += resistors(circuit, board)
+    lines += capacitors(circuit, board, initial)
+    lines += diodes(circuit, charge=rung != "ideal")
     lines += _opamps(circuit, board, rung, _outputs(circuit, board, excitation, initial, rung))
-    nets = [
-        *circuit.state_nets,
-        *([OUTPUT] if circuit.stops and stage else []),
-        circuit.generator.net,
-    ]
     lines += [
-        f".options method={settings.method} reltol={_n(settings.reltol)} "
-        f"abstol={_n(settings.abstol)} vntol={_n(settings.vntol)} noopiter",
-        ".save " + " ".join(f"v({net})" for net in nets),
-        f".tran {_n(settings.max_step)} {_n(stop_time)} "
-        f"{_n(kept_from) if kept_from else 0} {_n(settings.max_step)} uic",
+        f"{options(settings)} noopiter",
+        f".save {voltages(circuit, stage=stage)}",
+        f".tran {literal(settings.max_step)} {literal(stop_time)} "
+        f"{literal(kept_from) if kept_from else 0} {literal(settings.max_step)} uic",
         ".end",
     ]
     return "\n".join(lines) + "\n"
@@ -107,20 +114,17 @@ def _opamps(circuit: Circuit, board: Board, rung: Rung, outputs: Mapping[str, fl
 
     A vendor's model has a bandwidth of its own, which no board changes.
     """
-    gain = 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
+    gain = open_loop_gain(board)
     if rung == "ideal":
         return _instances(circuit, board, rung, outputs, {}) + opamp_model.ideal(gain)
     if circuit.figures is None:
         raise ValueError(f"rung {rung!r}: the circuit has no figures of its op-amp")
-    parameters = Parameters.of(circuit.figures, gain)
-    vendor = circuit.figures.spice if rung == "full" else None
-    bandwidths = {
-        name: opamp_model.bandwidth(rung, parameters, gbw)
-        for name, gbw in board.gain_bandwidth.items()
-        if vendor is None
-    }
+    figures = circuit.figures
+    vendor = rung == "full" and figures.spice is not None
+    drawn = {} if vendor else board.gain_bandwidth
+    bandwidths = {name: opamp_model.bandwidth(rung, figures, gbw) for name, gbw in drawn.items()}
     lines = _instances(circuit, board, rung, outputs, bandwidths)
-    return lines + opamp_model.subcircuit(rung, parameters, vendor)
+    return lines + opamp_model.subcircuit(rung, figures, gain)
 
 
 def _instances(
@@ -174,31 +178,76 @@ def _sources(circuit: Circuit, board: Board, rung: Rung) -> list[str]:
     A reference is a source on ``ideal``; above, it needs its current and has its resistance.
     """
     supplies = circuit.supplies if rung == "ideal" else circuit.rails
-    lines = [f"{s.name} {s.net} 0 {_n(board.supply.get(s.name, s.volts))}" for s in supplies]
-    shunts = False
+    lines = [f"{s.name} {s.net} 0 {literal(board.supply.get(s.name, s.volts))}" for s in supplies]
+    shunts = rung != "ideal" and any(r.least for r in circuit.references)
     for r in circuit.references:
         volts = board.reference[r.name]
-        if rung == "ideal" or r.least == 0.0:
-            lines.append(f"{r.name} {r.cathode} {r.anode} {_n(volts)}")
-            continue
-        shunts = True
-        lines.append(
-            reference_model.instance(
-                r.name, r.cathode, r.anode, volts=volts, least=r.least, impedance=r.impedance
-            )
-        )
-    return lines + (reference_model.subcircuit() if shunts else [])
+        source = f"{r.name} {r.cathode} {r.anode} {literal(volts)}"
+        lines.append(shunt_reference(r, volts) if shunts and r.least else source)
+    return lines + (SHUNT_REFERENCE if shunts else [])
 
 
-def _diodes(circuit: Circuit, rung: Rung) -> list[str]:
-    """The diodes, and a model for each kind; its name in the catalogue stays out of the deck.
+def shunt_reference(reference: Reference, volts: float) -> str:
+    """The element line of a reference that is a `SHUNT_REFERENCE`."""
+    r = reference
+    return (
+        f"X{r.name} {r.cathode} {r.anode} reference volts={literal(volts)} "
+        f"least={literal(r.least)} impedance={literal(r.impedance)}"
+    )
 
-    On ``ideal`` a diode is its curve alone; above, it has its capacitance and recovers.
-    """
+
+def resistors(circuit: Circuit, board: Board) -> list[str]:
+    """The element lines of the resistors."""
+    return [f"{r.name} {r.a} {r.b} {literal(board.values[r.name])}" for r in circuit.resistors]
+
+
+def capacitors(circuit: Circuit, board: Board, initial: Array | None) -> list[str]:
+    """The element lines of the capacitors, with their voltages at t = 0."""
+    start = dict(zip(circuit.states, initial if initial is not None else (), strict=False))
+    return [
+        f"{c.name} {c.plus} {c.minus} {literal(board.values[c.name])} "
+        f"IC={literal(start.get(c.name, 0.0))}"
+        for c in circuit.capacitors
+    ]
+
+
+def diode_names(circuit: Circuit) -> dict[str, str]:
+    """The model of each diode; its name in the catalogue stays out of the deck."""
     kinds = list(dict.fromkeys(d.model for d in circuit.diodes))
-    lines = [f"{d.name} {d.anode} {d.cathode} diode{kinds.index(d.model)}" for d in circuit.diodes]
-    charge = rung != "ideal"
-    return lines + [card(model, f"diode{i}", charge=charge) for i, model in enumerate(kinds)]
+    return {d.name: f"diode{kinds.index(d.model)}" for d in circuit.diodes}
+
+
+def diode_cards(circuit: Circuit, *, charge: bool) -> list[str]:
+    """A ``.model`` card for each kind of diode. charge : with capacitance and recovery."""
+    names = diode_names(circuit)
+    models = {names[d.name]: d.model for d in circuit.diodes}
+    return [card(model, name, charge=charge) for name, model in models.items()]
+
+
+def diodes(circuit: Circuit, *, charge: bool) -> list[str]:
+    """The element lines of the diodes and their cards."""
+    names = diode_names(circuit)
+    lines = [f"{d.name} {d.anode} {d.cathode} {names[d.name]}" for d in circuit.diodes]
+    return lines + diode_cards(circuit, charge=charge)
+
+
+def open_loop_gain(board: Board) -> float:
+    """Of the board's op-amps, `IDEAL_GAIN` where it is infinite."""
+    return 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
+
+
+def options(settings: SolverSettings) -> str:
+    """The line ``.options`` that every SPICE understands."""
+    return (
+        f".options method={settings.method} reltol={literal(settings.reltol)} "
+        f"abstol={literal(settings.abstol)} vntol={literal(settings.vntol)}"
+    )
+
+
+def voltages(circuit: Circuit, *, stage: bool = True) -> str:
+    """What a run shows: the states, the nonlinear stage's output (``stage``), the generator."""
+    shown = [OUTPUT] if circuit.stops and stage else []
+    return " ".join(f"v({net})" for net in (*circuit.state_nets, *shown, circuit.generator.net))
 
 
 def title_line(text: str) -> str:
@@ -217,8 +266,3 @@ def _plain(text: str) -> str:
         ch if ch.isascii() and (ch.isalnum() or ch in " .,:()+-=/_") else " " for ch in text
     )
     return " ".join(safe.split())
-
-
-def _n(value: float) -> str:
-    """A number that SPICE reads back as the same float: no unit letters, all digits."""
-    return repr(float(value))

@@ -34,9 +34,8 @@ from designer.model.mechanics import SecondOrderSystem
 from designer.spice import deck
 from designer.spice.convergence_aids import did_not_converge
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed, SpiceSweep
+from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
 
 Complex = NDArray[np.complex128]
 
@@ -109,13 +108,13 @@ class EquationCheck:
         """What did not pass, in words; empty where all did."""
         if self.passed:
             return ""
-        said = "the netlist does not compute the model's equation"
+        verdict = "the netlist does not compute the model's equation"
         if self.open:
-            said = "whether the netlist computes the model's equation is not to be trusted here"
-        return f"{said}: {'; '.join(str(f) for f in self.findings if not f.passed)}"
+            verdict = "whether the netlist computes the model's equation is not to be trusted here"
+        return f"{verdict}: {'; '.join(str(f) for f in self.findings if not f.passed)}"
 
     @classmethod
-    def read(cls, said: Mapping[str, Any]) -> EquationCheck:
+    def read(cls, record: Mapping[str, Any]) -> EquationCheck:
         """From what `as_dict` made, in JSON."""
 
         def number(value: float | None) -> float:
@@ -124,7 +123,7 @@ class EquationCheck:
         return cls(
             tuple(
                 EquationFinding(f["name"], number(f["deviation"]), number(f["bound"]), f["reason"])
-                for f in said["findings"]
+                for f in record["findings"]
             )
         )
 
@@ -161,22 +160,22 @@ def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> Eq
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
     curve = rests if design.circuit.stops else ()
 
-    def jobs(told: bool) -> list[SpiceJob[Any]]:
-        asked = [_ac(design, rest, low, high, told=told) for rest in rests]
-        return asked + [_dc(design, rest, told=told) for rest in curve]
+    def jobs(*, nodeset: bool) -> list[SpiceJob[Waveforms]]:
+        ac = [_ac(design, rest, low, high, nodeset=nodeset) for rest in rests]
+        return ac + [_dc(design, rest, nodeset=nodeset) for rest in curve]
 
-    heard = {}
-    asked = jobs(told=True)
-    for number, sweep in pool.map(asked):
-        heard[number] = sweep
-        doing(f"{len(heard)} of {len(asked)} runs")
-    # Told where a rectifier rests, its diodes' drop a constant, ngspice may end in vain where it
-    # finds the operating point by itself.
-    again = [i for i, sweep in heard.items() if _unconverged(sweep)]
-    alone = jobs(told=False)
-    heard |= {again[k]: sweep for k, sweep in pool.map(alone[i] for i in again)}
-    findings = [_transfer(design, model, rest, heard[i]) for i, rest in enumerate(rests)]
-    lines = {rest.contact: heard[len(rests) + i] for i, rest in enumerate(curve)}
+    answers = {}
+    first = jobs(nodeset=True)
+    for number, answer in pool.map(first):
+        answers[number] = answer
+        doing(f"{len(answers)} of {len(first)} runs")
+    # From the nodeset where a rectifier rests, its diodes' drop a constant, ngspice may end in vain
+    # where it finds the operating point by itself.
+    again = [i for i, answer in answers.items() if _unconverged(answer)]
+    bare = jobs(nodeset=False)
+    answers |= {again[k]: answer for k, answer in pool.map(bare[i] for i in again)}
+    findings = [_transfer(design, model, rest, answers[i]) for i, rest in enumerate(rests)]
+    lines = {rest.contact: answers[len(rests) + i] for i, rest in enumerate(curve)}
     return EquationCheck((*findings, *(_curve(design, model, lines) if lines else ())), low, high)
 
 
@@ -208,7 +207,7 @@ def explained(model: SecondOrderSystem, omega: Array, contact: int) -> Array:
     return out
 
 
-def _misdriven(design: Design, model: SecondOrderSystem, omega: Array, contact: int) -> Array:
+def _drive_error(design: Design, model: SecondOrderSystem, omega: Array, contact: int) -> Array:
     """(k,) |dH/H| that the drive explains: R6 and R12 share the force in a ratio of their own,
     which is no coefficient of the equations and not in their error."""
     wanted = model.force
@@ -282,19 +281,19 @@ def _deck(
     generator: float,
     contact: int,
     *,
-    told: bool,
+    nodeset: bool,
     turned: bool = False,
 ) -> str:
     """The deck that is simulated in time, with another generator line and analysis.
 
-    generator, contact : at the first operating point [V]. told : ngspice looks for it from where
-    the reduction says it is; from zero it does not find every one, nor does it find every one from
-    there. turned : the generator's poles are exchanged, so that its voltage counts negative.
+    generator, contact : at the first operating point [V]. nodeset : ngspice looks for that point
+    from where the reduction says it is. Neither from there nor from zero does it find every point.
+    turned : the generator's poles are exchanged, so that its voltage counts negative.
     """
     circuit = design.circuit
     board = nominal_board(circuit, ideal=True)
     try:
-        known = rest(Reduction(circuit, board), generator, contact) if told else []
+        known = rest(Reduction(circuit, board), generator, contact) if nodeset else []
     except ArithmeticError:  # a floating net: ngspice shall say it
         known = []
     resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in known)] if known else []
@@ -338,15 +337,15 @@ def _volts(design: Design, force: float) -> float:
 
 
 def _ac(
-    design: Design, resting: _Rest, low: float, high: float, *, told: bool
-) -> SpiceJob[SpiceSweep]:
+    design: Design, resting: _Rest, low: float, high: float, *, nodeset: bool
+) -> SpiceJob[Waveforms]:
     held = 0.0 if resting.contact == 0 else _volts(design, 0.5 * (resting.near + resting.far))
     source, card = f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
-    text = _deck(design, source, card, held, resting.contact, told=told)
-    return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _as_it_is, "ac")
+    text = _deck(design, source, card, held, resting.contact, nodeset=nodeset)
+    return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _whole, "ac")
 
 
-def _dc(design: Design, resting: _Rest, *, told: bool) -> SpiceJob[SpiceSweep]:
+def _dc(design: Design, resting: _Rest, *, nodeset: bool) -> SpiceJob[Waveforms]:
     """From the near end, where the stage carries least; upwards, as every sweep goes."""
     near, far = _volts(design, resting.near), _volts(design, resting.far)
     turned = far < near
@@ -355,15 +354,15 @@ def _dc(design: Design, resting: _Rest, *, told: bool) -> SpiceJob[SpiceSweep]:
     # Half a step more: the last point is not lost to rounding.
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
     nets = (design.circuit.state_nets[0], STAGE)
-    text = _deck(design, "DC 0", card, near, resting.contact, told=told, turned=turned)
-    return SpiceJob(text, nets, last - 0.01 * step, _as_it_is, "dc")
+    text = _deck(design, "DC 0", card, near, resting.contact, nodeset=nodeset, turned=turned)
+    return SpiceJob(text, nets, last - 0.01 * step, _whole, "dc")
 
 
-def _unconverged(heard: SpiceSweep | SimulationFailed) -> bool:
-    return isinstance(heard, SimulationFailed) and did_not_converge(heard)
+def _unconverged(answer: Waveforms | SimulationFailed) -> bool:
+    return isinstance(answer, SimulationFailed) and did_not_converge(answer)
 
 
-def _as_it_is(sweep: SpiceSweep) -> SpiceSweep:
+def _whole(sweep: Waveforms) -> Waveforms:
     return sweep
 
 
@@ -372,31 +371,31 @@ def _as_it_is(sweep: SpiceSweep) -> SpiceSweep:
 
 
 def _transfer(
-    design: Design, model: SecondOrderSystem, resting: _Rest, heard: SpiceSweep | SimulationFailed
+    design: Design, model: SecondOrderSystem, resting: _Rest, answer: Waveforms | SimulationFailed
 ) -> EquationFinding:
     name = f"transfer, {_place(resting.contact)}"
     bound = FLOOR
-    if isinstance(heard, SimulationFailed):
-        return EquationFinding(name, float("nan"), bound, heard.reason)
+    if isinstance(answer, SimulationFailed):
+        return EquationFinding(name, float("nan"), bound, answer.reason)
     scales = design.errors.scales
-    omega = 2.0 * np.pi * heard.axis * scales.seconds
+    omega = 2.0 * np.pi * answer.axis * scales.seconds
     unit = -scales.volts[0] / design.amplitude()
     wanted = unit * transfer(model, omega, resting.contact)
-    deviation = np.abs(heard.signals[design.circuit.state_nets[0]] / wanted - 1.0)
+    deviation = np.abs(answer.signals[design.circuit.state_nets[0]] / wanted - 1.0)
     known = design.errors.max_error * explained(model, omega, resting.contact)
-    bounds = np.expm1(known + _misdriven(design, model, omega, resting.contact)) + FLOOR
+    bounds = np.expm1(known + _drive_error(design, model, omega, resting.contact)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return EquationFinding(name, float(deviation[worst]), float(bounds[worst]))
 
 
 def _curve(
-    design: Design, model: SecondOrderSystem, heard: dict[int, SpiceSweep | SimulationFailed]
+    design: Design, model: SecondOrderSystem, answers: dict[int, Waveforms | SimulationFailed]
 ) -> list[EquationFinding]:
     """Slope, threshold, leftover slope from straight lines through the stretches."""
     bound = design.errors.max_error + FLOOR
     lines: dict[int, Array] = {}
     findings = []
-    for contact, sweep in heard.items():
+    for contact, sweep in answers.items():
         if isinstance(sweep, SimulationFailed):
             findings.append(
                 EquationFinding(f"curve, {_place(contact)}", float("nan"), bound, sweep.reason)

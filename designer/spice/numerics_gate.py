@@ -11,9 +11,10 @@ until the settings pass, which finds N.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +31,10 @@ from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.opamp_model import Rung, limit_into
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, Reading, read
-from designer.spice.simulator import SimulationFailed
+from designer.spice.simulator import SimulationFailed, SpiceJob
 
 STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 20
 MOST_STEPS = 40_000
@@ -99,16 +99,18 @@ class GateResult:
         """What the runs that there are were found not to do; none where they passed."""
         if self.passed or isinstance(self.read, SimulationFailed):
             return ()
-        said = []
+        reasons = []
         if self.difference > BOUND:
             differ = f"strobes differ by more than {BOUND:g} of the peak"
-            said.append(Reason(differ, f"by {self.difference:.1g}"))
+            reasons.append(Reason(differ, f"by {self.difference:.1g}"))
         if self.wave > self.wave_bound:
             off = f"by {self.wave:.1g} of the peak, bound {self.wave_bound:.1g}"
-            said.append(Reason("the wave is off the exact circuit's by more than its bound", off))
+            reasons.append(
+                Reason("the wave is off the exact circuit's by more than its bound", off)
+            )
         other = "its runs do not all show the exact circuit's response"
         shown = f"the coarsest shows {self.read.orbit.response}"
-        return tuple(said) or (Reason(other, shown),)
+        return tuple(reasons) or (Reason(other, shown),)
 
     def as_dict(self) -> dict[str, object]:
         """For provenance: the settings, and what they passed."""
@@ -185,7 +187,7 @@ def job(
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
-    upper, lower = contact_rows(_as_the_rung_has_it(subject).system())
+    upper, lower = contact_rows(_rung_reduction(subject).system())
     reading = Reading(
         period=subject.period,
         discard=0 if whole else subject.discard,
@@ -227,10 +229,12 @@ def task(
     return Task(partial(job, subject, keep=keep, whole=whole), settings)
 
 
-def _as_the_rung_has_it(subject: GateSubject) -> Reduction:
-    """The reduction whose thresholds the rung's are: an impact is counted by those of the board at
-    hand. On ``full`` the output limits follow the loads, and with them a saturating stage's
-    clearance. A vendor's model has limits that nobody has told: the board's stand for them."""
+def _rung_reduction(subject: GateSubject) -> Reduction:
+    """The reduction with the rung's own thresholds, by which impacts are counted.
+
+    On ``full`` the output limits follow the loads, and with them a saturating stage's clearance.
+    The limits of a vendor's model are not known: the board's stand for them.
+    """
     figures = subject.circuit.figures
     if subject.rung != "full" or figures is None or figures.spice is not None:
         return subject.reduction
@@ -314,12 +318,13 @@ def check(
             tried[i].append(steps[i] * 2**level)
             trio = _trio(subjects[i].period / tried[i][-1])
             tasks += [task(subjects[i], settings, keep=True) for settings in trio]
-        found = {}
+        outcomes = {}
         for number, outcome in remedies.run(pool, tasks, CURES):
-            found[number] = outcome
-            doing(f"step size {level + 1} of at most {levels}: {len(found)} of {len(tasks)} runs")
+            outcomes[number] = outcome
+            done = f"{len(outcomes)} of {len(tasks)} runs"
+            doing(f"step size {level + 1} of at most {levels}: {done}")
         for k, i in enumerate(open_):
-            runs = [found[3 * k + j] for j in range(3)]
+            runs = [outcomes[3 * k + j] for j in range(3)]
             results[i] = _judge(subjects[i], runs, tuple(tried[i]), contacts[i])
     return [r for r in results if r is not None]
 
@@ -398,7 +403,7 @@ def _judge(
         if wanted.status is OrbitStatus.PERIODIC:
             peak = np.abs(wanted.extremes).max(axis=1)
             last = [r.strobes[-wanted.n :] for r in good]
-            difference = max(float((np.abs(a - b) / peak).max()) for a, b in _pairs(last))
+            difference = max(float((np.abs(a - b) / peak).max()) for a, b in combinations(last, 2))
             passed = passed and difference <= BOUND
             passed = passed and (subject.rung != "ideal" or wave <= bound)
     return GateResult(
@@ -413,9 +418,3 @@ def _judge(
         wave,
         bound,
     )
-
-
-def _pairs(items: Sequence[Array]) -> Iterator[tuple[Array, Array]]:
-    for i, a in enumerate(items):
-        for b in items[i + 1 :]:
-            yield a, b

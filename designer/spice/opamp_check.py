@@ -9,20 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from designer.catalog.entries import Figure, OpAmp
-from designer.catalog.vendor_model import VendorModel
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.opamp_model import (
     HEAVY_LOAD,
     NOISE_FREQUENCY,
     RATED_LOAD,
-    Parameters,
     Rung,
+    headroom,
     instance,
+    recovery,
     subcircuit,
 )
 
@@ -35,44 +36,35 @@ HARD = 0.25
 class OpAmpBench:
     """One op-amp on a bench."""
 
+    opamp: OpAmp
+    """The catalogue's entry, at its rated supply and with every figure typical."""
     rung: Rung
     """Rung of its model."""
-    parameters: Parameters
-    """Figures of its model."""
-    supply: float
-    """Supply of either rail, ± [V]."""
     vos: float
     """Input offset voltage [V]."""
-    ib: float
-    """Input bias current [A]."""
     rails: tuple[float, float]
     """Output limits, (low, high) [V]."""
-    vendor: VendorModel | None = None
-    """A vendor's model, if there is one."""
 
     @classmethod
     def of(cls, opamp: OpAmp, rung: Rung) -> OpAmpBench:
-        """The op-amp as the catalogue has it, at its rated supply, every figure typical."""
+        """The op-amp with the offset and the limits of the catalogue."""
         limit = opamp.saturation.nominal
-        return cls(
-            rung=rung,
-            parameters=Parameters.of(opamp),
-            supply=opamp.rated_supply,
-            vos=opamp.offset.nominal,
-            ib=opamp.bias.nominal,
-            rails=(-limit, limit),
-            vendor=opamp.spice,
-        )
+        return cls(opamp, rung, opamp.offset.nominal, (-limit, limit))
 
-    def deck(self, around: Sequence[str], *, inputs: tuple[str, str] = ("inp", "inn")) -> str:
+    @property
+    def supply(self) -> float:
+        """Supply of either rail, ± [V]."""
+        return self.opamp.rated_supply
+
+    def deck(self, around: Sequence[str]) -> str:
         """A deck of the op-amp (output ``out``) and the lines around it."""
         lines = [
             "* op-amp bench",
             f"VCC vcc 0 {self.supply!r}",
             f"VEE vee 0 {-self.supply!r}",
-            instance("U1", (*inputs, "out"), rung=self.rung, vos=self.vos, ib=self.ib,
-                     rails=self.rails),
-            *subcircuit(self.rung, self.parameters, self.vendor),
+            instance("U1", ("inp", "inn", "out"), rung=self.rung, vos=self.vos,
+                     ib=self.opamp.bias.nominal, rails=self.rails),
+            *subcircuit(self.rung, self.opamp),
             *around,
             ".end",
         ]  # fmt: skip
@@ -81,26 +73,27 @@ class OpAmpBench:
     def open_loop_gain(self) -> float:
         """Change of the output over the change of the differential input, unloaded [V/V]."""
         reach = 0.5 * self.rails[1]
-        plot = self._real([
+        plot = self._run([
             "VIN in 0 0", "RIN in inn 1e6", "RF inn out 1e6", "VG inp 0 0",
             f".dc VIN {-reach!r} {reach!r} {2 * reach!r}", TIGHT,
         ])  # fmt: skip
-        return float(-np.ptp(plot["out"]) / (plot["inn"][1] - plot["inn"][0]) * -1.0)
+        return float(np.ptp(plot["out"]) / (plot["inn"][1] - plot["inn"][0]))
 
     def response(
         self, low: float, high: float
     ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         """Open-loop gain over frequency [Hz]: a servo of 1 GH and 1 GF holds the output at rest."""
-        text = self.deck([
+        phasors = self._run([
             "VIN inp 0 DC 0 AC 1", "LSERVO out inn 1e9", "CSERVO inn 0 1e9",
             f".ac dec 50 {low!r} {high!r}", TIGHT,
         ])  # fmt: skip
-        phasors = BatchNgspice().analyse(text)[-1].phasors
         return phasors["frequency"].real, phasors["out"]
 
     def unity_gain(self) -> tuple[float, float]:
         """Frequency [Hz] where the open-loop gain is one, and the phase left there [degrees]."""
-        frequency, gain = self.response(self.parameters.gbw / 30.0, self.parameters.gbw * 30.0)
+        frequency, gain = self.response(
+            self.opamp.gbw.nominal / 30.0, self.opamp.gbw.nominal * 30.0
+        )
         size = np.log(np.abs(gain))
         log_f = float(np.interp(0.0, -size, np.log(frequency)))
         phase = np.unwrap(np.angle(gain))
@@ -109,14 +102,14 @@ class OpAmpBench:
     def slew(self) -> tuple[float, float]:
         """Slope [V/s] of a follower's rising and falling edge, from 30 to 60 % of a large step."""
         top = 0.6 * self.rails[1]
-        flight = 2 * top / self.parameters.slew
+        flight = 2 * top / self.opamp.slew.nominal
         width = 3.0 * flight
         text = [
             f"VIN inp 0 PULSE({-top!r} {top!r} {flight!r} {flight / 1e3!r} {flight / 1e3!r} "
             f"{width!r} {4 * width!r})",
             "RF out inn 1", f".tran {flight / 200!r} {2 * width!r} 0 {flight / 200!r}",
         ]  # fmt: skip
-        plot = self._real(text)
+        plot = self._run(text)
         time, out = plot["time"], plot["out"]
         half = time < flight + width
         rise = _between(time[half], out[half], -top + 0.6 * top, -top + 1.2 * top)
@@ -125,7 +118,7 @@ class OpAmpBench:
 
     def swing(self, load: float) -> tuple[float, float]:
         """Output [V] driven hard down and up, into a load [ohm] to ground."""
-        plot = self._real([
+        plot = self._run([
             "VIN inp 0 0", "VG inn 0 0", f"RL out 0 {load!r}",
             *self._driven(),
         ])  # fmt: skip
@@ -137,16 +130,16 @@ class OpAmpBench:
 
     def bias(self) -> tuple[float, float]:
         """Current [A] into the noninverting and the inverting input."""
-        plot = self._real(["VIN inp 0 0", "VF out inn 0", "RL out 0 1e9", _POINT, TIGHT])
+        plot = self._run(["VIN inp 0 0", "VF out inn 0", "RL out 0 1e9", ".op", TIGHT])
         into = self._follower()
         return float(-into["vin#branch"][0]), float(plot["vf#branch"][0])
 
     def recovery(self) -> float:
         """Time [s] from the reversal of a hard overdrive to the output's leaving its limit."""
-        wait = 20.0 * self.parameters.recovery + 10.0 * self.rails[1] / self.parameters.slew
-        step = min(self.parameters.recovery / 200.0, wait / 1000.0)
+        wait = 20.0 * recovery(self.opamp) + 10.0 * self.rails[1] / self.opamp.slew.nominal
+        step = min(recovery(self.opamp) / 200.0, wait / 1000.0)
         hard = HARD * self.supply
-        plot = self._real([
+        plot = self._run([
             f"VIN inp 0 PULSE({hard!r} {-hard!r} {wait!r} {step / 10!r} {step / 10!r} 1 2)",
             "VG inn 0 0", "RL out 0 1e6", f".tran {step!r} {2 * wait!r} 0 {step!r}",
         ])  # fmt: skip
@@ -154,20 +147,20 @@ class OpAmpBench:
         limit = float(plot["out"][~after][-1])
         left = after & (plot["out"] < 0.99 * limit)
         # The way from the limit to 1 % below it is slewing, no recovery.
-        slewing = 0.01 * limit / self.parameters.slew
+        slewing = 0.01 * limit / self.opamp.slew.nominal
         return float(plot["time"][left][0] - wait - slewing)
 
     def short_circuit(self) -> tuple[float, float]:
         """Current [A] that the output drives into ground, driven hard down and up."""
-        plot = self._real(["VIN inp 0 0", "VG inn 0 0", "VSHORT out 0 0", *self._driven()])
+        plot = self._run(["VIN inp 0 0", "VG inn 0 0", "VSHORT out 0 0", *self._driven()])
         return float(plot["vshort#branch"][0]), float(plot["vshort#branch"][1])
 
     def below_range(self) -> tuple[float, float]:
         """Output [V] of a follower whose input falls from zero to 0.5 V beyond the lower end of
         its common-mode range: at 0.5 V inside that end, and at the last."""
-        end = -self.supply + self.parameters.headroom[0]
-        slow = 200.0 * self.supply / self.parameters.slew
-        plot = self._real([
+        end = -self.supply + headroom(self.opamp)[0]
+        slow = 200.0 * self.supply / self.opamp.slew.nominal
+        plot = self._run([
             f"VIN inp 0 PWL(0 0 {slow!r} {end - 0.5!r} {2 * slow!r} {end - 0.5!r})",
             "RF out inn 1", "RL out 0 1e6", f".tran {slow / 100!r} {2 * slow!r} 0 {slow / 100!r}",
         ])  # fmt: skip
@@ -177,8 +170,8 @@ class OpAmpBench:
     def supply_current(self, load: float = 1e9) -> tuple[float, float]:
         """Current [A] into the positive and out of the negative supply pin, as a follower of half
         the positive limit into a load [ohm]."""
-        plot = self._real([
-            f"VIN inp 0 {self.rails[1] / 2!r}", "RF out inn 1", f"RL out 0 {load!r}", _POINT,
+        plot = self._run([
+            f"VIN inp 0 {self.rails[1] / 2!r}", "RF out inn 1", f"RL out 0 {load!r}", ".op",
         ])  # fmt: skip
         return float(-plot["vcc#branch"][0]), float(plot["vee#branch"][0])
 
@@ -192,19 +185,16 @@ class OpAmpBench:
         density = next(p.vectors for p in plots if "onoise_spectrum" in p.vectors)
         return float(density["onoise_spectrum"][0])
 
-    def _follower(self) -> dict[str, NDArray[np.float64]]:
-        return self._real(["VIN inp 0 0", "RF out inn 1e-3", "RL out 0 1e9", _POINT, TIGHT])
+    def _follower(self) -> dict[str, NDArray[Any]]:
+        return self._run(["VIN inp 0 0", "RF out inn 1e-3", "RL out 0 1e9", ".op", TIGHT])
 
     def _driven(self) -> list[str]:
         """A sweep of the input from hard low to hard high."""
         hard = HARD * self.supply
         return [f".dc VIN {-hard!r} {hard!r} {2 * hard!r}", TIGHT]
 
-    def _real(self, around: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    def _run(self, around: Sequence[str]) -> dict[str, NDArray[Any]]:
         return BatchNgspice().analyse(self.deck(around))[-1].vectors
-
-
-_POINT = ".op"
 
 
 @dataclass(frozen=True)

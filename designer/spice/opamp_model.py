@@ -21,12 +21,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 from designer.base.errors import InputError
 from designer.catalog.entries import OpAmp
-from designer.catalog.vendor_model import VendorModel
 
 Rung = Literal["ideal", "dynamic", "full"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
@@ -59,73 +57,35 @@ _FLICKER_CURRENT = 1e-3
 """Current [A] through the 1 ohm whose flicker noise stands for the op-amp's."""
 
 
-@dataclass(frozen=True)
-class Parameters:
-    """Figures of a model, typical."""
-
-    gain: float
-    """Open-loop gain [V/V]."""
-    gbw: float
-    """Gain-bandwidth product [Hz]."""
-    slew: float
-    """Slew rate [V/s]."""
-    output_resistance: float
-    """Open-loop output resistance [Ω]."""
-    recovery: float
-    """Recovery from saturation [s]."""
-    second_pole: float
-    """Frequency of the second pole [Hz]."""
-    saturation_resistance: float
-    """Resistance by which the output limit falls with the load [Ω]."""
-    current_limit: float
-    """Largest output current [A]."""
-    headroom: tuple[float, float | None]
-    """Headroom from the lower and the upper rail to the input common-mode range [V]; None: no
-    limit."""
-    reversal: bool
-    """Whether the output goes high for an input below the common-mode range."""
-    supply_current: float
-    """Supply current [A]."""
-    noise: float
-    """Input voltage noise above the corner [V/√Hz]."""
-    noise_corner: float
-    """Corner frequency of the 1/f noise [Hz]; 0: none."""
-
-    @classmethod
-    def of(cls, opamp: OpAmp, gain: float | None = None) -> Parameters:
-        """From the catalogue's entry; ``gain`` replaces its own."""
-        corner = opamp.noise_corner.nominal if opamp.noise_corner else 0.0
-        range_ = opamp.common_mode
-        lower = opamp.rated_supply + (range_.nominal if range_.min is None else range_.min)
-        upper = opamp.rated_supply - (range_.nominal if range_.max is None else range_.max)
-        return cls(
-            gain=opamp.gain.nominal if gain is None else gain,
-            gbw=opamp.gbw.nominal,
-            slew=opamp.slew.nominal,
-            output_resistance=opamp.output_resistance.nominal,
-            recovery=opamp.recovery.nominal if opamp.recovery else ASSUMED_RECOVERY,
-            second_pole=second_pole(
-                opamp.gbw.nominal,
-                opamp.phase_margin.nominal if opamp.phase_margin else ASSUMED_PHASE_MARGIN,
-            ),
-            saturation_resistance=saturation_resistance(opamp),
-            current_limit=opamp.output_current.nominal,
-            # An op-amp with reversal has its upper end at the positive rail.
-            headroom=(lower, None if opamp.phase_reversal else upper),
-            reversal=opamp.phase_reversal,
-            supply_current=opamp.supply_current.nominal,
-            noise=opamp.noise.nominal / math.sqrt(1.0 + corner / NOISE_FREQUENCY),
-            noise_corner=corner,
-        )
+def literal(value: float) -> str:
+    """A number that SPICE reads back as the same float: no unit letters, all digits."""
+    return repr(float(value))
 
 
-def second_pole(gbw: float, phase_margin: float) -> float:
-    """Frequency [Hz] of a second pole that leaves this phase margin [degrees] at unity gain.
+def recovery(opamp: OpAmp) -> float:
+    """Time [s] from the end of a hard overdrive to the output's leaving its limit."""
+    return opamp.recovery.nominal if opamp.recovery else ASSUMED_RECOVERY
+
+
+def headroom(opamp: OpAmp) -> tuple[float, float | None]:
+    """From the lower and the upper rail to the input common-mode range [V]; None: no limit.
+
+    An op-amp with phase reversal has its upper end at the positive rail.
+    """
+    range_ = opamp.common_mode
+    lower = opamp.rated_supply + (range_.nominal if range_.min is None else range_.min)
+    upper = opamp.rated_supply - (range_.nominal if range_.max is None else range_.max)
+    return lower, None if opamp.phase_reversal else upper
+
+
+def second_pole(opamp: OpAmp) -> float:
+    """Frequency [Hz] of a second pole that leaves the op-amp's phase margin at unity gain.
 
     With one pole more, f_u sqrt(1 + (f_u/f_2)^2) = gbw and the margin is arctan(f_2/f_u).
     """
-    margin = math.radians(min(phase_margin, LARGEST_PHASE_MARGIN))
-    return gbw * math.sin(margin) * math.tan(margin)
+    degrees = opamp.phase_margin.nominal if opamp.phase_margin else ASSUMED_PHASE_MARGIN
+    margin = math.radians(min(degrees, LARGEST_PHASE_MARGIN))
+    return opamp.gbw.nominal * math.sin(margin) * math.tan(margin)
 
 
 def saturation_resistance(opamp: OpAmp) -> float:
@@ -179,11 +139,11 @@ def instance(
     given = {"vos": vos, "ib": ib, "low": rails[0], "high": rails[1]}
     if rung != "ideal":
         given |= {"start": start, **(bandwidth or {})}
-    words = " ".join(f"{key}={_n(value)}" for key, value in given.items())
+    words = " ".join(f"{key}={literal(value)}" for key, value in given.items())
     return f"X{name} {' '.join(nets)} {' '.join(supplies)} opamp {words}"
 
 
-def bandwidth(rung: Rung, parameters: Parameters, gbw: float) -> dict[str, float]:
+def bandwidth(rung: Rung, opamp: OpAmp, gbw: float) -> dict[str, float]:
     """Parameters of one op-amp with a gain-bandwidth [Hz] of its own.
 
     The second pole of ``full`` moves along, so that the phase margin stays the data sheet's.
@@ -192,17 +152,21 @@ def bandwidth(rung: Rung, parameters: Parameters, gbw: float) -> dict[str, float
         return {}
     own = {"gbw": gbw}
     if rung == "full":
-        own["pole2"] = parameters.second_pole * gbw / parameters.gbw
+        own["pole2"] = second_pole(opamp) * gbw / opamp.gbw.nominal
     return own
 
 
-def subcircuit(rung: Rung, parameters: Parameters, vendor: VendorModel | None = None) -> list[str]:
-    """The lines of the subcircuit ``opamp`` of one rung; on ``full`` a vendor's model, if any."""
+def subcircuit(rung: Rung, opamp: OpAmp, gain: float | None = None) -> list[str]:
+    """The lines of the subcircuit ``opamp`` of one rung, every figure typical.
+
+    gain : in the place of the catalogue's. On ``full`` a vendor's model goes first.
+    """
+    gain = opamp.gain.nominal if gain is None else gain
     if rung == "ideal":
-        return ideal(parameters.gain)
+        return ideal(gain)
     if rung == "dynamic":
-        return _dynamic(parameters)
-    return _full(parameters) if vendor is None else vendor.wrapped()
+        return _dynamic(opamp, gain)
+    return _full(opamp, gain) if opamp.spice is None else opamp.spice.wrapped()
 
 
 def ideal(gain: float) -> list[str]:
@@ -211,16 +175,16 @@ def ideal(gain: float) -> list[str]:
         f".subckt opamp {PINS} {_EACH}",
         *_INPUT,
         "Alimit %vd(inside inn) out limiter",
-        f".model limiter limit(in_offset=0 gain={_n(gain)} out_lower_limit={{low}} "
+        f".model limiter limit(in_offset=0 gain={literal(gain)} out_lower_limit={{low}} "
         f"out_upper_limit={{high}} limit_range={LIMIT_RANGE!r} fraction=FALSE)",
         ".ends opamp",
     ]
 
 
-def _dynamic(p: Parameters) -> list[str]:
+def _dynamic(opamp: OpAmp, gain: float) -> list[str]:
     """One pole whose charging current is limited, then the output limit."""
     return [
-        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(p)}",
+        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(opamp, gain)}",
         *_INPUT,
         *_pole("inside", "inn"),
         "Hout z x Vout {-rout}",
@@ -230,25 +194,25 @@ def _dynamic(p: Parameters) -> list[str]:
     ]
 
 
-def _full(p: Parameters) -> list[str]:
+def _full(opamp: OpAmp, gain: float) -> list[str]:
     """Common-mode range, pole, second pole, output limit, output current limit, supply pins."""
     rail = 1.0 / RATED_LOAD
     return [
-        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(p)} "
-        f"pole2={_n(p.second_pole)} rsat={_n(p.saturation_resistance)} "
-        f"isc={_n(p.current_limit)} iq={_n(p.supply_current)}",
-        *_noisy_input(p),
-        *_common_mode(p),
+        f".subckt opamp {PINS} {_EACH} start=0 {_dynamics(opamp, gain)} "
+        f"pole2={literal(second_pole(opamp))} rsat={literal(saturation_resistance(opamp))} "
+        f"isc={literal(opamp.output_current.nominal)} iq={literal(opamp.supply_current.nominal)}",
+        *_noisy_input(opamp),
+        *_common_mode(opamp),
         *_pole("seen", "seenn"),
         "Gpole2 0 w x 0 1",
         "Rpole2 w 0 1",
-        f"Cpole2 w 0 {{{_n(0.5 / math.pi)}/pole2}} IC={{start}}",
+        f"Cpole2 w 0 {{{literal(0.5 / math.pi)}/pole2}} IC={{start}}",
         "Hout z w Vout {rsat-rout}",
         # The catalogue's limits are those into the rated load.
-        *_output_limit(f"{{low*(1+rsat*{_n(rail)})}}", f"{{high*(1+rsat*{_n(rail)})}}"),
+        *_output_limit(f"{{low*(1+rsat*{literal(rail)})}}", f"{{high*(1+rsat*{literal(rail)})}}"),
         "Acurrent %vd(y drive) %id(y drive) short",
         ".model short limit(in_offset=0 gain={1/rsat} out_lower_limit={-isc} "
-        f"out_upper_limit={{isc}} limit_range={{{_n(_CORNER)}*isc}} fraction=FALSE)",
+        f"out_upper_limit={{isc}} limit_range={{{literal(_CORNER)}*isc}} fraction=FALSE)",
         "Vout drive out 0",
         "Bpositive vcc 0 I={iq}+uramp(i(Vout))",
         "Bnegative 0 vee I={iq}+uramp(-i(Vout))",
@@ -264,14 +228,14 @@ def _pole(positive: str, negative: str) -> list[str]:
     ``recovery``, which is ln 2 times the leak's time constant.
     """
     return [
-        f".param charge={{slew*{_n(_POLE)}}}",
-        f".param gm={{gbw*{_n(2.0 * math.pi * _POLE)}}}",
+        f".param charge={{slew*{literal(_POLE)}}}",
+        f".param gm={{gbw*{literal(2.0 * math.pi * _POLE)}}}",
         f"Aslew %vd({positive} {negative}) %id(0 x) slewing",
         ".model slewing limit(in_offset=0 gain={gm} out_lower_limit={-charge} "
-        f"out_upper_limit={{charge}} limit_range={{{_n(_CORNER)}*charge}} fraction=FALSE)",
+        f"out_upper_limit={{charge}} limit_range={{{literal(_CORNER)}*charge}} fraction=FALSE)",
         "Rpole x 0 {gain/gm}",
-        f"Cpole x 0 {_n(_POLE)} IC={{start}}",
-        f"Gwind x 0 z y {{{_n(_POLE * math.log(2.0))}/recovery}}",
+        f"Cpole x 0 {literal(_POLE)} IC={{start}}",
+        f"Gwind x 0 z y {{{literal(_POLE * math.log(2.0))}/recovery}}",
     ]
 
 
@@ -283,47 +247,49 @@ def _output_limit(low: str, high: str) -> list[str]:
     ]
 
 
-def _common_mode(p: Parameters) -> list[str]:
+def _common_mode(opamp: OpAmp) -> list[str]:
     """Inputs as the first stage sees them: cut at its range, at nodes ``seen`` and ``seenn``.
 
     Two limits in a row, each about its own pin: XSPICE's controlled limiter would do with one, but
     reports an error in Newton's first steps, while the supplies are still at zero.
     Phase reversal: an input below the range, either of them, pulls the output up.
     """
-    lower, upper = p.headroom
+    lower, upper = headroom(opamp)
     lines = [
-        f".model lowest limit(in_offset=0 gain=1 out_lower_limit={_n(lower)} "
-        f"out_upper_limit={_n(BEYOND)} limit_range=0.01 fraction=FALSE)"
+        f".model lowest limit(in_offset=0 gain=1 out_lower_limit={literal(lower)} "
+        f"out_upper_limit={literal(BEYOND)} limit_range=0.01 fraction=FALSE)"
     ]
     if upper is not None:
         lines.append(
-            f".model highest limit(in_offset=0 gain=1 out_lower_limit={_n(-BEYOND)} "
-            f"out_upper_limit={_n(-upper)} limit_range=0.01 fraction=FALSE)"
+            f".model highest limit(in_offset=0 gain=1 out_lower_limit={literal(-BEYOND)} "
+            f"out_upper_limit={literal(-upper)} limit_range=0.01 fraction=FALSE)"
         )
-    pull = REVERSAL if p.reversal else 0.0
+    pull = REVERSAL if opamp.phase_reversal else 0.0
     for pin, own, seen in (("inside", "p", "seen"), ("inn", "n", "seenn")):
         cut = f"cut{own}" if upper is not None else f"kept{own}"
         lines.append(f"Alowest{own} %vd({pin} vee) %vd({cut} vee) lowest")
         if upper is not None:
             lines.append(f"Ahighest{own} %vd({cut} vcc) %vd(kept{own} vcc) highest")
         sign = f"kept{own} {pin}" if own == "p" else f"{pin} kept{own}"
-        lines.append(f"Epull{own} {seen} kept{own} {sign} {_n(pull)}")
+        lines.append(f"Epull{own} {seen} kept{own} {sign} {literal(pull)}")
     return lines
 
 
-def _noisy_input(p: Parameters) -> list[str]:
+def _noisy_input(opamp: OpAmp) -> list[str]:
     """The offset in series with a resistor that carries no current and has the op-amp's noise."""
-    white = p.noise**2 / (4.0 * BOLTZMANN * NOISE_TEMPERATURE)
-    bias = [f"Rwhite inp noisy {_n(white)}", *_BIAS]
-    if p.noise_corner == 0.0:
+    corner = opamp.noise_corner.nominal if opamp.noise_corner else 0.0
+    density = opamp.noise.nominal / math.sqrt(1.0 + corner / NOISE_FREQUENCY)  # above the corner
+    white = density**2 / (4.0 * BOLTZMANN * NOISE_TEMPERATURE)
+    bias = [f"Rwhite inp noisy {literal(white)}", *_BIAS]
+    if corner == 0.0:
         return ["Voffset inside noisy {vos}", *bias]
-    flicker = p.noise**2 * p.noise_corner / _FLICKER_CURRENT**2
+    flicker = density**2 * corner / _FLICKER_CURRENT**2
     return [
-        f"Voffset flicker noisy {{vos-{_n(_FLICKER_CURRENT)}}}",
+        f"Voffset flicker noisy {{vos-{literal(_FLICKER_CURRENT)}}}",
         "Eflicker inside flicker nf 0 1",
-        f"Iflicker 0 nf {_n(_FLICKER_CURRENT)}",
+        f"Iflicker 0 nf {literal(_FLICKER_CURRENT)}",
         "Rflicker nf 0 pink r=1",
-        f".model pink r(kf={_n(flicker)} af=2)",
+        f".model pink r(kf={literal(flicker)} af=2)",
         *bias,
     ]
 
@@ -335,13 +301,8 @@ _BIAS = ("Ibiasp inp 0 {ib}", "Ibiasn inn 0 {ib}")
 _INPUT = ("Voffset inside inp {vos}", *_BIAS)
 
 
-def _dynamics(p: Parameters) -> str:
+def _dynamics(opamp: OpAmp, gain: float) -> str:
     return (
-        f"gain={_n(p.gain)} gbw={_n(p.gbw)} slew={_n(p.slew)} "
-        f"rout={_n(p.output_resistance)} recovery={_n(p.recovery)}"
+        f"gain={literal(gain)} gbw={literal(opamp.gbw.nominal)} slew={literal(opamp.slew.nominal)} "
+        f"rout={literal(opamp.output_resistance.nominal)} recovery={literal(recovery(opamp))}"
     )
-
-
-def _n(value: float) -> str:
-    """A number that SPICE reads back as the same float: no unit letters, all digits."""
-    return repr(float(value))

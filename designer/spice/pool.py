@@ -23,7 +23,7 @@ import tempfile
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -35,8 +35,13 @@ from typing import Any, TypeVar
 from designer.base.environment import changed_environment
 from designer.base.errors import EnvironmentMissing
 from designer.spice.batch_backend import program_version
-from designer.spice.job import SpiceJob
-from designer.spice.simulator import HOW_TO_INSTALL, Backend, SimulationFailed, Waveforms
+from designer.spice.simulator import (
+    HOW_TO_INSTALL,
+    Backend,
+    SimulationFailed,
+    SpiceJob,
+    Waveforms,
+)
 from designer.spice.worker import Reply, told, work
 
 T = TypeVar("T")
@@ -94,18 +99,11 @@ class SpicePool:
         """End all workers at once and remove their folders. May be called twice."""
         self._cleanup()
 
-    def map(
-        self, jobs: Iterable[SpiceJob[T]], *, progress: Callable[[int], None] | None = None
-    ) -> Iterator[tuple[int, T | SimulationFailed]]:
+    def map(self, jobs: Iterable[SpiceJob[T]]) -> Iterator[tuple[int, T | SimulationFailed]]:
         """Run jobs and yield ``(index, result)`` as they finish, in no certain order.
 
         Jobs are taken from the iterable only as workers become free. Giving the iterator up early
         ends the jobs under way.
-
-        Parameters
-        ----------
-        jobs : any number of them.
-        progress : called with the number of jobs finished so far, before each is yielded.
 
         Raises
         ------
@@ -118,11 +116,7 @@ class SpicePool:
             raise RuntimeError("this pool is at work: finish or close the other iterator first")
         self._mapping = True
         try:
-            results = self._results(enumerate(jobs))
-            for finished, (index, result) in enumerate(results, start=1):
-                if progress is not None:
-                    progress(finished)
-                yield index, result
+            yield from self._results(enumerate(jobs))
         finally:
             for worker in [w for w in self._workers if w.task is not None]:
                 self._discard(worker)
@@ -171,10 +165,10 @@ class SpicePool:
         if not active:
             return []
         left = min(w.deadline for w in active) - time.monotonic()
-        heard = wait([w.connection for w in self._workers], max(left, 0.0))
+        ready = wait([w.connection for w in self._workers], max(left, 0.0))
         now = time.monotonic()
         return [
-            w for w in self._workers if w.connection in heard or (w in active and now >= w.deadline)
+            w for w in self._workers if w.connection in ready or (w in active and now >= w.deadline)
         ]
 
     def _look_at(self, worker: _Worker, waiting: deque[_Task]) -> tuple[int, Any] | None:
@@ -314,4 +308,4 @@ def require_ngspice(pool: SpicePool) -> None:
 
 
 def _length(waveforms: Waveforms) -> int:
-    return len(waveforms.time)
+    return len(waveforms.axis)

@@ -61,7 +61,7 @@ class Read:
 
 def read(waveforms: Waveforms, reading: Reading) -> Read:
     """Classify the run after ``guarded_reading.discard`` periods."""
-    time = waveforms.time
+    time = waveforms.axis
     x = np.stack([waveforms.signals[net] for net in reading.nets], axis=1) - reading.shift
     last = int(np.floor(time[-1] / reading.period * (1.0 + 1e-9)))
     marks = np.arange(reading.discard, last + 1).astype(float) * reading.period

@@ -30,10 +30,8 @@ from designer.spice.simulator import (
     HOW_TO_INSTALL,
     Analysis,
     SimulationFailed,
-    SpiceSweep,
     Waveforms,
     accept,
-    accept_sweep,
     require_version,
 )
 
@@ -56,10 +54,10 @@ class SharedNgspice:
                 "this process has an ngspice session already and cannot hold two: "
                 "use SharedNgspice.of_this_process(), or a process more"
             )
-        self._heard: list[str] | None = None
+        self._log: list[str] | None = None
         self._session = _start_session()
         SharedNgspice._only = self  # from here on a second start would crash
-        self._session.send_char = self._hear
+        self._session.send_char = self._listen
         self.usable = True
         self.version = str(self._session.ngspice_version or "")
         self._check_library()
@@ -77,28 +75,15 @@ class SharedNgspice:
         if not self._session.has_xspice:
             raise EnvironmentMissing(f"this libngspice has no XSPICE; {HOW_TO_INSTALL}")
 
-    def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
+    def run(
+        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis = "tran"
+    ) -> Waveforms:
         """See `designer.spice.simulator.Simulator.run`."""
-        vectors, log, seconds = self._vectors_of(netlist, "tran")
-        real = {name: values.real for name, values in vectors.items()}
-        return accept(real, signals, stop_time, log, seconds)
-
-    def sweep(
-        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis
-    ) -> SpiceSweep:
-        """See `designer.spice.simulator.Simulator.sweep`."""
-        vectors, log, seconds = self._vectors_of(netlist, analysis)
-        return accept_sweep(vectors, signals, stop, analysis, log, seconds)
-
-    def _vectors_of(
-        self, netlist: str, analysis: Analysis
-    ) -> tuple[dict[str, NDArray[Any]], str, float]:
-        """Run a deck: the vectors of its newest analysis of this kind, log and wall time."""
         check_netlist(netlist)
         if not self.usable:
             raise SimulationFailed("an earlier deck ended the ngspice session of this process")
         started = time.perf_counter()
-        self._heard = []
+        self._log = []
         vectors: dict[str, NDArray[Any]] = {}
         try:
             # PySpice raises NameError and its kin on any odd line of output, harmless ones too;
@@ -113,21 +98,15 @@ class SharedNgspice:
             if self.usable:
                 vectors = self._newest(analysis)
         finally:
-            log = "\n".join(self._heard)
-            self._heard = None
+            log = "\n".join(self._log)
+            self._log = None
             if self.usable:
                 self._forget()
-        return vectors, log, time.perf_counter() - started
-
-    def close(self) -> None:
-        """Nothing to do: no circuit and no plot outlives a run, the session ends with the process.
-
-        See `designer.spice.simulator.Simulator.close`.
-        """
+        return accept(vectors, signals, stop, log, time.perf_counter() - started, analysis)
 
     def _watch(self) -> None:
         """Touch the library no more once it wanted to exit: the next call may crash the process."""
-        if any("cannot recover" in line for line in self._heard or ()):
+        if any("cannot recover" in line for line in self._log or ()):
             self.usable = False
 
     def _newest(self, analysis: Analysis) -> dict[str, NDArray[Any]]:
@@ -144,9 +123,9 @@ class SharedNgspice:
             with contextlib.suppress(NameError):  # no circuit: it was not even parsed
                 self._session.exec_command(command)
 
-    def _hear(self, message: str, session: int) -> int:
-        if self._heard is not None:
-            self._heard.append(message.removeprefix("stdout ").removeprefix("stderr "))
+    def _listen(self, message: str, session: int) -> int:
+        if self._log is not None:
+            self._log.append(message.removeprefix("stdout ").removeprefix("stderr "))
         return 0
 
 

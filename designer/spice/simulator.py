@@ -17,9 +17,9 @@ This module is imported by every worker process: it imports numpy and the standa
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from designer.base.errors import DesignerError, EnvironmentMissing
 
 Backend = Literal["shared", "batch"]
 Analysis = Literal["tran", "ac", "dc"]
+T_co = TypeVar("T_co", covariant=True)
 
 OLDEST_NGSPICE = 36
 HOW_TO_INSTALL = (
@@ -38,33 +39,23 @@ HOW_TO_INSTALL = (
 
 @dataclass(frozen=True, eq=False)
 class Waveforms:
-    """What a run that counts has produced.
+    """What an analysis that counts has produced.
 
-    With ``uic`` ngspice does not keep t = 0: ``time`` starts at its first step.
+    With ``uic`` ngspice does not keep t = 0: the axis starts at its first step.
     """
 
-    time: NDArray[np.float64]
-    """(k,), s, strictly increasing, up to the stop time at least."""
-    signals: Mapping[str, NDArray[np.float64]]
-    """Name as it was asked for → (k,), V (A for a branch such as ``vm1#branch``)."""
-    log: str
-    """What ngspice printed."""
-    seconds: float
-    """Wall time of the run."""
-
-
-@dataclass(frozen=True, eq=False)
-class SpiceSweep:
-    """What an ``.ac`` or ``.dc`` analysis that counts has produced."""
-
     axis: NDArray[np.float64]
-    """(k,), strictly increasing: frequency in Hz, or the swept source in V."""
-    signals: Mapping[str, NDArray[np.complex128]]
-    """Name as it was asked for → (k,), V; the imaginary part is 0 for ``.dc``."""
+    """(k,), strictly increasing: time [s]; frequency [Hz] of "ac", swept voltage [V] of "dc"."""
+    signals: Mapping[str, NDArray[Any]]
+    """Name as asked for → (k,) [V]; [A] of a branch, such as ``vm1#branch``; complex of "ac"."""
     log: str
     """What ngspice printed."""
     seconds: float
     """Wall time of the run."""
+
+
+LOG_LIMIT = 20_000
+"""Characters of ngspice's log that a failure keeps."""
 
 
 class SimulationFailed(DesignerError):
@@ -79,9 +70,6 @@ class SimulationFailed(DesignerError):
         return self.reason
 
 
-LOG_LIMIT = 20_000
-
-
 class Simulator(Protocol):
     """A way to run a deck."""
 
@@ -92,14 +80,16 @@ class Simulator(Protocol):
     usable: bool
     """False once the session is beyond repair; only a new process helps."""
 
-    def run(self, netlist: str, signals: Sequence[str], stop_time: float) -> Waveforms:
+    def run(
+        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis = "tran"
+    ) -> Waveforms:
         """Run a deck and return the wanted signals.
 
         Parameters
         ----------
-        netlist : a whole deck: title, elements, one ``.tran``, ``.end``.
+        netlist : a whole deck: title, elements, one analysis, ``.end``.
         signals : node names, any case.
-        stop_time : s; the run must reach it.
+        stop : last value of the axis, which the run must reach.
 
         Raises
         ------
@@ -107,22 +97,22 @@ class Simulator(Protocol):
         SimulationFailed : the run does not count.
         """
 
-    def sweep(
-        self, netlist: str, signals: Sequence[str], stop: float, analysis: Analysis
-    ) -> SpiceSweep:
-        """Run a deck with one ``.ac`` or ``.dc`` and return the wanted signals.
 
-        Parameters
-        ----------
-        stop : last frequency [Hz], or last value of the swept source [V]; the run must reach it.
+@dataclass(frozen=True)
+class SpiceJob(Generic[T_co]):
+    """One run of ngspice, as it is handed to a worker."""
 
-        Raises
-        ------
-        As `run`.
-        """
-
-    def close(self) -> None:
-        """Release what can be released. May be called twice."""
+    netlist: str
+    """The deck, as of ``Simulator.run``."""
+    signals: tuple[str, ...]
+    """Names of the wanted signals, as of ``Simulator.run``."""
+    stop: float
+    """Last value of the axis, as of ``Simulator.run``."""
+    reduce: Callable[[Waveforms], T_co]
+    """What is made of the waveforms, inside the worker. It and its result must pickle: a function
+    of a module or a ``functools.partial`` of one, not a lambda."""
+    analysis: Analysis = "tran"
+    """The analysis of the deck."""
 
 
 def require_version(found: str) -> str:
@@ -137,13 +127,6 @@ def require_version(found: str) -> str:
         raise EnvironmentMissing(f"ngspice {found or 'of unknown version'} found; {HOW_TO_INSTALL}")
     return found
 
-
-# ---------------------------------------------------------------------------------------------
-# What may reach ngspice
-
-
-# ---------------------------------------------------------------------------------------------
-# When a run counts
 
 _OFFENDING = re.compile(
     r"error|warning|singular|timestep too small|no such|undefined|doanalyses|aborted|fatal"
@@ -173,85 +156,58 @@ def offending_line(log: str) -> str | None:
     return None
 
 
-def said(line: str) -> str:
+def quoted(line: str) -> str:
     """A reason that quotes a line of ngspice's log."""
     return f"ngspice said: {line[:200]}"
 
 
+_AXES: Mapping[Analysis, tuple[str, str, str]] = {
+    "tran": ("time", "time vector", "s"),
+    "ac": ("frequency", "frequency vector", "Hz"),
+    "dc": ("v-sweep", "vector of the swept source", "V"),
+}
+"""ngspice's name of the axis, its name in messages, its unit."""
+
+
 def accept(
-    vectors: Mapping[str, NDArray[np.float64]],
+    vectors: Mapping[str, NDArray[Any]],
     signals: Sequence[str],
-    stop_time: float,
+    stop: float,
     log: str,
     seconds: float,
+    analysis: Analysis = "tran",
 ) -> Waveforms:
     """The waveforms of a run, if it counts.
 
     Parameters
     ----------
-    vectors : of the transient analysis, by lower-case name, with ``time``; empty if there is none.
-    signals, stop_time : as in `Simulator.run`.
+    vectors : of the analysis, by lower-case name, with the axis; empty if there is none.
+    signals, stop : as in `Simulator.run`.
 
     Raises
     ------
-    SimulationFailed : the log holds an `offending_line`; or the time vector is missing, does not
-        increase, does not reach the stop time; or a signal is missing or not finite.
+    SimulationFailed : the log holds an `offending_line`; or the axis is missing, does not increase,
+        does not reach its end; or a signal is missing or not finite.
     """
-    time, found = _accepted(vectors, "time", signals, stop_time, log)
-    return Waveforms(time=time, signals=found, log=log, seconds=seconds)
-
-
-AXES = {"ac": "frequency", "dc": "v-sweep"}
-"""What ngspice calls the axis of each analysis."""
-
-
-def accept_sweep(
-    vectors: Mapping[str, NDArray[np.complex128]],
-    signals: Sequence[str],
-    stop: float,
-    analysis: Analysis,
-    log: str,
-    seconds: float,
-) -> SpiceSweep:
-    """The sweep of an ``.ac`` or ``.dc`` analysis, if it counts: as `accept`.
-
-    Raises
-    ------
-    SimulationFailed : as `accept`, of the axis that `AXES` names.
-    """
-    axis, found = _accepted(vectors, AXES[analysis], signals, stop, log)
-    complex_ = {name: values.astype(np.complex128) for name, values in found.items()}
-    return SpiceSweep(axis=axis, signals=complex_, log=log, seconds=seconds)
-
-
-_WORDS = {
-    "time": ("transient", "time vector", "s"),
-    "frequency": ("ac", "frequency vector", "Hz"),
-    "v-sweep": ("dc", "vector of the swept source", "V"),
-}
-
-
-def _accepted(
-    vectors: Mapping[str, NDArray[Any]], name: str, signals: Sequence[str], stop: float, log: str
-) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
     line = offending_line(log)
     if line is not None:
-        raise SimulationFailed(said(line), log)
-    analysis, what, unit = _WORDS[name]
-    axis = vectors.get(name)
+        raise SimulationFailed(quoted(line), log)
+    key, what, unit = _AXES[analysis]
+    axis = vectors.get(key)
     if axis is None or axis.size == 0:
-        raise SimulationFailed(f"ngspice made no {analysis} analysis", log)
+        kind = "transient" if analysis == "tran" else analysis
+        raise SimulationFailed(f"ngspice made no {kind} analysis", log)
     axis = np.array(axis.real, dtype=np.float64)
     if not np.all(np.isfinite(axis)) or not np.all(np.diff(axis) > 0.0):
         raise SimulationFailed(f"the {what} does not increase", log)
     if axis[-1] < stop - 1e-9 * abs(stop):
         raise SimulationFailed(f"the run ends at {axis[-1]:.9g} {unit}, not {stop:.9g} {unit}", log)
-    found: dict[str, NDArray[Any]] = {}
+    waves: dict[str, NDArray[Any]] = {}
     for name in signals:
         values = vectors.get(name.lower())
         if values is None:
             raise SimulationFailed(f"the circuit has no node {name!r}", log)
         if values.shape != axis.shape or not np.all(np.isfinite(values)):
             raise SimulationFailed(f"node {name!r} has values that are not finite", log)
-        found[name] = values
-    return axis, found
+        waves[name] = values if analysis == "ac" else values.real
+    return Waveforms(axis, waves, log, seconds)

@@ -21,18 +21,17 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from designer.base.arrays import Array
-from designer.catalog.diode_curve import THERMAL, card
-from designer.circuit.dead_zone_parts import OUTPUT
+from designer.catalog.diode_curve import THERMAL
 from designer.circuit.netlist import (
     GROUND,
-    NEGATIVE,
-    POSITIVE,
     Board,
     Circuit,
     Excitation,
     nominal_board,
 )
-from designer.spice.deck import IDEAL_GAIN, SolverSettings, comment_line, title_line
+from designer.spice import deck, opamp_model
+from designer.spice.deck import SolverSettings
+from designer.spice.opamp_model import literal
 
 Dialect = Literal["ltspice", "portable"]
 DIALECTS: tuple[Dialect, ...] = get_args(Dialect)
@@ -84,18 +83,17 @@ def write(
     notes : lines of a comment at the top.
     """
     board = nominal_board(circuit)
-    nets = [*circuit.state_nets, *([OUTPUT] if circuit.stops else []), circuit.generator.net]
-    shown = " ".join(f"v({net})" for net in nets)
     lines = [
-        title_line(title),
+        deck.title_line(title),
         f"* designer deck for {dialect}, format {FORMAT}",
-        *map(comment_line, notes),
+        *map(deck.comment_line, notes),
         *_supplies(circuit),
-        *(f"{r.name} {r.a} {r.b} {_n(board.values[r.name])}" for r in circuit.resistors),
-        *_diodes(circuit),
+        *deck.resistors(circuit, board),
+        *deck.diodes(circuit, charge=False),
         *(_instances(circuit, board) if dialect == "ltspice" else _elements(circuit, board)),
-        *_options(dialect, runs[0].settings),
-        f".save {shown}" if dialect == "ltspice" else f".print tran {shown}",
+        # LTspice thins out the waves that it writes unless told not to.
+        deck.options(runs[0].settings) + (" plotwinsize=0" if dialect == "ltspice" else ""),
+        f"{'.save' if dialect == 'ltspice' else '.print tran'} {deck.voltages(circuit)}",
     ]
     for number, run in enumerate(runs, start=1):
         lines += _block(circuit, board, run, number, len(runs))
@@ -105,71 +103,56 @@ def write(
 def _block(circuit: Circuit, board: Board, run: ResponseRun, number: int, count: int) -> list[str]:
     """The lines of one response; those of all but the first are comments."""
     drive, first = run.excitation, number == 1
-    starts = dict(zip(circuit.states, run.initial if run.initial is not None else (), strict=False))
-    step = _n(run.settings.max_step)
+    step = literal(run.settings.max_step)
     lines = [
         # Half a turn of phase, so that the model's sine and the circuit agree (``Excitation``).
         f"{circuit.generator.name} {circuit.generator.net} 0 "
-        f"SIN({_n(drive.offset)} {_n(-drive.amplitude)} {_n(drive.frequency)})",
-        *(
-            f"{c.name} {c.plus} {c.minus} {_n(board.values[c.name])} "
-            f"IC={_n(starts.get(c.name, 0.0))}"
-            for c in circuit.capacitors
-        ),
-        f".tran {step} {_n(run.stop_time)} 0 {step} uic",
+        f"SIN({literal(drive.offset)} {literal(-drive.amplitude)} {literal(drive.frequency)})",
+        *deck.capacitors(circuit, board, run.initial),
+        f".tran {step} {literal(run.stop_time)} 0 {step} uic",
     ]
     state = "switched on" if first else "switched off: a star stands before each line"
-    head = comment_line(f"Response {number} of {count}: {run.name}, {state}")
+    head = deck.comment_line(f"Response {number} of {count}: {run.name}, {state}")
     return [head, *(line if first else f"*{line}" for line in lines)]
-
-
-def _options(dialect: Dialect, settings: SolverSettings) -> list[str]:
-    options = f".options method={settings.method} reltol={_n(settings.reltol)} "
-    options += f"abstol={_n(settings.abstol)} vntol={_n(settings.vntol)}"
-    # LTspice thins out the waves that it writes unless told not to.
-    return [f"{options} plotwinsize=0" if dialect == "ltspice" else options]
 
 
 def _supplies(circuit: Circuit) -> Iterator[str]:
     """Both rails, a load where a rail has no other element, and the references as sources."""
     used = {rail.name for rail in circuit.supplies}
     for rail in circuit.rails:
-        yield f"{rail.name} {rail.net} 0 {_n(rail.volts)}"
+        yield f"{rail.name} {rail.net} 0 {literal(rail.volts)}"
         if rail.name not in used:
-            yield f"R{rail.name} {rail.net} 0 {_n(LOAD)}"
+            yield f"R{rail.name} {rail.net} 0 {literal(LOAD)}"
     for r in circuit.references:
-        yield f"{r.name} {r.cathode} {r.anode} {_n(r.volts)}"
-
-
-def _diodes(circuit: Circuit) -> list[str]:
-    """The diodes, and a model for each kind: its curve alone."""
-    kinds = list(dict.fromkeys(d.model for d in circuit.diodes))
-    lines = [f"{d.name} {d.anode} {d.cathode} diode{kinds.index(d.model)}" for d in circuit.diodes]
-    return lines + [card(model, f"diode{i}", charge=False) for i, model in enumerate(kinds)]
+        yield f"{r.name} {r.cathode} {r.anode} {literal(r.volts)}"
 
 
 def _instances(circuit: Circuit, board: Board) -> Iterator[str]:
     """One subcircuit, and a line for each section."""
-    drop = _n(_drop(circuit))
-    yield ".subckt opamp inp inn out vcc vee params: vos=0 ib=0 low=-13 high=13"
-    yield "Voffset inside inp {vos}"
-    yield "Ibiasp inp 0 {ib}"
-    yield "Ibiasn inn 0 {ib}"
-    yield f"Ggain 0 clamped inside inn {_n(_gain(board) / INNER)}"
-    yield f"Rgain clamped 0 {_n(INNER)}"
-    yield f"Vhigh top 0 {{high-{drop}}}"
-    yield f"Vlow bottom 0 {{low+{drop}}}"
-    yield "Dhigh clamped top clamp"
-    yield "Dlow bottom clamped clamp"
-    yield "Eout out 0 clamped 0 1"
-    yield CLAMP
-    yield ".ends opamp"
+    drop = literal(_drop(circuit))
+    yield from (
+        ".subckt opamp inp inn out vcc vee params: vos=0 ib=0 low=-13 high=13",
+        "Voffset inside inp {vos}",
+        "Ibiasp inp 0 {ib}",
+        "Ibiasn inn 0 {ib}",
+        f"Ggain 0 clamped inside inn {literal(deck.open_loop_gain(board) / INNER)}",
+        f"Rgain clamped 0 {literal(INNER)}",
+        f"Vhigh top 0 {{high-{drop}}}",
+        f"Vlow bottom 0 {{low+{drop}}}",
+        "Dhigh clamped top clamp",
+        "Dlow bottom clamped clamp",
+        "Eout out 0 clamped 0 1",
+        CLAMP,
+        ".ends opamp",
+    )
     for s in circuit.sections:
-        lowest, highest = board.rails[s.name]
-        yield (
-            f"X{s.name} {s.noninverting} {s.inverting} {s.output} {POSITIVE} {NEGATIVE} opamp "
-            f"vos={_n(board.offset.get(s.name, 0.0))} ib={_n(board.bias.get(s.name, 0.0))} "
-            f"low={_n(lowest)} high={_n(highest)}"
+        yield opamp_model.instance(
+            s.name,
+            (s.noninverting, s.inverting, s.output),
+            rung="ideal",
+            vos=board.offset.get(s.name, 0.0),
+            ib=board.bias.get(s.name, 0.0),
+            rails=board.rails[s.name],
         )
 
 
@@ -177,20 +160,21 @@ def _elements(circuit: Circuit, board: Board) -> Iterator[str]:
     """The same elements once more for each section; offsets and bias currents that are not 0."""
     limits = list(dict.fromkeys(board.rails[s.name] for s in circuit.sections))
     for number, (low, high) in enumerate(limits):
-        yield f"Vhigh{number} high{number} 0 {_n(high - _drop(circuit))}"
-        yield f"Vlow{number} low{number} 0 {_n(low + _drop(circuit))}"
+        yield f"Vhigh{number} high{number} 0 {literal(high - _drop(circuit))}"
+        yield f"Vlow{number} low{number} 0 {literal(low + _drop(circuit))}"
     yield CLAMP
+    conductance = literal(deck.open_loop_gain(board) / INNER)
     for s in circuit.sections:
         number, inside, plus = limits.index(board.rails[s.name]), f"x{s.name}", s.noninverting
         if volts := board.offset.get(s.name, 0.0):
             plus = f"p{s.name}"
-            yield f"V{s.name} {plus} {s.noninverting} {_n(volts)}"
+            yield f"V{s.name} {plus} {s.noninverting} {literal(volts)}"
         current = board.bias.get(s.name, 0.0)
         for letter, net in (("p", s.noninverting), ("n", s.inverting)):
             if current and net != GROUND:
-                yield f"I{s.name}{letter} {net} 0 {_n(current)}"
-        yield f"G{s.name} 0 {inside} {plus} {s.inverting} {_n(_gain(board) / INNER)}"
-        yield f"RX{s.name} {inside} 0 {_n(INNER)}"
+                yield f"I{s.name}{letter} {net} 0 {literal(current)}"
+        yield f"G{s.name} 0 {inside} {plus} {s.inverting} {conductance}"
+        yield f"RX{s.name} {inside} 0 {literal(INNER)}"
         yield f"DH{s.name} {inside} high{number} clamp"
         yield f"DL{s.name} low{number} {inside} clamp"
         yield f"E{s.name} {s.output} 0 {inside} 0 1"
@@ -200,12 +184,3 @@ def _drop(circuit: Circuit) -> float:
     """Voltage [V] of a clamp that carries as much current as the resistor at the limit."""
     current = circuit.saturation / INNER
     return EMISSION * THERMAL * math.log1p(current / SATURATION_CURRENT)
-
-
-def _gain(board: Board) -> float:
-    return 1.0 / board.inverse_gain if board.inverse_gain else IDEAL_GAIN
-
-
-def _n(value: float) -> str:
-    """A number that SPICE reads back as the same float."""
-    return repr(float(value))

@@ -15,15 +15,13 @@ import tempfile
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from designer.base.environment import clean_environment, set_environment
 from designer.base.errors import EnvironmentMissing
-from designer.spice.backends import open_simulator
-from designer.spice.simulator import Backend, SimulationFailed, Simulator, SpiceSweep, Waveforms
-
-if TYPE_CHECKING:
-    from designer.spice.job import SpiceJob
+from designer.spice.batch_backend import BatchNgspice
+from designer.spice.shared_backend import SharedNgspice
+from designer.spice.simulator import Backend, SimulationFailed, Simulator, SpiceJob
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,20 @@ class Reply:
     """Pickled result or ``SimulationFailed``."""
     last: bool = False
     """Whether the worker ends after this."""
+
+
+def open_simulator(backend: Backend = "shared") -> Simulator:
+    """The simulator of this process; a shared session is opened once and then handed out again.
+
+    Raises
+    ------
+    EnvironmentMissing : ngspice is missing or too old.
+    """
+    if backend == "shared":
+        return SharedNgspice.of_this_process()
+    if backend == "batch":
+        return BatchNgspice()
+    raise ValueError(f'backend: found {backend!r}, expected "shared" or "batch"')
 
 
 def work(connection: Connection, backend: Backend, folder: str) -> None:
@@ -82,13 +94,7 @@ def _outcome(simulator: Simulator, job: bytes) -> bytes:
         except Exception as error:
             raise SimulationFailed(f"analysis failed: it cannot be read: {told(error)}") from error
         try:
-            waveforms: Waveforms | SpiceSweep
-            if todo.analysis == "tran":
-                waveforms = simulator.run(todo.netlist, todo.signals, todo.stop_time)
-            else:
-                waveforms = simulator.sweep(
-                    todo.netlist, todo.signals, todo.stop_time, todo.analysis
-                )
+            waveforms = simulator.run(todo.netlist, todo.signals, todo.stop, todo.analysis)
         except (ValueError, OSError, EnvironmentMissing) as error:
             raise SimulationFailed(f"simulation failed: {told(error)}") from error
         try:

@@ -17,9 +17,9 @@ from designer.circuit import nominal
 from designer.circuit.netlist import nominal_board
 from designer.dynamics.orbit import Orbit
 from designer.spice import deck, numerics_gate
-from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
+from designer.spice.simulator import SpiceJob
 from tests.shared.kicad_cases import CASES, case, case_files, kicad, project, written
 from tests.shared.paper_cases import OMEGA, synthesised
 
@@ -179,18 +179,16 @@ def test_kicads_own_deck_shows_the_same_responses(tmp_path: Path) -> None:
             assert answer.gate.passed
             subject = numerics_gate.GateSubject(reduction, answer.excitation, answer.circuit)
             own = numerics_gate.job(subject, answer.gate.settings)
-            run = FirstRun(
-                answer.excitation, answer.gate.settings, own.stop_time, answer.circuit.start
-            )
+            run = FirstRun(answer.excitation, answer.gate.settings, own.stop, answer.circuit.start)
             sheet = replace(project(made.design.circuit, title=made.modelfile.title), run=run)
             folder = written(files(sheet), tmp_path / f"{answer.model.omega:g}")
             cir = deck.write(
                 made.design.circuit, nominal_board(made.design.circuit), answer.excitation,
-                answer.gate.settings, title="circuit.cir", stop_time=own.stop_time,
+                answer.gate.settings, title="circuit.cir", stop_time=own.stop,
                 initial=answer.circuit.start,
             )  # fmt: skip
             texts = (cir, spice(folder))
-            jobs += [SpiceJob(t, own.signals, own.stop_time, own.reduce) for t in texts]
+            jobs += [SpiceJob(t, own.signals, own.stop, own.reduce) for t in texts]
         found = dict(pool.map(jobs))
     for i, answer in enumerate(checked):
         ours, theirs = found[2 * i], found[2 * i + 1]

@@ -75,7 +75,7 @@ def test_kicads_own_deck_shows_the_same_responses(name: str, tmp_path: Path) -> 
         ):
             assert result.passed
             own = numerics_gate.job(each, result.settings)
-            run = FirstRun(each.excitation, result.settings, own.stop_time, each.orbit.start)
+            run = FirstRun(each.excitation, result.settings, own.stop, each.orbit.start)
             sheet = replace(project(circuit, mounting), run=run)
             folder = written(files(sheet), tmp_path / str(i))
             theirs_text = spice(folder)

@@ -12,8 +12,8 @@ from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
 from designer.catalog.diode_curve import card, diode_model
 from designer.catalog.entries import Figure
-from designer.spice.backends import open_simulator
 from designer.spice.batch_backend import BatchNgspice
+from designer.spice.worker import open_simulator
 
 DIODE = load_catalog().diode("1N4148")
 
@@ -71,7 +71,7 @@ def test_ngspice_draws_the_same_curve(charge: bool) -> None:
     want = np.array([model.forward(float(i)) for i in current[high]])
     # ngspice runs at 27 °C and takes its own value of Vt there.
     assert waves.signals["b"][high] == pytest.approx(want, rel=2e-3)
-    assert abs(current[waves.time < 1.0]).max() < 25e-9
+    assert abs(current[waves.axis < 1.0]).max() < 25e-9
 
 
 def test_ngspice_recovers_in_the_time_of_the_sheet() -> None:
@@ -85,10 +85,10 @@ def test_ngspice_recovers_in_the_time_of_the_sheet() -> None:
     )  # fmt: skip
     waves = open_simulator("shared").run(text, ("a", "b"), 130e-9)
     current = (waves.signals["a"] - waves.signals["b"]) / 100.0
-    reversed_ = (waves.time > 99e-9) & (current < 0.0)
-    began = waves.time[reversed_][0]
+    reversed_ = (waves.axis > 99e-9) & (current < 0.0)
+    began = waves.axis[reversed_][0]
     assert current[reversed_].min() == pytest.approx(-10e-3, rel=0.05)
-    ended = waves.time[(waves.time > began + 0.1e-9) & (current > -1e-3)][0]
+    ended = waves.axis[(waves.axis > began + 0.1e-9) & (current > -1e-3)][0]
     assert ended - began == pytest.approx(DIODE.recovery.nominal, rel=0.1)
 
 
@@ -99,5 +99,5 @@ def test_ngspice_has_the_capacitance_of_the_sheet() -> None:
             card(diode_model(DIODE), "diode0", charge=True), ".ac lin 2 1e6 2e6", ".end", "",
         ]
     )  # fmt: skip
-    current = BatchNgspice().analyse(text)[-1].phasors["v1#branch"][0]
+    current = BatchNgspice().analyse(text)[-1].vectors["v1#branch"][0]
     assert abs(current.imag) / (2e6 * np.pi) == pytest.approx(4e-12, rel=0.01)

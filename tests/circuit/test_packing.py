@@ -20,9 +20,9 @@ from designer.circuit.reduction import Reduction
 from designer.jobs.synthesise_job import read_design
 from designer.model.board_table import BoardChoice
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import Rung
+from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT
 from tests.shared.quick_folders import quick_folder
@@ -177,7 +177,7 @@ def test_the_deck_of_duals_runs_as_that_of_quads(rung: Rung) -> None:
     for other in waves[1:]:
         for net in ("v1", "v2", "v3", "v4"):
             np.testing.assert_allclose(
-                np.interp(waves[0].time, other.time, other.signals[net]),
+                np.interp(waves[0].axis, other.axis, other.signals[net]),
                 waves[0].signals[net],
                 atol=1e-4 * np.ptp(waves[0].signals[net]),
             )

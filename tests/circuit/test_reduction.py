@@ -28,8 +28,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
+from designer.spice.worker import open_simulator
 from tests.shared.oracles import dead_zone_curve, dead_zone_gains, linear_matrix
 
 OPAMP = load_catalog().opamp("TL074C")
@@ -386,7 +386,7 @@ def test_boards_with_everything_agree_with_ngspice() -> None:
     nets = circuit.state_nets
     waves = open_simulator("shared").run(text, nets, 3 / frequency)
     grid = np.arange(len(want)) / frequency / points
-    y = np.stack([np.interp(grid, waves.time, waves.signals[n]) for n in nets], axis=1)
+    y = np.stack([np.interp(grid, waves.axis, waves.signals[n]) for n in nets], axis=1)
     # Output nets against capacitor voltages: they differ by the summing node, out/gain - offset.
     reduction = Reduction(circuit, board)
     outs = np.stack(

@@ -22,7 +22,7 @@ from designer.base.version import __version__
 from designer.cli import entry
 from designer.cli.app import VERBS
 from designer.jobs.bench_tables import COLUMNS
-from designer.spice.backends import open_simulator
+from designer.spice.worker import open_simulator
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]

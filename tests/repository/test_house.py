@@ -47,11 +47,9 @@ LAZY = {
     STARTS: {
         ("jobs.json_answers", "circuit.design"),
         ("jobs.json_answers", "model.model"),
-        ("jobs.origin", "spice.backends"),
+        ("jobs.origin", "spice.batch_backend"),
         ("jobs.study_stage", "yields.dask_runner"),
         ("model.rules_table", "base.units"),
-        ("spice.backends", "spice.batch_backend"),
-        ("spice.backends", "spice.shared_backend"),
     },
 }
 """Imports inside functions, outside the command line, each with its reason."""

@@ -10,9 +10,8 @@ import pytest
 from designer.spice import convergence_aids
 from designer.spice.convergence_aids import NUDGE, REMEDIES, Task, did_not_converge
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.pool import SpicePool
-from designer.spice.simulator import SimulationFailed, Waveforms, accept
+from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms, accept
 
 FIRST = SolverSettings("trap", 1e-5)
 RC = """RC from a charged capacitor
@@ -35,7 +34,7 @@ C1 b 0 1p
 def value(waves: Waveforms) -> tuple[float, float]:
     """Voltage at the first point, with its time."""
     name = next(iter(waves.signals))
-    return float(waves.time[0]), float(waves.signals[name][0])
+    return float(waves.axis[0]), float(waves.signals[name][0])
 
 
 def broken(waves: Waveforms) -> float:

@@ -15,9 +15,10 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings, title_line
+from designer.spice.opamp_model import literal
 from designer.spice.simulator import Waveforms
+from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT, circuit_of
 
@@ -100,7 +101,7 @@ def test_numbers_round_trip_exactly(seed: int) -> None:
 
 @given(value=st.floats(allow_nan=False, allow_infinity=False))
 def test_no_number_has_a_unit_letter(value: float) -> None:
-    text = deck._n(value)
+    text = literal(value)
     assert float(text) == value
     assert set(text) <= set("0123456789+-.e")
 
@@ -136,7 +137,7 @@ def test_ngspice_shows_what_the_exact_reduction_says(kind: str) -> None:
     u = -excitation.amplitude * np.sin(2 * np.pi * 400.0 * grid)
     for net in CIRCUIT.state_nets:
         want = reduction.output(reduction.system().start, net, exact.strobes, u)
-        got = np.interp(grid, waves.time, waves.signals[net])
+        got = np.interp(grid, waves.axis, waves.signals[net])
         error = np.sqrt(np.mean((got - want)[1:] ** 2) / np.mean(want**2))
         assert error < 5e-4, (net, error)
 

@@ -10,16 +10,17 @@ import pytest
 
 from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
+from designer.catalog.entries import Figure
 from designer.catalog.vendor_model import PINS, VendorModel
 from designer.circuit.netlist import Board, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_check import FigureCheck, OpAmpBench, checks
-from designer.spice.opamp_model import RUNGS, Rung
+from designer.spice.opamp_model import RUNGS, Rung, recovery, second_pole
+from designer.spice.worker import open_simulator
 from tests.circuit.test_reduction import EXACT, circuit_of
 
 CATALOG = load_catalog()
@@ -173,9 +174,10 @@ def test_recovery_is_the_parameter(name: str, rung: Rung) -> None:
     """
     bench = OpAmpBench.of(CATALOG.opamp(name), rung)
     for factor in (0.1, 1.0, 10.0):
-        wanted = factor * bench.parameters.recovery
-        swept = replace(bench, parameters=replace(bench.parameters, recovery=wanted))
-        lag = 0.0 if rung == "dynamic" else 0.5 / np.pi / bench.parameters.second_pole
+        wanted = factor * recovery(bench.opamp)
+        figure = Figure(None, wanted, None, "a test")
+        swept = replace(bench, opamp=replace(bench.opamp, recovery=figure))
+        lag = 0.0 if rung == "dynamic" else 0.5 / np.pi / second_pole(bench.opamp)
         assert swept.recovery() == pytest.approx(wanted + lag / 2, rel=0.04, abs=lag)
 
 
@@ -198,7 +200,7 @@ def test_a_deck_of_every_rung(rung: Rung) -> None:
         peak = np.abs(waves.signals[net]).max()
         # 60 mV at the threshold against 13 V at the limit: what the load takes of that shows here.
         assert waves.signals[net][-1] == pytest.approx(start[k], abs=0.05 * peak), net
-        first = np.interp(1e-8, waves.time, waves.signals[net])
+        first = np.interp(1e-8, waves.axis, waves.signals[net])
         assert first == pytest.approx(start[k], abs=0.03 * peak), f"{net} does not start there"
 
 
@@ -208,18 +210,18 @@ def unity_gain(text: str, section: str, gbw: float) -> tuple[float, float]:
     class Taken(OpAmpBench):
         """That section's line and the deck's own models, on the bench."""
 
-        def deck(self, around: Sequence[str], *, inputs: tuple[str, str] = ("inp", "inn")) -> str:
+        def deck(self, around: Sequence[str]) -> str:
             lines = text.splitlines()
             (own,) = (line.split() for line in lines if line.startswith(f"X{section} "))
             first = next(i for i, x in enumerate(lines) if x.startswith(".subckt"))
             last = max(i for i, x in enumerate(lines) if x.startswith(".ends"))
             here = ["* a section", "VCC vcc 0 15.0", "VEE vee 0 -15.0",
-                    " ".join(["XU1", *inputs, "out", *own[4:]])]  # fmt: skip
+                    " ".join(["XU1", "inp", "inn", "out", *own[4:]])]  # fmt: skip
             return "\n".join([*here, *lines[first : last + 1], *around, ".end"]) + "\n"
 
     bench = OpAmpBench.of(CATALOG.opamp("TL074C"), "full")
-    parameters = replace(bench.parameters, gbw=gbw)
-    return Taken(**{**bench.__dict__, "parameters": parameters}).unity_gain()
+    opamp = replace(bench.opamp, gbw=Figure(None, gbw, None, "a test"))
+    return Taken(**{**bench.__dict__, "opamp": opamp}).unity_gain()
 
 
 @every_rung_with_memory
@@ -269,7 +271,7 @@ def test_a_vendor_s_model_keeps_its_bandwidth() -> None:
         title="t", stop_time=1e-3, rung="full",
     )  # fmt: skip
     assert "gbw" not in text
-    assert open_simulator("shared").run(text, circuit.state_nets, 1e-3).time[-1] > 0.99e-3
+    assert open_simulator("shared").run(text, circuit.state_nets, 1e-3).axis[-1] > 0.99e-3
 
 
 def test_a_rung_without_figures() -> None:

@@ -51,7 +51,7 @@ def waveforms(
     )
     signals = {net: y[keep, i] for i, net in enumerate(NETS)}
     signals["vg"] = np.sin(flow.drive.omega * time[keep])
-    return Waveforms(time=time[keep], signals=signals, log="", seconds=0.0)
+    return Waveforms(axis=time[keep], signals=signals, log="", seconds=0.0)
 
 
 @cache

@@ -15,8 +15,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck, numerics_gate
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
+from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.shared.stages import model, stage
 
@@ -61,7 +61,7 @@ def test_ngspice_shows_what_the_exact_reduction_says(
     asked = subject(circuit, nominal_board(circuit), sides, omega)
     assert asked.orbit.response == response
     job = numerics_gate.job(asked, SolverSettings("trap", asked.period / steps), whole=True)
-    waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
+    waves = open_simulator("shared").run(job.netlist, job.signals, job.stop)
     assert job.reduce(waves).orbit.response == response
     points = 100
     exact = Flow(asked.system, asked.excitation.drive).run(
@@ -71,7 +71,7 @@ def test_ngspice_shows_what_the_exact_reduction_says(
     u = -asked.excitation.amplitude * np.sin(2.0 * np.pi * grid / asked.period)
     for net in circuit.state_nets:
         want = asked.reduction.output(circuit.rest, net, exact, u)
-        got = np.interp(grid, waves.time, waves.signals[net])
+        got = np.interp(grid, waves.axis, waves.signals[net])
         assert np.abs(got - want)[1:].max() < 2e-3 * np.abs(want).max(), net
 
 

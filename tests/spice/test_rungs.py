@@ -23,12 +23,12 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model_file import parse_model_file
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import RELTOL, GateSubject, job
 from designer.spice.opamp_model import Rung, limit_into
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
+from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.paper_cases import OMEGA, subject as exact_parts, synthesised
@@ -109,8 +109,8 @@ def test_impacts_on_full_are_counted_by_its_own_limits() -> None:
     subject = replace(paper()[0.215], rung="full", discard=14)
     asked = job(subject, SolverSettings("trap", subject.period / 3000.0, 1e-5))
     text = asked.netlist.replace(".save ", ".save v(w2) ")
-    waves = open_simulator("shared").run(text, [*asked.signals, "w2"], asked.stop_time)
-    last = waves.time > waves.time[-1] - subject.period
+    waves = open_simulator("shared").run(text, [*asked.signals, "w2"], asked.stop)
+    last = waves.axis > waves.axis[-1] - subject.period
     size = np.abs(waves.signals["w2"][last])
     (load,) = (s.load for s in stages(subject.circuit) if s.section.name == "U3C")
     assert subject.circuit.figures is not None

@@ -22,10 +22,10 @@ from designer.jobs.deck_job import text
 from designer.model.find_responses import find
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, simulator_decks
-from designer.spice.backends import open_simulator
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import Waveforms
 from designer.spice.simulator_decks import DIALECTS, Dialect
+from designer.spice.worker import open_simulator
 from tests.jobs.test_kicad_export import MODEL, designer, snapshot
 from tests.jobs.test_stage_files import made
 
@@ -111,7 +111,7 @@ def test_the_deck_shows_what_circuit_cir_shows(name: str, dialect: Dialect, numb
     assert named(name, number, theirs) == named(name, number, ours)
     grid = np.linspace(0.0, stop, 10_001)
     for net in design(name).design.circuit.state_nets:
-        x, y = (np.interp(grid, w.time, w.signals[net]) for w in (ours, theirs))
+        x, y = (np.interp(grid, w.axis, w.signals[net]) for w in (ours, theirs))
         assert np.sqrt(np.mean((x - y) ** 2)) < WAVE_BOUND * np.abs(x).max(), net
 
 
@@ -224,9 +224,9 @@ def test_offsets_and_unequal_limits_reach_both_decks(monkeypatch: pytest.MonkeyP
     found = [waves(text(whole, dialect), whole, stop) for dialect in DIALECTS]
     net = circuit.state_nets[0]
     grid = np.linspace(0.0, stop, 2001)
-    one, other = (np.interp(grid, w.time, w.signals[net]) for w in found)
+    one, other = (np.interp(grid, w.axis, w.signals[net]) for w in found)
     before = by_circuit_cir("saturation, upper", 1)
-    nominal_wave = np.interp(grid, before.time, before.signals[net])
+    nominal_wave = np.interp(grid, before.axis, before.signals[net])
     moved = np.sqrt(np.mean((one - nominal_wave) ** 2))
     assert moved > 3e-3
     assert np.sqrt(np.mean((one - other) ** 2)) < 1e-2 * moved

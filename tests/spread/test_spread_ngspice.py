@@ -11,8 +11,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.distributions import Uniform
 from designer.spice import numerics_gate
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
+from designer.spice.worker import open_simulator
 from designer.spread.spread import Group, Spread, draw
 from tests.shared.stages import stage
 from tests.spice.test_rectifier_ngspice import SCALED, subject
@@ -40,7 +40,7 @@ def test_ngspice_runs_the_board_that_the_reduction_solves(index: int) -> None:
     job = numerics_gate.job(asked, SolverSettings("trap", asked.period / steps), whole=True)
     for rail in ("VCC", "VEE"):
         assert f"\n{rail} {rail.lower()} 0 {board.supply[rail]!r}\n" in job.netlist
-    waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
+    waves = open_simulator("shared").run(job.netlist, job.signals, job.stop)
     exact = Flow(asked.system, asked.excitation.drive).run(
         asked.orbit.start, 4, mode=asked.orbit.mode, points=points
     ).strobes  # fmt: skip
@@ -48,5 +48,5 @@ def test_ngspice_runs_the_board_that_the_reduction_solves(index: int) -> None:
     u = -asked.excitation.amplitude * np.sin(2.0 * np.pi * grid / asked.period)
     for net in circuit.state_nets:
         want = asked.reduction.output(circuit.rest, net, exact, u)
-        got = np.interp(grid, waves.time, waves.signals[net])
+        got = np.interp(grid, waves.axis, waves.signals[net])
         assert np.abs(got - want)[1:].max() < 2e-3 * np.abs(want).max(), net

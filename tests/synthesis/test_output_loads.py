@@ -17,8 +17,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
+from designer.spice.worker import open_simulator
 from designer.synthesis import output_loads
 from designer.synthesis.output_loads import Loads, Run
 from tests.circuit.test_reduction import EXACT, circuit_of

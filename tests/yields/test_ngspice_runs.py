@@ -19,11 +19,10 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.job import SpiceJob
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
-from designer.spice.simulator import SimulationFailed
+from designer.spice.simulator import SimulationFailed, SpiceJob
 from designer.spread.spread import draw
 from designer.yields import ngspice_runs
 from designer.yields.layers import Samples, listen

@@ -15,8 +15,8 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spice import deck
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
+from designer.spice.worker import open_simulator
 from designer.spread.spread import draw
 from designer.yields.power_up import follow, until_strobe
 from tests.shared.bench_plans import SPREAD
@@ -134,7 +134,7 @@ def test_ngspice_ends_where_the_exact_circuit_does(sample: int | None, degrees: 
     run = Flow(system, e.drive).run(met[0], periods)
     first = (1.0 - degrees / 360.0) / e.frequency
     times = first + np.arange(periods) / e.frequency
-    heard = np.interp(times, waves.time, waves.signals["v1"])
+    heard = np.interp(times, waves.axis, waves.signals["v1"])
     rest = board.offset["U1A"]  # v1 is the capacitor's voltage and that of the summing node
     exact = run.strobes[:periods, 0] + rest
     peak = np.abs(heard).max()
@@ -163,7 +163,7 @@ def test_ngspice_and_the_exact_circuit_agree_on_a_dc_offset() -> None:
         title="offset", stop_time=periods / e.frequency, initial=orbit.start,
     )  # fmt: skip
     waves = open_simulator("shared").run(text, ("v1",), periods / e.frequency)
-    late = waves.time > (periods - 3) / e.frequency
+    late = waves.axis > (periods - 3) / e.frequency
     heard = waves.signals["v1"][late]
     centre = 0.5 * (wanted.max() + wanted.min())
     swing = wanted.max() - wanted.min()

@@ -11,9 +11,9 @@ from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice import numerics_gate
-from designer.spice.backends import open_simulator
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
+from designer.spice.worker import open_simulator
 from designer.yields.trimmed_yield import HIGH, LOW, trimmed_boards
 from tests.shared.bench_plans import plan
 from tests.yields.test_trimmed_yield import ROUGH, TRACK, trim
@@ -35,13 +35,13 @@ def test_ngspice_runs_the_trimmed_board() -> None:
     assert board.values[HIGH] + board.values[LOW] == TRACK
     for name, nets in ((HIGH, "vcc trim"), (LOW, "vee trim")):
         assert f"\n{name} {nets} {board.values[name]!r}\n" in job.netlist
-    waves = open_simulator("shared").run(job.netlist, job.signals, job.stop_time)
+    waves = open_simulator("shared").run(job.netlist, job.signals, job.stop)
     exact = flow.run(orbit.start, 4, mode=orbit.mode, points=points).strobes
     grid = np.arange(len(exact)) * asked.period / points
     u = -asked.excitation.amplitude * np.sin(2.0 * np.pi * grid / asked.period)
     for net in reduction.circuit.state_nets:
         want = reduction.output(reduction.circuit.rest, net, exact, u)
-        got = np.interp(grid, waves.time, waves.signals[net])
+        got = np.interp(grid, waves.axis, waves.signals[net])
         assert np.abs(got - want)[1:].max() < 2e-3 * np.abs(want).max(), net
     rest, stops = at_rest(boards)
     middle = 0.5 * (stops[1][which] + stops[-1][which])

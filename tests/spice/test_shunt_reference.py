@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from designer.catalog.catalog import load_catalog
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation, Reference, nominal_board
 from designer.spice import deck
 from designer.spice.batch_backend import BatchNgspice
-from designer.spice.deck import SolverSettings
+from designer.spice.deck import SHUNT_REFERENCE, SolverSettings, shunt_reference
 from designer.spice.opamp_model import Rung
-from designer.spice.reference_model import instance, subcircuit
 from tests.shared.stages import rectifier, stage
 
 ENTRY = load_catalog().reference("LM4040C50")
@@ -19,13 +18,16 @@ ENTRY = load_catalog().reference("LM4040C50")
 
 def voltages(currents: list[float], volts: float = ENTRY.voltage) -> list[float]:
     """Voltage [V] at each current [A]."""
+    reference = Reference(
+        "VR1", "k", "0", volts, 0.001, ENTRY.name, "",
+        ENTRY.least_current, ENTRY.dynamic_impedance,
+    )  # fmt: skip
     found = []
     for current in currents:
         text = [
             "* title: a reference", f"I1 0 k {current!r}",
-            instance("VR1", "k", "0", volts=volts, least=ENTRY.least_current,
-                     impedance=ENTRY.dynamic_impedance),
-            *subcircuit(), ".options reltol=1e-9 vntol=1e-9", ".op", ".end", "",
+            shunt_reference(reference, volts),
+            *SHUNT_REFERENCE, ".options reltol=1e-9 vntol=1e-9", ".op", ".end", "",
         ]  # fmt: skip
         found.append(float(BatchNgspice().analyse("\n".join(text))[-1].vectors["k"][0]))
     return found
@@ -66,4 +68,4 @@ def test_a_feed_that_is_too_large_shows_on_the_board(rung: Rung) -> None:
                 assert volts < 3.0
             else:
                 assert volts == pytest.approx(wanted, abs=5e-3)
-    assert np.isfinite(waves.time).all()
+    assert np.isfinite(waves.axis).all()
