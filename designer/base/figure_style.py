@@ -11,13 +11,14 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
-from pathlib import Path
-from typing import Any, BinaryIO, ParamSpec
+from typing import Any, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from designer.base.arrays import Array
 
@@ -106,10 +107,17 @@ def to_svg(figure: Figure) -> str:
     return _numbered(_LONG.sub(_short, text[text.index("<svg") :]))
 
 
-def to_png(figure: Figure, path: Path | BinaryIO, dpi: float = 160.0) -> None:
-    """Write the figure as PNG to a file or an open stream."""
+def to_png(figure: Figure, dpi: float = 160.0) -> bytes:
+    """The figure as PNG."""
+    stream = io.BytesIO()
     with style():
-        figure.savefig(path, format="png", dpi=dpi, metadata={"Software": None})
+        figure.savefig(stream, format="png", dpi=dpi, metadata={"Software": None})
+    return stream.getvalue()
+
+
+def picture(figure: Figure, form: str, dpi: float = 160.0) -> bytes:
+    """The figure as a file of the form "svg" or "png"."""
+    return to_svg(figure).encode() if form == "svg" else to_png(figure, dpi)
 
 
 def _short(attribute: re.Match[str]) -> str:
@@ -140,3 +148,31 @@ def axis_limits(values: Array, gaps: Sequence[float]) -> tuple[float, float]:
     low, high = min(float(values.min()), *gaps, 0.0), max(float(values.max()), *gaps, 0.0)
     margin = 0.08 * (high - low) or 1.0
     return low - margin, high + margin
+
+
+def shade_stops(
+    axes: Axes, gaps: Sequence[float], limits: tuple[float, float], *, across: bool = False
+) -> None:
+    """Shade what lies beyond each stop, up to the axis limits; gaps and limits are of x, or of y
+    if ``across``."""
+    span, line = (axes.axhspan, axes.axhline) if across else (axes.axvspan, axes.axvline)
+    for gap in gaps:
+        span(gap, limits[1] if gap > 0 else limits[0], color=CONTACT, lw=0, zorder=0)
+        line(gap, color=MUTED, lw=0.8, zorder=1)
+
+
+def plain_numbers(*axis: Axis) -> None:
+    """Numbers without exponents at the decades of a logarithmic axis, and none between."""
+    for each in axis:
+        each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
+        each.set_minor_formatter(NullFormatter())
+
+
+def name_rows(axes: Axes, names: Sequence[str], *, rules: bool = False) -> None:
+    """A row for each name, the first at the top; rules : lines between them."""
+    axes.set_yticks(range(len(names)), list(names), color=INK)
+    axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="x", color=GRID, lw=0.7)
+    for i in range(1, len(names) if rules else 0):
+        axes.axhline(i - 0.5, color=GRID, lw=0.7)

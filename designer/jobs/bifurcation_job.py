@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -312,6 +311,4 @@ def _with_si(row: dict[str, Any], unit: Unit | None) -> dict[str, Any]:
 def _drawn(kind: StageName, figure: Any) -> dict[str, str | bytes]:
     from designer.base.figure_style import to_png, to_svg
 
-    png = BytesIO()
-    to_png(figure, png, 200.0)
-    return {f"{kind}.png": png.getvalue(), f"{kind}.svg": to_svg(figure)}
+    return {f"{kind}.png": to_png(figure, 200.0), f"{kind}.svg": to_svg(figure)}

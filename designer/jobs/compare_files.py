@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -47,9 +46,7 @@ def write(folder: Folder, compared: ComparisonFiles) -> None:
     figure = compare_plots.comparison(compared.file["columns"])
     svg, png = COMPARISON_PICTURES
     folder.write(svg, figure_style.to_svg(figure))
-    stream = io.BytesIO()
-    figure_style.to_png(figure, stream)
-    folder.write(png, stream.getvalue())
+    folder.write(png, figure_style.to_png(figure))
 
 
 def beside(design: Mapping[str, Any], file: Mapping[str, Any]) -> dict[str, Any]:

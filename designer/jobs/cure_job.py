@@ -8,7 +8,6 @@ folder of its own.
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -211,9 +210,7 @@ def cure_into(
     place.write(CURE, dumps(answer))
     place.write(FRONT[0], front_csv(found))
     chart = front_chart(found)
-    picture = io.BytesIO()
-    to_png(chart, picture)
-    place.write(FRONT[1], picture.getvalue())
+    place.write(FRONT[1], to_png(chart))
     place.write(FRONT[2], to_svg(chart))
     place.finish("cure")
     answer = place.json(CURE)

@@ -221,11 +221,11 @@ class _FolderPieces(StoredParts):
 
 def write_maps(folder: Folder, study: Study, provenance: Mapping[str, Any]) -> None:
     """``maps.json`` and a picture of each map; times are in ``tolerance.json``."""
-    from designer.report.map_writer import files  # Matplotlib takes a while to import
+    from designer.report.map_plots import map_files  # Matplotlib takes a while to import
 
     labels = [
         f"ω = {q.spec.omega:g} {q.spec.expect or q.start.response}" for q in study.plan.questions
     ]
     timeless = [replace(found, seconds=0.0) for found in study.maps]
-    for name, content in files(timeless, labels, {"provenance": provenance}).items():
+    for name, content in map_files(timeless, labels, {"provenance": provenance}).items():
         folder.write(name, content)

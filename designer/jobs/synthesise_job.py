@@ -38,7 +38,6 @@ from designer.jobs.origin import provenance
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming, read_model_file
 from designer.model.si_units import Reader, units_of
-from designer.report import simulate_plots
 from designer.spice.opamp_model import Rung
 from designer.spread.part_grades import once_otherwise
 from designer.yields.run_result import RunResult
@@ -204,9 +203,12 @@ def simulate_answer(
     omegas = tuple(read.omega("--omega", w) for w in omegas)
     omegas += tuple(read.frequency("--frequency", f) for f in frequencies)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
-    digits = simulate_plots.DIGITS if modelfile.mechanical is None else DIGITS
-    names = simulate_plots.names([w for w in wanted if w is not None], digits)
+    names: tuple[str, ...] = ()
     if plots is not None:
+        from designer.report import simulate_plots  # matplotlib is not needed but for them
+
+        digits = simulate_plots.DIGITS if modelfile.mechanical is None else DIGITS
+        names = simulate_plots.names([w for w in wanted if w is not None], digits)
         simulate_plots.check(plots, names, overwrite)
     simulated = simulation.simulate(
         modelfile,

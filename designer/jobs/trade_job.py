@@ -5,7 +5,6 @@ Nothing here prints; ``cli.trade`` does.
 
 from __future__ import annotations
 
-import io
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -277,6 +276,4 @@ def _write(folder: Folder, document: dict[str, Any]) -> None:
     for name, key in trade_files.KEYS.items():
         figure = trade_files.front(document, key)
         folder.write(f"{name}.svg", figure_style.to_svg(figure))
-        stream = io.BytesIO()
-        figure_style.to_png(figure, stream)
-        folder.write(f"{name}.png", stream.getvalue())
+        folder.write(f"{name}.png", figure_style.to_png(figure))

@@ -22,8 +22,8 @@ from .comparison import (
 from .data import (
     ReportData as ReportData,
 )
-from .map_writer import (
-    files as files,
+from .map_plots import (
+    map_files as map_files,
 )
 from .write import (
     write_report as write_report,

@@ -8,7 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, ON_LIGHT, new_figure, say, styled
+from designer.base.figure_style import (
+    INK,
+    MUTED,
+    ON_DARK,
+    ON_LIGHT,
+    name_rows,
+    new_figure,
+    say,
+    styled,
+)
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 
@@ -90,18 +99,17 @@ def _indices(axes: Axes, title: str, b: ResponseBlame) -> None:
     place = range(len(top))
     axes.barh(place, [100.0 * max(x.total, 0.0) for x in top], color=_TOTAL, height=0.75)
     axes.barh(place, [100.0 * max(x.first, 0.0) for x in top], color=_FIRST, height=0.36)
-    axes.set_yticks(place, [x.coordinate for x in top], color=INK, size=7)
+    name_rows(axes, [x.coordinate for x in top])
     axes.set_ylim(INDICES_SHOWN - 0.4, -0.6)
     axes.set_xlim(0.0, 100.0)
     axes.set_title(title, size=8, color=INK, loc="left")
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", labelsize=7)
     axes.tick_params(axis="x", labelbottom=True)
-    axes.grid(axis="x", color=GRID, lw=0.7)
     decided = b.prediction.ok + b.prediction.lost
     if decided:
-        said = f"sign foretells {b.prediction.right} of {decided}"
+        text = f"sign foretells {b.prediction.right} of {decided}"
         axes.text(
-            0.98, 0.04, said, ha="right", va="bottom", size=6.5, color=MUTED,
+            0.98, 0.04, text, ha="right", va="bottom", size=6.5, color=MUTED,
             transform=axes.transAxes,
         )  # fmt: skip
 

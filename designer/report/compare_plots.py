@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
-from designer.base.figure_style import GRID, INK, new_figure, say, styled
+from designer.base.figure_style import INK, name_rows, new_figure, plain_numbers, say, styled
 from designer.circuit.coefficients import EXACT
 from designer.report.compare_table import peaks
 
@@ -63,7 +63,7 @@ def _errors(
     real = [v for row in sizes for v in row if np.isfinite(v) and v > 100.0 * EXACT]
     high = 10.0 ** np.ceil(np.log10(max(real)) + 0.05) if real else 1.0
     low = 10.0 ** (np.floor(np.log10(min(real))) - 1.0) if real else 1e-3
-    _rows(axes, names)
+    name_rows(axes, names, rules=True)
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     edge = low * 10.0**0.35
@@ -88,7 +88,7 @@ def _peaks(
     if not names:
         say(axes, "no response is wanted")
         return
-    _rows(axes, names)
+    name_rows(axes, names, rules=True)
     limits = sorted({float(c["saturation"]) for c in columns})
     for limit in limits:
         axes.axvline(limit, color=INK, lw=0.9, ls=(0, (4, 2)))
@@ -99,8 +99,7 @@ def _peaks(
         _dots(axes, values, i, len(columns), mark)
     axes.set_xscale("log")
     axes.set_xlim(min([*shown, 0.04]) / 2.0, 1.4 * limits[-1])
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.xaxis)
     words = " and ".join(f"{v:g} V" for v in limits)
     axes.set_xlabel(f"peak output [V]; dashed: the op-amps' limit, {words}")
 
@@ -112,7 +111,7 @@ def _offsets(
     if not any(c["offset"] for c in columns):
         say(axes, "no clearance")
         return
-    _rows(axes, list(OFFSETS.values()))
+    name_rows(axes, list(OFFSETS.values()), rules=True)
     axes.axvline(1.0, color=INK, lw=0.9, ls=(0, (4, 2)))
     values = []
     for i, (c, mark) in enumerate(zip(columns, marks, strict=True)):
@@ -122,18 +121,8 @@ def _offsets(
         _dots(axes, row, i, len(columns), mark)
     axes.set_xscale("log")
     axes.set_xlim(min([*values, 0.02]) / 2.0, max([*values, 2.0]) * 2.0)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.xaxis)
     axes.set_xlabel("shift / clearance; past 1 (dashed) the mass rests on a stop")
-
-
-def _rows(axes: Axes, names: Sequence[str]) -> None:
-    axes.set_yticks(range(len(names)), list(names), color=INK)
-    axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
-    axes.tick_params(axis="y", length=0)
-    axes.grid(axis="x", color=GRID, lw=0.7)
-    for i in range(1, len(names)):
-        axes.axhline(i - 0.5, color=GRID, lw=0.7)
 
 
 def _dots(

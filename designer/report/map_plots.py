@@ -1,17 +1,21 @@
-"""Figures of the yield maps: a curve with its interval, a heat map over ω and grade."""
+"""The yield maps of a study: a curve with its interval, or a heat map over ω and grade."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, new_figure, styled
+from designer.base.figure_style import GRID, INK, MUTED, ON_DARK, new_figure, styled, to_png
 from designer.yields.yield_maps import YieldMap
 
+FORMAT = 1
 _LINE, _BAND, _BEST = "#0072b2", "#c6dff0", "#d55e00"
 _AXES = {
     "omega": "drive frequency ω",
@@ -20,96 +24,113 @@ _AXES = {
 }
 
 
+def map_files(
+    maps: Sequence[YieldMap], labels: Sequence[str], provenance: Mapping[str, Any]
+) -> dict[str, bytes]:
+    """``maps.json`` and a picture for each map, by file name.
+
+    labels : of the plan's questions, such as "ω = 0.54   1-3-3".
+    """
+    rows, pictures = [], {}
+    for one in maps:
+        label, name = labels[one.question], f"map-{one.over}-{one.question + 1}.png"
+        pictures[name] = to_png(map_chart(" ".join(label.split()), one))
+        rows.append({"response": label, "picture": name, **one.as_dict()})
+    document = {"format": FORMAT, **provenance, "maps": rows}
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    return {"maps.json": f"{text}\n".encode(), **pictures}
+
+
 @styled
-def map_chart(label: str, found: YieldMap) -> Figure:
+def map_chart(label: str, one: YieldMap) -> Figure:
     """A yield map of the response ``label``, readable alone."""
-    if len(found.axes) == 2:
-        return _heat(label, found)
+    if len(one.axes) == 2:
+        return _heat(label, one)
     figure = new_figure(6.2, 3.1)
     axes = figure.subplots()
-    name = found.axes[0].name
+    name = one.axes[0].name
     scale = 100.0 if name == "grade" else 1.0
-    x = scale * np.array(found.axes[0].values)
-    axes.fill_between(x, 100.0 * found.low, 100.0 * found.high, color=_BAND, lw=0.0)
-    axes.plot(x, 100.0 * found.rate, "-o", color=_LINE, ms=3.6, lw=1.2)
-    gone = ~found.there
+    x = scale * np.array(one.axes[0].values)
+    axes.fill_between(x, 100.0 * one.low, 100.0 * one.high, color=_BAND, lw=0.0)
+    axes.plot(x, 100.0 * one.rate, "-o", color=_LINE, ms=3.6, lw=1.2)
+    gone = ~one.there
     if gone.any():
         axes.plot(x[gone], np.zeros(gone.sum()), "x", color=MUTED, ms=6, clip_on=False)
     if name == "grade":
         axes.set_xscale("log")
         axes.set_xticks(x, [f"{v:g}" for v in x])
         axes.xaxis.set_minor_formatter(NullFormatter())
-    _marks(axes, found, scale)
+    _marks(axes, one, scale)
     axes.set_ylim(0.0, 103.0)
     axes.set_ylabel("yield with its 95 % interval [%]")
     axes.set_xlabel(_AXES[name])
-    _hertz(axes, found)
+    _hertz(axes, one)
     axes.grid(color=GRID, lw=0.7)
-    axes.set_title(f"{label}; {found.samples} boards a point", loc="left", color=INK, size=9)
+    axes.set_title(f"{label}; {one.samples} boards a point", loc="left", color=INK, size=9)
     handles, names = axes.get_legend_handles_labels()
     if handles:
         figure.legend(handles, names, loc="outside lower center", ncols=len(handles))
     return figure
 
 
-def _marks(axes: Axes, found: YieldMap, scale: float) -> None:
-    word = "coarsest of the best" if found.over == "grade" else "recommended"
-    best = None if found.recommended is None else scale * found.recommended[0]
+def _marks(axes: Axes, one: YieldMap, scale: float) -> None:
+    word = "coarsest of the best" if one.over == "grade" else "recommended"
+    best = None if one.recommended is None else scale * one.recommended[0]
     if best is None:
         axes.plot([], [], color=_BEST, lw=1.2, label=f"{word}: nowhere")
-    elif best == found.used and found.over != "grade":
+    elif best == one.used and one.over != "grade":
         axes.axvline(best, color=_BEST, lw=1.2, label=f"recommended, in use: {best:.4g}")
     else:
         axes.axvline(best, color=_BEST, lw=1.2, label=f"{word}: {best:.4g}")
-    if found.over == "grade":
+    if one.over == "grade":
         return
-    if best != found.used:
-        axes.axvline(found.used, color=INK, lw=0.9, ls="--", label=f"in use: {found.used:.4g}")
-    if found.window is not None:
-        for edge, open_ in zip(found.window, found.open, strict=True):
+    if best != one.used:
+        axes.axvline(one.used, color=INK, lw=0.9, ls="--", label=f"in use: {one.used:.4g}")
+    if one.window is not None:
+        for edge, open_ in zip(one.window, one.open, strict=True):
             if not open_:
                 axes.axvline(edge, color=MUTED, lw=0.9, ls=":")
         axes.plot([], [], color=MUTED, lw=0.9, ls=":", label="edge of the nominal window")
-    if (~found.there).any():
+    if (~one.there).any():
         axes.plot([], [], "x", color=MUTED, label="not there nominally")
 
 
-def _hertz(axes: Axes, found: YieldMap) -> None:
+def _hertz(axes: Axes, one: YieldMap) -> None:
     """The generator's frequency above ω."""
-    if found.axes[0].name != "omega" or found.frequency is None:
+    if one.axes[0].name != "omega" or one.frequency is None:
         return
-    scale = found.frequency / found.used
+    scale = one.frequency / one.used
     top = axes.secondary_xaxis(
         "top", functions=(partial(np.multiply, scale), partial(np.multiply, 1.0 / scale))
     )
     top.set_xlabel("drive frequency [Hz]")
 
 
-def _heat(label: str, found: YieldMap) -> Figure:
+def _heat(label: str, one: YieldMap) -> Figure:
     figure = new_figure(6.6, 3.3)
     axes = figure.subplots()
-    omega, grade = (np.array(a.values) for a in found.axes)
-    values = np.where(found.there, 100.0 * found.rate, np.nan)
+    omega, grade = (np.array(a.values) for a in one.axes)
+    values = np.where(one.there, 100.0 * one.rate, np.nan)
     edges = _edges(omega)
     image = axes.pcolormesh(
         edges, np.arange(len(grade) + 1) - 0.5, values.T, cmap="cividis", vmin=0.0, vmax=100.0
     )
     axes.set_yticks(range(len(grade)), [f"{100 * g:g}" for g in grade])
     axes.set_xlabel(_AXES["omega"])
-    _hertz(axes, found)
+    _hertz(axes, one)
     axes.set_ylabel(_AXES["grade"])
-    axes.axvline(found.used, color=ON_DARK, lw=1.0, ls="--")
-    best = found.recommended
-    where = ([], []) if best is None else ([best[0]], [found.axes[1].values.index(best[1])])
+    axes.axvline(one.used, color=ON_DARK, lw=1.0, ls="--")
+    best = one.recommended
+    where = ([], []) if best is None else ([best[0]], [one.axes[1].values.index(best[1])])
     said = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
     axes.plot(
         *where, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {said}"
     )  # fmt: skip
-    axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {found.used:.4g}")
+    axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {one.used:.4g}")
     axes.set_facecolor("#d9d9d9")
     bar = figure.colorbar(image, ax=axes, pad=0.015, format=FuncFormatter(lambda v, _: f"{v:g}"))
     bar.set_label("yield [%]")
-    axes.set_title(f"{label}; {found.samples} boards a point", loc="left", color=INK, size=9)
+    axes.set_title(f"{label}; {one.samples} boards a point", loc="left", color=INK, size=9)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 

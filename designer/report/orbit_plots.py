@@ -23,6 +23,7 @@ from designer.base.figure_style import (
     axis_limits,
     new_figure,
     say,
+    shade_stops,
     styled,
 )
 from designer.check.checked_design import CheckedResponse
@@ -51,18 +52,14 @@ def phase_portrait(
     traces: Mapping[str, Trace],
     *,
     sides: Sequence[int] = BOTH,
-    legend: bool = True,
 ) -> Figure:
     """One response in the plane (x1, x1'), all engines over each other, in model units.
 
     The model is a broad light line, the exact circuit a dashed one on it, ngspice dots; triangles
     mark where an impact begins; beyond ±b the mass is in contact. sides : the stops there are.
     """
-    figure = new_figure(3.5, 3.5 if legend else 3.2)
-    axes = figure.subplots()
-    _portrait(axes, checked, traces, sides)
-    if legend:
-        _engine_legend(figure, [traces], [checked], sides, columns=2)
+    figure = new_figure(3.5, 3.2)
+    _portrait(figure.subplots(), checked, traces, sides)
     return figure
 
 
@@ -81,8 +78,10 @@ def portrait_sheet(
         axes.set_ylabel("x₁′" if i % columns == 0 else "")
     for axes in grid[len(shown) :]:
         axes.set_axis_off()
+    drawn = {name for checked, traces in shown for name in _drawn(traces, _orbits(checked))}
+    names = [name for name in ENGINES if name in drawn]
     if shown:
-        _engine_legend(figure, [t for _, t in shown], [c for c, _ in shown], sides, columns=5)
+        figure.legend(handles=_keys(names, sides), loc="outside lower center", ncols=5)
     else:
         say(grid[0], "no responses")
     return figure
@@ -94,12 +93,11 @@ def time_traces(
     traces: Mapping[str, Trace],
     *,
     sides: Sequence[int] = BOTH,
-    legend: bool = True,
 ) -> Figure:
     """x1(t) over the n periods of the response, with the stops shaded."""
-    figure = new_figure(3.5, 2.15 if legend else 1.75)
+    figure = new_figure(3.5, 1.75)
     axes = figure.subplots()
-    model, period = checked.model, 2.0 * np.pi / checked.model.omega
+    period = 2.0 * np.pi / checked.model.omega
     orbits = _orbits(checked)
     n = max((o.n for o in orbits.values() if o.status is OrbitStatus.PERIODIC), default=0)
     span = n or APERIODIC_PERIODS
@@ -119,19 +117,16 @@ def time_traces(
             axes.plot(cycles[at], x[at], **_look(name, orbits[name]))
         else:
             axes.plot(cycles, x, **_look(name, orbits[name]))
-    low, high = axis_limits(np.concatenate([*shown, [0.0]]), _gaps(checked, sides))
-    axes.set_ylim(low, high)
+    gaps = _gaps(checked, sides)
+    limits = axis_limits(np.concatenate([*shown, [0.0]]), gaps)
+    axes.set_ylim(limits)
     axes.set_xlim(0.0, span)
-    for gap in _gaps(checked, sides):
-        axes.axhspan(gap, high if gap > 0 else low, color=CONTACT, lw=0, zorder=0)
-        axes.axhline(gap, color=MUTED, lw=0.8, zorder=1)
+    shade_stops(axes, gaps, limits, across=True)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=span > 2))
     axes.yaxis.set_major_locator(MaxNLocator(4))
     length = f"{1e3 / checked.excitation.frequency:.3g} ms"
     axes.set_xlabel(f"drive periods ({length} each on the bench)", size=8)
     axes.set_ylabel("x₁")
-    if legend:
-        axes.set_title(f"ω = {model.omega:.4g}", loc="left", weight="bold", color=INK)
     return figure
 
 
@@ -145,10 +140,10 @@ def legend(*, ngspice: bool = True, sides: Sequence[int] = BOTH) -> Figure:
 
 
 def _orbits(checked: CheckedResponse) -> dict[str, Orbit]:
-    found = {"model": checked.model.orbit, "circuit": checked.circuit}
+    orbits = {"model": checked.model.orbit, "circuit": checked.circuit}
     if checked.ngspice is not None:
-        found["ngspice"] = checked.ngspice
-    return found
+        orbits["ngspice"] = checked.ngspice
+    return orbits
 
 
 def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str, Trace]:
@@ -176,9 +171,7 @@ def _portrait(
     }
     every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
     xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
-    for gap in gaps:
-        axes.axvspan(gap, xlim[1] if gap > 0 else xlim[0], color=CONTACT, lw=0, zorder=0)
-        axes.axvline(gap, color=MUTED, lw=0.8, zorder=1)
+    shade_stops(axes, gaps, xlim)
     for name, states in drawn.items():
         if name == "ngspice":
             scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
@@ -202,17 +195,17 @@ def _portrait(
     axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set_xlabel("x₁")
     axes.set_ylabel("x₁′")
-    short = {"model": "model", "circuit": "circuit", "ngspice": "ngspice"}
-    said = "   ".join(f"{short[name]} {orbit.response}" for name, orbit in orbits.items())
-    if len(said) > WIDEST_TITLE:
-        said = "\n".join(f"{short[name]} {orbit.response}" for name, orbit in orbits.items())
+    shown = [f"{name} {orbit.response}" for name, orbit in orbits.items()]
+    text = "   ".join(shown)
+    if len(text) > WIDEST_TITLE:
+        text = "\n".join(shown)
     wanted = f", wanted {checked.model.expected}" if checked.model.expected else ""
-    pad = 17.0 + 11.0 * said.count("\n")
+    pad = 17.0 + 11.0 * text.count("\n")
     axes.set_title(
         f"ω = {checked.model.omega:.4g}{wanted}", loc="left", weight="bold", color=INK, pad=pad
     )
     axes.annotate(
-        said, (0.0, 1.0), (0, 6), xycoords="axes fraction", textcoords="offset points",
+        text, (0.0, 1.0), (0, 6), xycoords="axes fraction", textcoords="offset points",
         color=MUTED, size=8,
     )  # fmt: skip
 
@@ -232,18 +225,6 @@ def _look(name: str, orbit: Orbit) -> dict[str, Any]:
     if name == "model":
         return {**style, "color": MODEL_COLOUR, "zorder": 2}
     return {**style, "color": CIRCUIT_COLOUR, "ls": (0, (4.0, 2.2)), "zorder": 3}
-
-
-def _engine_legend(
-    figure: Figure,
-    traces: Sequence[Mapping[str, Trace]],
-    checked: Sequence[CheckedResponse],
-    sides: Sequence[int],
-    columns: int,
-) -> None:
-    drawn = {name for t, c in zip(traces, checked, strict=True) for name in _drawn(t, _orbits(c))}
-    names = [name for name in ENGINES if name in drawn]
-    figure.legend(handles=_keys(names, sides), loc="outside lower center", ncols=columns)
 
 
 def _keys(names: Sequence[str], sides: Sequence[int]) -> list[Line2D]:

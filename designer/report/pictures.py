@@ -94,11 +94,11 @@ def _portraits(data: ReportData, element: Element) -> Gallery:
         if c.ngspice is not None:
             engines += f", ngspice {c.ngspice.response}"
         portrait = element(
-            orbit_plots.phase_portrait(c, drawn, sides=sides, legend=False),
+            orbit_plots.phase_portrait(c, drawn, sides=sides),
             f"Phase portrait at ω = {omega}: {engines}.",
         )
         trace = element(
-            orbit_plots.time_traces(c, drawn, sides=sides, legend=False),
+            orbit_plots.time_traces(c, drawn, sides=sides),
             f"x₁ over time at ω = {omega}.",
         )
         cards.append(Picture("", _caption(data, i, c), svg=portrait + trace,

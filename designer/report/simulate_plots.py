@@ -8,29 +8,39 @@ is known before anything is computed.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
+from designer.base.atomic_write import appearing
 from designer.base.errors import InputError
+from designer.base.figure_style import (
+    CONTACT,
+    INK,
+    MUTED,
+    axis_limits,
+    new_figure,
+    picture,
+    shade_stops,
+    styled,
+)
 from designer.base.si_unit import Unit
 from designer.base.units import told_apart
+from designer.check.simulation import Simulated
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.si_units import NO_UNITS
 from designer.report.si_axes import si_x, si_y
 
-if TYPE_CHECKING:  # matplotlib takes long to import; only drawing needs it
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from designer.check.simulation import Simulated
-
 DIGITS = 12
 """Of a frequency in a file's name, at most."""
-KINDS = ("phase", "time")
 FORMATS = ("png", "svg")
+FOLDER = "a directory that can be written"
 BLACK, RED = "#000000", "#d40000"
 LEAST_PERIODS = 2
 """A time trace shows at least so many drive periods."""
@@ -66,9 +76,9 @@ def check(folder: Path, stems: Sequence[str], overwrite: bool) -> None:
             raise InputError(above, "--plots", "a link to nothing", "a directory")
         above = above.parent
     if not above.is_dir():
-        raise InputError(above, "--plots", "a file", "a directory that can be written")
+        raise InputError(above, "--plots", "a file", FOLDER)
     if not os.access(above, os.W_OK | os.X_OK):
-        raise InputError(above, "--plots", "no right to write", "a directory that can be written")
+        raise InputError(above, "--plots", "no right to write", FOLDER)
     for name in (_file(s, k, f) for s in stems for k in KINDS for f in FORMATS):
         path = folder / name
         if path.is_dir() and not path.is_symlink():
@@ -88,110 +98,90 @@ def write(
 
     units : SI units of the model's quantities, shown beside the dimensionless values.
     """
-    from designer.base.figure_style import to_png, to_svg
-
     check(folder, stems, overwrite)
-    written: list[str] = []
+    names: list[str] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for stem, response in zip(stems, simulated, strict=True):
-            if not response.traces:
-                continue
-            for kind, draw in zip(KINDS, (portrait, time_trace), strict=True):
-                figure = draw(response, units)
-                for form in FORMATS:
-                    name = _file(stem, kind, form)
-                    part = folder / f".{name}.part"
-                    try:
-                        if form == "png":
-                            to_png(figure, part, 200.0)
-                        else:
-                            part.write_text(to_svg(figure), encoding="utf-8")
-                        part.replace(folder / name)
-                    finally:
-                        part.unlink(missing_ok=True)
-                    written.append(name)
     except OSError as error:
-        raise InputError(
-            folder, "--plots", error.strerror or str(error), "a directory that can be written"
-        ) from None
-    return written
+        raise InputError(folder, "--plots", error.strerror or str(error), FOLDER) from None
+    for stem, response in zip(stems, simulated, strict=True):
+        for kind, draw in KINDS.items() if response.traces else ():
+            figure = draw(response, units)
+            for form in FORMATS:
+                names.append(_file(stem, kind, form))
+                with appearing(folder / names[-1], "--plots", FOLDER) as partial:
+                    partial.write_bytes(picture(figure, form, 200.0))
+    return names
 
 
+@styled
 def portrait(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
     """The orbit and its twin in the plane (x1, x1'); triangles where an impact begins."""
-    from designer.base.figure_style import CONTACT, MUTED, axis_limits, new_figure, style
-
-    with style():
-        figure = new_figure(4.2, 4.0)
-        axes = figure.subplots()
-        gaps = _gaps(response)
-        period = 2.0 * np.pi / response.omega
-        last = MOST_PORTRAIT * period * (1.0 + 1e-9)
-        curves = [t.states[t.time <= last, :2] for t in response.traces]
-        every = np.concatenate(curves)
-        xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
-        for gap in gaps:
-            axes.axvspan(gap, xlim[1] if gap > 0 else xlim[0], color=CONTACT, lw=0, zorder=0)
-            axes.axvline(gap, color=MUTED, lw=0.8, zorder=1)
-        for orbit, curve, look in zip(_drawn(response), curves, _LOOKS, strict=False):
-            axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
-            for side in response.sides:
-                met = orbit.impact_velocities[orbit.impact_sides == side]
-                _impacts(axes, np.full(len(met), side * response.b), met, side, look)
-        axes.set_xlim(*xlim)
-        axes.set_ylim(*ylim)
-        axes.set_xlabel("x₁")
-        axes.set_ylabel("x₁′")
-        si_x(axes, units.get("x1"))
-        si_y(axes, units.get("x1'"))
-        _finish(figure, axes, response, units)
+    figure = new_figure(4.2, 4.0)
+    axes = figure.subplots()
+    gaps = _gaps(response)
+    period = 2.0 * np.pi / response.omega
+    last = MOST_PORTRAIT * period * (1.0 + 1e-9)
+    curves = [t.states[t.time <= last, :2] for t in response.traces]
+    every = np.concatenate(curves)
+    xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
+    shade_stops(axes, gaps, xlim)
+    for orbit, curve, look in zip(_drawn(response), curves, _LOOKS, strict=False):
+        axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
+        for side in response.sides:
+            met = orbit.impact_velocities[orbit.impact_sides == side]
+            _impacts(axes, np.full(len(met), side * response.b), met, side, look)
+    axes.set_xlim(*xlim)
+    axes.set_ylim(*ylim)
+    axes.set_xlabel("x₁")
+    axes.set_ylabel("x₁′")
+    si_x(axes, units.get("x1"))
+    si_y(axes, units.get("x1'"))
+    _finish(figure, axes, response, units)
     return figure
 
 
+@styled
 def time_trace(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
     """x1 over drive periods, orbit and twin; triangles where an impact begins."""
-    from matplotlib.ticker import MaxNLocator
-
-    from designer.base.figure_style import CONTACT, MUTED, axis_limits, new_figure, style
-
-    with style():
-        figure = new_figure(6.4, 3.0)
-        axes = figure.subplots()
-        gaps = _gaps(response)
-        period = 2.0 * np.pi / response.omega
-        n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
-        span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
-        shown = []
-        for orbit, trace, look in zip(_drawn(response), response.traces, _LOOKS, strict=False):
-            cycles, x = trace.time / period, trace.states[:, 0]
-            times, sides = orbit.impact_times / period, orbit.impact_sides
-            if 0 < n < span:  # again, to fill what is shown
-                laps = -(-span // n)
-                cycles = np.concatenate([cycles + k * n for k in range(laps)])
-                x = np.tile(x, laps)
-                times = np.concatenate([times + k * n for k in range(laps)])
-                sides = np.tile(sides, laps)
-            keep = cycles <= span * (1.0 + 1e-9)
-            axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
-            shown.append(x[keep])
-            for side in response.sides:
-                met = times[(sides == side) & (times <= span)]
-                _impacts(axes, met, np.full(len(met), side * response.b), side, look)
-        low, high = axis_limits(np.concatenate(shown), gaps)
-        for gap in gaps:
-            axes.axhspan(gap, high if gap > 0 else low, color=CONTACT, lw=0, zorder=0)
-            axes.axhline(gap, color=MUTED, lw=0.8, zorder=1)
-        axes.set_xlim(0.0, span)
-        axes.set_ylim(low, high)
-        axes.xaxis.set_major_locator(MaxNLocator(8, integer=span > LEAST_PERIODS))
-        axes.set_xlabel("drive periods t / T")
-        axes.set_ylabel("x₁")
-        si_y(axes, units.get("x1"))
-        _finish(figure, axes, response, units)
+    figure = new_figure(6.4, 3.0)
+    axes = figure.subplots()
+    gaps = _gaps(response)
+    period = 2.0 * np.pi / response.omega
+    n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
+    span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
+    shown = []
+    for orbit, trace, look in zip(_drawn(response), response.traces, _LOOKS, strict=False):
+        cycles, x = trace.time / period, trace.states[:, 0]
+        times, sides = orbit.impact_times / period, orbit.impact_sides
+        if 0 < n < span:  # again, to fill what is shown
+            laps = -(-span // n)
+            cycles = np.concatenate([cycles + k * n for k in range(laps)])
+            x = np.tile(x, laps)
+            times = np.concatenate([times + k * n for k in range(laps)])
+            sides = np.tile(sides, laps)
+        keep = cycles <= span * (1.0 + 1e-9)
+        axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
+        shown.append(x[keep])
+        for side in response.sides:
+            met = times[(sides == side) & (times <= span)]
+            _impacts(axes, met, np.full(len(met), side * response.b), side, look)
+    limits = axis_limits(np.concatenate(shown), gaps)
+    shade_stops(axes, gaps, limits, across=True)
+    axes.set_xlim(0.0, span)
+    axes.set_ylim(limits)
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=span > LEAST_PERIODS))
+    axes.set_xlabel("drive periods t / T")
+    axes.set_ylabel("x₁")
+    si_y(axes, units.get("x1"))
+    _finish(figure, axes, response, units)
     return figure
 
 
+KINDS: dict[str, Callable[[Simulated, Mapping[str, Unit]], Figure]] = {
+    "phase": portrait,
+    "time": time_trace,
+}
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLACK, "zorder": 3, "ls": "-"},
     {"color": RED, "zorder": 2, "ls": "-"},
@@ -235,10 +225,6 @@ def _impacts(axes: Axes, x: Any, y: Any, side: int, look: dict[str, Any]) -> Non
 
 def _finish(figure: Figure, axes: Axes, response: Simulated, units: Mapping[str, Unit]) -> None:
     """Title and key."""
-    from matplotlib.lines import Line2D
-
-    from designer.base.figure_style import CONTACT, INK, MUTED
-
     wanted = f", wanted {response.expected}" if response.expected and not response.found else ""
     hertz = f" ({units['omega'].text(response.omega)})" if "omega" in units else ""
     axes.set_title(

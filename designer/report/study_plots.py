@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator
 
 from designer.base.figure_style import (
     GRID,
-    INK,
     MUTED,
     ON_DARK,
     ON_LIGHT,
+    name_rows,
     new_figure,
+    plain_numbers,
     styled,
 )
 from designer.circuit.coefficients import EXACT
@@ -28,6 +30,7 @@ VERDICTS = {
     Verdict.GRAZING: "#cc79a7",
     Verdict.FAILED: "#9a9a9a",
 }
+MARKERS = {v: "o" if v is Verdict.OK else "D" for v in Verdict}
 
 
 @styled
@@ -39,8 +42,6 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
     rows = max(len(labels), 1)
     figure = new_figure(7.4, 0.31 * rows + 1.15)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.0))
-    left.set_yticks(range(len(labels)), labels, color=INK)
-    left.set_ylim(rows - 0.4, -0.6)
     for i, counted in enumerate(yields):
         if counted is None or not counted.samples:
             for axes in (left, right):
@@ -49,19 +50,16 @@ def yield_chart(labels: Sequence[str], yields: Sequence[Yield | None]) -> Figure
         _interval(left, i, counted)
         _shares(right, i, counted)
     for axes in (left, right):
+        name_rows(axes, labels)
         axes.set_xlim(0.0, 100.0)
-        axes.grid(axis="x", color=GRID, lw=0.7)
-        axes.tick_params(axis="y", length=0)
         axes.set_xticks([0, 25, 50, 75, 100])
     left.set_xlim(-2.0, 118.0)
     left.spines["bottom"].set_bounds(0.0, 100.0)
     every = any(y is not None and y.census for y in yields)
     left.set_xlabel("yield, of all boards [%]" if every else "yield with its 95 % interval [%]")
     right.set_xlabel("share of the samples [%]; counts inside")
-    met = [v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)]
-    if met:
-        handles = [Line2D([], [], marker="s", ls="", ms=7, color=VERDICTS[v]) for v in met]
-        figure.legend(handles, [str(v) for v in met], loc="outside upper right", ncols=len(met))
+    shown = {v for v in Verdict if any(y is not None and getattr(y, str(v)) for y in yields)}
+    _verdict_key(figure, shown, dict.fromkeys(Verdict, "s"), 7)
     return figure
 
 
@@ -77,39 +75,26 @@ def coefficient_chart(errors: Mapping[str, float]) -> Figure:
     edge = low * (high / low) ** 0.05
     axes.set_xscale("log")
     axes.set_xlim(low, high * (high / low) ** 0.12)
-    axes.set_ylim(len(errors) - 0.4, -0.6)
-    axes.set_yticks(range(len(errors)), list(errors), color=INK)
+    name_rows(axes, list(errors))
     for i, (name, value) in enumerate(percent.items()):
         if not np.isfinite(value):
             axes.text(edge, i, "not known", va="center", color=MUTED, size=8)
         elif value <= 100.0 * EXACT:
             axes.plot([edge], [i], "o", mfc="white", mec=VERDICTS[Verdict.OK], ms=5.5)
-            axes.annotate(
-                "exact", (edge, i), (7, 0), textcoords="offset points", va="center", size=8
-            )
+            _beside(axes, edge, i, "exact")
         else:
             axes.plot([low, value], [i, i], color=GRID, lw=2.5, solid_capstyle="butt")
             axes.plot([value], [i], "o", color=VERDICTS[Verdict.OK], ms=5.5)
             sign = "+" if errors[name] > 0 else "−"
-            axes.annotate(
-                f"{sign}{value:.2g} %",
-                (value, i),
-                (7, 0),
-                textcoords="offset points",
-                va="center",
-                size=8,
-            )
-    axes.tick_params(axis="y", length=0)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+            _beside(axes, value, i, f"{sign}{value:.2g} %")
+    plain_numbers(axes.xaxis)
     if real:
-        axes.grid(axis="x", color=GRID, lw=0.7)
-        axes.set_xlabel("|ln(realised/wanted)| [%]; exact: below 1e-10 %")
+        axes.set_xlabel(f"|ln(realised/wanted)| [%]; exact: up to {100 * EXACT:g} %")
     else:
         axes.set_xticks([])
         axes.set_xticks([], minor=True)
         axes.spines["bottom"].set_visible(False)
-        axes.set_xlabel("every coefficient exact to rounding, below 1e-10 %")
+        axes.set_xlabel(f"every coefficient exact, up to {100 * EXACT:g} %")
     return figure
 
 
@@ -124,9 +109,7 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
     rows = max(len(labels), 1)
     figure = new_figure(7.4, 0.38 * rows + 1.15)
     left, right = figure.subplots(1, 2, sharey=True)
-    left.set_yticks(range(len(labels)), labels, color=INK)
-    left.set_ylim(rows - 0.4, -0.6)
-    met: set[Verdict] = set()
+    shown: set[Verdict] = set()
     positive: list[float] = []
     for i, row in enumerate(answers):
         for verdict in Verdict:
@@ -139,23 +122,20 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
                 fine = np.isfinite(values) & (values > 0.0)
                 if not fine.any():
                     continue
-                met.add(verdict)
+                shown.add(verdict)
                 positive += list(values[fine]) if axes is right else []
                 axes.plot(
                     values[fine],
                     i + shift[fine],
                     ls="",
-                    marker="o" if verdict is Verdict.OK else "D",
+                    marker=MARKERS[verdict],
                     ms=3.2,
                     mew=0,
                     alpha=0.75,
                     color=VERDICTS[verdict],
                 )
     for axes in (left, right):
-        axes.tick_params(axis="y", length=0)
-        axes.grid(axis="x", color=GRID, lw=0.7)
-        for i in range(1, len(labels)):
-            axes.axhline(i - 0.5, color=GRID, lw=0.7)
+        name_rows(axes, labels, rules=True)
     left.set_xlim(0.0, 1.05)
     left.axvline(1.0, color=MUTED, lw=0.9)
     left.set_xlabel("largest multiplier; stable below 1")
@@ -165,17 +145,28 @@ def margin_chart(labels: Sequence[str], answers: Sequence[Sequence[Answer]]) -> 
         right.set_xlim(low, high)
         subs = (1.0,) if high / low > 300.0 else (1.0, 2.0, 5.0)
         right.xaxis.set_major_locator(LogLocator(subs=subs))
-        right.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.10g}"))
-        right.xaxis.set_minor_formatter(NullFormatter())
+        plain_numbers(right.xaxis)
     right.set_xlabel("shallowest contact or nearest miss [V]")
-    order = [v for v in Verdict if v in met]
-    if order:
-        handles = [
-            Line2D([], [], marker="o" if v is Verdict.OK else "D", ls="", ms=5, color=VERDICTS[v])
-            for v in order
-        ]
-        figure.legend(handles, [str(v) for v in order], loc="outside upper right", ncols=len(order))
+    _verdict_key(figure, shown, MARKERS, 5)
     return figure
+
+
+def _verdict_key(
+    figure: Figure, shown: Collection[Verdict], markers: Mapping[Verdict, str], size: float
+) -> None:
+    look: dict[str, Any] = {"ls": "", "ms": size}
+    handles = [
+        Line2D([], [], marker=markers[v], color=VERDICTS[v], label=str(v), **look)
+        for v in Verdict
+        if v in shown
+    ]
+    if handles:
+        figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
+
+
+def _beside(axes: Axes, x: float, row: int, text: str) -> None:
+    """A text to the right of a dot."""
+    axes.annotate(text, (x, row), (7, 0), textcoords="offset points", va="center", size=8)
 
 
 def _interval(axes: Axes, row: int, counted: Yield) -> None:

@@ -17,8 +17,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import coexisting, settle, starts
 from designer.dynamics.flow import Flow
 from designer.model.response_table import Expect, Response
-from designer.report.map_plots import map_chart
-from designer.report.map_writer import files
+from designer.report.map_plots import map_chart, map_files
 from designer.spread.spread import Spread, draw
 from designer.yields import yield_maps
 from designer.yields.verdict import Question, StudyPlan, Verdict, judge
@@ -217,7 +216,7 @@ def test_where_nothing_survives_nothing_is_recommended(tmp_path: Path) -> None:
         found = made(counts, over)  # type: ignore[arg-type]
         assert found.recommended is None
         assert found.as_dict()["recommended"] is None
-        for name, content in files([found], ["ω = 0.85   1-2-2"], {}).items():
+        for name, content in map_files([found], ["ω = 0.85   1-2-2"], {}).items():
             assert content
             (tmp_path / name).write_bytes(content)
     assert len(list(tmp_path.glob("*.png"))) == 3
@@ -233,7 +232,7 @@ def test_only_a_point_where_the_nominal_circuit_shows_it_is_recommended() -> Non
 
 def test_files_hold_what_the_maps_say() -> None:
     found = [over_omega(), made([10, 8, 2], "grade")]
-    out = files(found, ["ω = 0.85   1-2-2"], {"versions": {"designer": "x"}})
+    out = map_files(found, ["ω = 0.85   1-2-2"], {"versions": {"designer": "x"}})
     assert set(out) == {"maps.json", "map-omega-1.png", "map-grade-1.png"}
     said = json.loads(out["maps.json"])
     assert said["format"] == 1
