@@ -66,6 +66,7 @@ from .figure_style import (
     axis_limits as axis_limits,
     name_rows as name_rows,
     new_figure as new_figure,
+    number_cells as number_cells,
     picture as picture,
     plain_numbers as plain_numbers,
     say as say,

@@ -14,6 +14,7 @@ from functools import wraps
 from typing import Any, ParamSpec
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -166,6 +167,14 @@ def plain_numbers(*axis: Axis) -> None:
     for each in axis:
         each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
         each.set_minor_formatter(NullFormatter())
+
+
+def number_cells(axes: Axes, values: Array, *, least: float = 0.0, size: float = 7) -> None:
+    """Write whole per cents into the cells of an image in ``cividis``, those from ``least`` on."""
+    for i, j in np.argwhere(np.isfinite(values) & (values >= least)):
+        ink = ON_DARK if values[i, j] < 55.0 else ON_LIGHT
+        text = f"{values[i, j]:.0f}"
+        axes.text(j, i, text, ha="center", va="center", color=ink, size=size)
 
 
 def name_rows(axes: Axes, names: Sequence[str], *, rules: bool = False) -> None:

@@ -11,17 +11,14 @@ response, price and parts, and what every lever is worth. Each case is on disk w
 from __future__ import annotations
 
 import argparse
-import io
-import json
 import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer.base.atomic_write import write
 from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import DesignerError
@@ -42,6 +39,8 @@ from designer.jobs.search_job import search_into
 from designer.jobs.study_folder import FolderStores
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
+from designer.paper.report_files import README, write_files
+from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.paper.tolerance_cases import TITLES, cases, model_file
 from designer.report import comparison
 from designer.yields import exact_rung, study_identity, study_plan
@@ -62,7 +61,8 @@ inside, so many times the boards are asked, once."""
 OTHERS, BLAMED = 500, 250
 """Boards at most of the paper's circuits, where most settle slowly; boards behind a blame."""
 FREE, NOMINAL = "searched", "searched, nominal b"
-FILES = ("robust-design.json", "yields.png", "yields.svg", "levers.png", "levers.svg", "README.md")
+DATA = "robust-design.json"
+FILES = (DATA, "yields.png", "yields.svg", "levers.png", "levers.svg", README)
 
 
 def report(
@@ -118,8 +118,13 @@ def report(
     numbers = {"samples": samples, "short": short}
     source = provenance(file, catalog.hash, seed=seed, settings=numbers)
     document = {"format": FORMAT, "cases": found, "provenance": source}
-    for name, content in _files(document, model, samples, short, seed).items():
-        write(out / name, content)
+    command = (
+        "python -m designer.paper.robust_design reports/robust-design "
+        f"--samples {samples} --short {short} --seed {seed}"
+    )
+    page = robust_design_page(found, command, model.name)
+    figures = {"yields": yield_chart(found), "levers": lever_chart(found)}
+    write_files(out, (DATA, document), page, figures, ("png", "svg"))
     return document
 
 
@@ -221,29 +226,6 @@ def _as_built(
 def _counted(counted: Yield) -> dict[str, Any]:
     low, high = counted.interval
     return {**counted.__dict__, "rate": counted.rate, "low": low, "high": high}
-
-
-def _files(
-    document: Mapping[str, Any], model: Path, samples: int, short: int, seed: int
-) -> dict[str, bytes]:
-    from designer.base.figure_style import to_png, to_svg  # Matplotlib takes a while to import
-    from designer.paper.robust_design_page import lever_chart, readme, yield_chart
-
-    contents = {"robust-design.json": _json(document)}
-    found: Sequence[Mapping[str, Any]] = document["cases"]
-    for name, figure in (("yields", yield_chart(found)), ("levers", lever_chart(found))):
-        picture = io.BytesIO()
-        to_png(figure, picture)
-        contents |= {f"{name}.png": picture.getvalue(), f"{name}.svg": to_svg(figure).encode()}
-    numbers = f"--samples {samples} --short {short} --seed {seed}"
-    command = f"python -m designer.paper.robust_design reports/robust-design {numbers}"
-    contents["README.md"] = readme(found, command, model.name).encode()
-    return contents
-
-
-def _json(value: Mapping[str, Any]) -> bytes:
-    text = json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
-    return f"{text}\n".encode()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

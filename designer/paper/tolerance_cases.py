@@ -19,7 +19,7 @@ from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse, find
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.spread.spread import Spread
-from designer.yields.verdict import Question, StudyPlan, Verdict, judge
+from designer.yields.verdict import Question, StudyPlan, Verdict, Yield, judge
 
 OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.215}
 """Drive frequency at which 1-p-p is asked for, by p."""
@@ -88,6 +88,45 @@ class SpreadCase:
     def reference(self) -> bool:
         """Whether it is the case whose blame is worked out."""
         return (self.resistor, self.capacitor, self.offsets) == REFERENCE
+
+
+@dataclass(frozen=True)
+class YieldRow:
+    """The yield of one response in one case."""
+
+    circuit: str
+    """Name of the circuit."""
+    resistor: float
+    """Grade of the resistors, a fraction."""
+    capacitor: float
+    """Grade of the capacitors, a fraction."""
+    offsets: bool
+    """Whether the op-amps have offsets."""
+    expect: str
+    """The wanted response, such as "1-3-3"."""
+    omega: float
+    """Dimensionless frequency."""
+    kind: str
+    """Kind of the yield, such as "as built"."""
+    there: bool
+    """Whether the nominal circuit shows it; where it does not every count is 0."""
+    ok: int
+    """Boards that keep the response."""
+    lost: int
+    """Boards that lose the response."""
+    grazing: int
+    """Boards whose count of impacts is undecided."""
+    failed: int
+    """Boards without an answer."""
+
+    @property
+    def counted(self) -> Yield:
+        return Yield(self.ok, self.lost, self.grazing, self.failed)
+
+    @property
+    def spread(self) -> tuple[float, float, bool]:
+        """Grade of the resistors and of the capacitors, and whether there are offsets."""
+        return (self.resistor, self.capacitor, self.offsets)
 
 
 def model_file() -> ModelFile:

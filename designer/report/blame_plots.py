@@ -11,10 +11,9 @@ from matplotlib.figure import Figure
 from designer.base.figure_style import (
     INK,
     MUTED,
-    ON_DARK,
-    ON_LIGHT,
     name_rows,
     new_figure,
+    number_cells,
     say,
     styled,
 )
@@ -59,10 +58,7 @@ def avoided_chart(labels: Sequence[str], blames: Sequence[ResponseBlame | None])
         spine.set_visible(False)
     if groups and parts:
         axes.axhline(len(groups) - 0.5, color="white", lw=3.0)
-    for i, j in np.ndindex(*values.shape):
-        if np.isfinite(values[i, j]) and values[i, j] >= 0.5:
-            ink = ON_DARK if values[i, j] < 55.0 else ON_LIGHT
-            axes.text(j, i, f"{values[i, j]:.0f}", ha="center", va="center", color=ink, size=7)
+    number_cells(axes, values, least=0.5)
     bar = figure.colorbar(image, ax=axes, pad=0.015, fraction=0.04)
     bar.set_label("losses avoided\nif exact [%]")
     bar.outline.set_visible(False)

@@ -23,7 +23,6 @@ from designer.fidelity.cpu_clock import Entrant, here, rounds
 from designer.model.find_responses import ModelResponse, find
 from designer.model.model import Dimensionless
 from designer.paper import misprints, reproduce_circuit
-from designer.paper.circuit_cases import CircuitExtent
 from designer.paper.circuit_ngspice import _stage, stage_curve
 from designer.paper.circuit_pictures import _between
 from designer.paper.circuits import (
@@ -38,7 +37,7 @@ from designer.paper.circuits import (
 )
 from designer.paper.misprints import MISPRINTS, apply
 from designer.paper.offsets import shifts, signs
-from designer.paper.reproduce_circuit import names, reproduce
+from designer.paper.reproduce_circuit import CircuitExtent, names, reproduce
 from designer.spice.pool import SpicePool
 
 CATALOG = load_catalog()

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from designer.base.figure_style import to_png
+from designer.base.page import markdown
 from designer.model.model_file import parse_model_file
 from designer.paper.robust_design import _decided, at_model_clearance
-from designer.paper.robust_design_page import lever_chart, readme, yield_chart
+from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.yields.verdict import Verdict, Yield
 from tests.shared.search_cases import asked
 
@@ -87,8 +89,13 @@ def table(text: str, kind: str) -> dict[str, list[str]]:
     return rows
 
 
+def written(cases: list[dict[str, Any]]) -> str:
+    page = robust_design_page(cases, "make it", "robust.toml")
+    return re.sub(" +", " ", markdown(page))
+
+
 def test_the_tables_say_which_goal_is_reached() -> None:
-    text = readme(CASES, "make it", "robust.toml")
+    text = written(CASES)
     built = table(text, "as built")
     assert built["searched"] == [
         "4000", "100.00 (99.90 to 100.00)", "99.98 (99.86 to 100.00)",
@@ -154,7 +161,7 @@ def test_a_second_look_where_the_first_decides_nothing(layer: str, ok: int, deci
 
 def test_two_responses_with_one_n_p_q_have_a_column_each() -> None:
     twice = case("searched", response("1-1-1", 4000), response("1-1-1", 3000), search=SEARCH)
-    text = readme([twice], "make it", "robust.toml")
+    text = written([twice])
     assert "| 1-1-1 | 1-1-1 (2) |" in text
     assert table(text, "as built")["searched"][1:3] == [
         "100.00 (99.90 to 100.00)", "75.00 (73.63 to 76.32)",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,10 +13,10 @@ from matplotlib.image import AxesImage
 
 from designer.base import figure_style
 from designer.base.arrays import Array
+from designer.base.page import markdown
 from designer.paper.reproduce_tolerance import KINDS
-from designer.paper.tolerance_cases import OMEGA, TITLES
-from designer.paper.tolerance_page import readme, yield_sheet
-from designer.paper.tolerance_rows import YieldRow
+from designer.paper.tolerance_cases import OMEGA, TITLES, YieldRow
+from designer.paper.tolerance_page import tolerance_page, yield_sheet
 from designer.report.blame_plots import avoided_chart, index_chart
 from designer.report.map_plots import map_chart
 from designer.yields.blame_analysis import ResponseBlame
@@ -134,11 +135,8 @@ def test_the_page_says_every_case_and_what_is_not_there() -> None:
             }
         ]
     }  # fmt: skip
-    document = {
-        "provenance": {"settings": {"short": 10}},
-        "blame": {"printed": blame, "corrected": None},
-    }
-    text = readme(rows(), document, samples=10, seed=3)
+    page = tolerance_page(rows(), {"printed": blame}, samples=10, short=10, seed=3)
+    text = re.sub(" +", " ", markdown(page))
     assert text.splitlines()[2].startswith("Made by `designer reproduce tolerance --samples 10")
     assert text.count("| 1 % | 1 % | on | as built | 50 | 50 | 50 | 50 | 50 | 50 | 50 | × |") == 3
     assert "- **1-2-2**: stability: a fold. Losses avoided if exact: all offsets 3 of 4. " in text
