@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from designer.base.arrays import Array
 from designer.base.figure_style import (
     CIRCUIT_COLOUR,
     CONTACT,
@@ -21,6 +20,8 @@ from designer.base.figure_style import (
     MODEL_COLOUR,
     NGSPICE_COLOUR,
     new_figure,
+    plain_numbers,
+    shade_stops,
     styled,
 )
 from designer.circuit.paper_values import MODEL
@@ -103,8 +104,7 @@ def portraits(model: Piece, one: Piece) -> Figure:
 def _portrait(axes: Axes, wanted: Piece, shown: Piece) -> None:
     x, v = wanted["portrait"]
     reach = 1.15 * max(map(abs, x))
-    for side in (-1.0, 1.0):
-        axes.axvspan(side * MODEL.b, side * reach, color=CONTACT, lw=0, zorder=0)
+    shade_stops(axes, (-MODEL.b, MODEL.b), (-reach, reach))
     axes.plot(x, v, color=MODEL_COLOUR, lw=4.0, zorder=1)
     axes.plot(*shown["portrait"], color=CIRCUIT_COLOUR, lw=1.0, zorder=2)
     axes.plot(*shown["ngspice_portrait"], color=NGSPICE_COLOUR, lw=1.0, ls=(0, (2, 2)), zorder=3)
@@ -123,10 +123,10 @@ def misprints(rows: Sequence[Piece]) -> Figure:
     axes = figure.subplots()
     for i, row in enumerate(shown):
         for j, f in enumerate(row["responses"]):
-            said = f["circuit"]
+            text = f["circuit"]
             if f["kept"]:
-                said += f"\n{100.0 * f['error']:.2g} %"
-            _cell(axes, j, i, said, KEPT if f["kept"] else LOST)
+                text += f"\n{100.0 * f['error']:.2g} %"
+            _cell(axes, j, i, text, KEPT if f["kept"] else LOST)
     _table(axes, heads, [r["where"] for r in shown])
     return figure
 
@@ -172,9 +172,7 @@ def times(rows: Sequence[Piece]) -> Figure:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylim(0.5 * floor, 1.0)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            axis.set_minor_formatter(NullFormatter())
+        plain_numbers(axes.xaxis, axes.yaxis)
         axes.grid(True, color=GRID, lw=0.6)
         axes.set_title(f"ω = {row['omega']:g}, 1-{row['p']}-{row['p']}", loc="left")
         axes.set_xlabel("CPU seconds of a drive period")
@@ -223,9 +221,5 @@ def _table(axes: Axes, heads: Sequence[str], names: Sequence[str]) -> None:
 def _between(low: str, high: str, share: float) -> str:
     if np.isnan(share):
         return NO_RUN
-
-    def rgb(text: str) -> Array:
-        return np.array([float(int(text[i : i + 2], 16)) for i in (1, 3, 5)])
-
-    mixed = rgb(low) + share * (rgb(high) - rgb(low))
-    return "#" + "".join(f"{round(v):02x}" for v in mixed)
+    ends = [np.array(to_rgb(colour)) for colour in (low, high)]
+    return to_hex(ends[0] + share * (ends[1] - ends[0]))

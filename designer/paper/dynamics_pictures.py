@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from designer.base.arrays import Array
-from designer.base.figure_style import CONTACT, GRID, MUTED, new_figure, style
+from designer.base.figure_style import GRID, MUTED, new_figure, shade_stops, styled
 from designer.bifurcations.branch_survey import Survey
 from designer.bifurcations.continuation import Branch
 from designer.bifurcations.points import Bifurcation
@@ -31,55 +31,45 @@ class Portrait:
     """Title above the panel."""
     b: float
     """Dimensionless clearance."""
-    orbit: Array
-    """(points, 2) closed curve."""
-    twin: Array | None
-    """(points, 2) closed curve of the mirror twin; None where it has none of its own."""
+    curves: tuple[Array, ...]
+    """(points, 2) closed curves of the orbit and of its twin."""
 
 
-def branches(found: Survey, low: float, high: float) -> Figure:
+@styled
+def branches(survey: Survey, low: float, high: float) -> Figure:
     """Least first displacement of each orbit over the parameter: solid where stable."""
-    with style():
-        figure = new_figure(9.6, 5.4)
-        axes = figure.subplots()
-        deepest = 0
-        for number, branch in enumerate(found.branches):
-            depth, above = 0, found.parents[number]
-            while above >= 0:
-                depth, above = depth + 1, found.parents[above]
-            deepest = max(deepest, depth)
-            _line(axes, branch, found.on(number), COLOURS[min(depth, len(COLOURS) - 1)])
-        kinds: dict[str, list[tuple[float, float]]] = {}
-        for p in found.points:
-            if p.stable[0] or p.stable[1]:
-                least = float(p.point.orbit.extremes[0, 0])
-                kinds.setdefault(str(p.kind), []).append((p.value, least))
-        handles = [
-            Line2D([], [], color=MUTED, lw=1.6, label="stable"),
-            Line2D([], [], color=MUTED, lw=0.6, ls=(0, (3, 2)), label="unstable"),
-        ]
-        for depth in range(deepest + 1):
-            name = ("symmetric", "asymmetric twins", "their doubled orbits")
-            label = name[depth] if depth < len(name) else f"left another {depth} times"
-            colour = COLOURS[min(depth, len(COLOURS) - 1)]
-            handles.append(Line2D([], [], color=colour, lw=1.6, label=label))
-        for kind, at in kinds.items():
-            marker, colour = MARKS[kind]
-            look: dict[str, Any] = {
-                "marker": marker,
-                "color": colour,
-                "mfc": "white",
-                "ms": 4.5,
-                "ls": "",
-            }
-            axes.plot(*np.transpose(at), **look, zorder=4)
-            handles.append(Line2D([], [], **look, label=kind))
-        axes.grid(True, color=GRID, lw=0.5)
-        axes.set_xlim(low, high)
-        axes.set_xlabel(NAMES.get(found.parameter, found.parameter))
-        axes.set_ylabel("least x₁ of the orbit")
-        figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    figure = new_figure(9.6, 5.4)
+    axes = figure.subplots()
+    depths: list[int] = []  # a parent comes before its branches
+    for number, branch in enumerate(survey.branches):
+        above = survey.parents[number]
+        depths.append(0 if above < 0 else depths[above] + 1)
+        _line(axes, branch, survey.on(number), _colour(depths[-1]))
+    handles = [
+        Line2D([], [], color=MUTED, lw=1.6, label="stable"),
+        Line2D([], [], color=MUTED, lw=0.6, ls=(0, (3, 2)), label="unstable"),
+    ]
+    names = ("symmetric", "asymmetric twins", "their doubled orbits")
+    for depth in range(max(depths) + 1):
+        label = names[depth] if depth < len(names) else f"left another {depth} times"
+        handles.append(Line2D([], [], color=_colour(depth), lw=1.6, label=label))
+    stable = [p for p in survey.points if p.stable[0] or p.stable[1]]
+    for kind in dict.fromkeys(p.kind for p in stable):
+        marker, colour = MARKS[str(kind)]
+        look: dict[str, Any] = {"marker": marker, "color": colour, "mfc": "white", "ms": 4.5}
+        at = [(p.value, p.point.orbit.extremes[0, 0]) for p in stable if p.kind is kind]
+        axes.plot(*np.transpose(at), ls="", **look, zorder=4)
+        handles.append(Line2D([], [], ls="", **look, label=str(kind)))
+    axes.grid(True, color=GRID, lw=0.5)
+    axes.set_xlim(low, high)
+    axes.set_xlabel(NAMES.get(survey.parameter, survey.parameter))
+    axes.set_ylabel("least x₁ of the orbit")
+    figure.legend(handles=handles, loc="outside lower center", ncols=5)
     return figure
+
+
+def _colour(depth: int) -> str:
+    return COLOURS[min(depth, len(COLOURS) - 1)]
 
 
 def _line(axes: Axes, branch: Branch, points: Sequence[Bifurcation], colour: str) -> None:
@@ -96,36 +86,33 @@ def _line(axes: Axes, branch: Branch, points: Sequence[Bifurcation], colour: str
             axes.plot(both[:, 0], both[:, 1], color=colour, lw=1.6, zorder=3)
 
 
+@styled
 def portraits(panels: Mapping[int, Sequence[Portrait]]) -> Figure:
     """The paper's Fig. 3: for each p a row of panels, twins in black and red."""
-    with style():
-        columns = max(len(row) for row in panels.values())
-        across = 2 if len(panels) > 4 else 1
-        rows = -(-len(panels) // across)
-        figure = new_figure(2.45 * columns * across, 2.35 * rows)
-        grid = figure.subplots(rows, columns * across, squeeze=False)
-        for axes in grid.ravel():
-            axes.set_visible(False)
-        for place, row in enumerate(panels.values()):
-            for column, panel in enumerate(row):
-                axes = grid[place % rows, columns * (place // rows) + column]
-                axes.set_visible(True)
-                _panel(axes, panel)
-        handles = [
-            Line2D([], [], color=BLACK, lw=1.2, label="orbit"),
-            Line2D([], [], color=RED, lw=1.2, label="its mirror twin"),
-        ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    columns = max(len(row) for row in panels.values())
+    across = 2 if len(panels) > 4 else 1
+    rows = -(-len(panels) // across)
+    figure = new_figure(2.45 * columns * across, 2.35 * rows)
+    grid = figure.subplots(rows, columns * across, squeeze=False)
+    for axes in grid.ravel():
+        axes.set_visible(False)
+    for place, row in enumerate(panels.values()):
+        for column, panel in enumerate(row):
+            axes = grid[place % rows, columns * (place // rows) + column]
+            axes.set_visible(True)
+            _panel(axes, panel)
+    handles = [
+        Line2D([], [], color=BLACK, lw=1.2, label="orbit"),
+        Line2D([], [], color=RED, lw=1.2, label="its mirror twin"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 
 def _panel(axes: Axes, panel: Portrait) -> None:
-    curves = [panel.orbit] if panel.twin is None else [panel.orbit, panel.twin]
-    reach = 1.12 * max(float(np.abs(c[:, 0]).max()) for c in curves)
-    for side in (-1, 1):
-        axes.axvspan(side * panel.b, side * reach, color=CONTACT, lw=0, zorder=0)
-        axes.axvline(side * panel.b, color=MUTED, lw=0.6, zorder=1)
-    for curve, colour in zip(curves, (BLACK, RED), strict=False):
+    reach = 1.12 * max(float(np.abs(c[:, 0]).max()) for c in panel.curves)
+    shade_stops(axes, (-panel.b, panel.b), (-reach, reach))
+    for curve, colour in zip(panel.curves, (BLACK, RED), strict=False):
         axes.plot(curve[:, 0], curve[:, 1], color=colour, lw=0.9, zorder=3 - (colour == RED))
     axes.set_xlim(-reach, reach)
     axes.set_title(panel.title, loc="left")

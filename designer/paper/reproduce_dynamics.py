@@ -1,15 +1,15 @@
-"""The paper's Sections 3 and 4 measured: its Fig. 2 and Fig. 3 and its statements.
+"""``designer reproduce dynamics``: the paper's Sections 3 and 4, Fig. 2 and Fig. 3, measured.
 
-``reproduce`` writes one folder: README.md with the command at its top, pictures as PNG and SVG,
-dynamics.json with windows, points, cascades, coexisting attractors and statements, and the followed
-branches and the sweeps as Parquet. A folder that holds anything else is refused.
+The folder holds README.md with the command at its top, pictures as PNG and SVG, dynamics.json with
+windows, points, cascades, coexisting attractors and statements, and the followed branches and the
+sweeps as Parquet. A folder that holds anything else is refused.
 """
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,19 +17,17 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from matplotlib.figure import Figure
 
 from designer.base.atomic_write import write
 from designer.base.errors import InputError
-from designer.base.figure_style import to_png, to_svg
 from designer.base.progress import Progress
 from designer.base.report_pieces import check_ours
 from designer.bifurcations import sweep
 from designer.bifurcations.branch_survey import Survey, survey
-from designer.bifurcations.continuation import End
-from designer.bifurcations.doubling_cascade import Cascade
 from designer.bifurcations.point_captions import caption
 from designer.bifurcations.store import write_sweep
-from designer.bifurcations.windows import NOT_LOCATED, BranchWindow, all_windows, outside
+from designer.bifurcations.windows import all_windows, outside
 from designer.catalog.catalog import load_catalog
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.attractors import coexisting, settle, starts, twin
@@ -40,15 +38,11 @@ from designer.model.find_responses import scale_of
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
 from designer.paper import dynamics_pictures
+from designer.paper.dynamics_page import KINDS, Dynamics, dynamics_page
 from designer.paper.dynamics_pictures import Portrait
+from designer.paper.report_files import README, write_files
 from designer.paper.response_order import gaps
-from designer.paper.statements import (
-    Statement,
-    main_cascades,
-    main_windows,
-    statements,
-    symmetric_mains,
-)
+from designer.paper.statements import main_cascades, main_windows, statements, symmetric_mains
 from designer.report import bifurcation_plots
 
 FORMAT = 1
@@ -69,7 +63,7 @@ SHARED = (1.55, 1.505, 1.43, 1.35, 0.85, 0.77, 0.54, 0.41, 0.25, 0.225)
 STARTS = 64
 """Initial states tried at each of them."""
 NAMES = frozenset(
-    ["README.md", DATA, "branches.parquet", *(f"{name}.parquet" for name in FIGURES)]
+    [README, DATA, "branches.parquet", *(f"{name}.parquet" for name in FIGURES)]
     + [f"{name}.{kind}" for name in ("branches", "fig3", *FIGURES) for kind in ("png", "svg")]
 )
 """Of the report's files."""
@@ -95,27 +89,6 @@ class DynamicsExtent:
     """ω at which the impacts of the response from rest are counted."""
 
 
-@dataclass(frozen=True)
-class Dynamics:
-    """Everything that was found."""
-
-    found: Survey
-    """The branches, with their bifurcation points."""
-    windows: tuple[BranchWindow, ...]
-    """The windows in which responses are stable."""
-    cascades: Mapping[int, Cascade]
-    """Period-doubling cascades by p of the main window."""
-    after: Mapping[tuple[int, str], str]
-    """Response right beyond an end of a main window, by its p and "S low", "S high", "AS low" or
-    "AS high"."""
-    shared: Mapping[float, tuple[str, ...]]
-    """By ω, the coexisting responses."""
-    chatter: tuple[tuple[float, Orbit], ...]
-    """(ω, orbit) of the response from rest."""
-    statements: tuple[Statement, ...]
-    """What the paper says, and what was found."""
-
-
 def reproduce(
     out: Path,
     *,
@@ -133,7 +106,7 @@ def reproduce(
         Nothing is written then.
     """
     extent = DynamicsExtent() if extent is None else extent
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     try:
         out.mkdir(parents=True, exist_ok=True)
         check_ours(out, NAMES, DATA, COMMAND)
@@ -141,13 +114,15 @@ def reproduce(
         raise InputError(
             out, "--out", error.strerror or str(error), "a directory that can be written"
         ) from None
-    dynamics = measure(extent, said)
+    dynamics = measure(extent, progress)
     source = _provenance(extent)
-    text = json.dumps(_plain(dynamics, extent, source), indent=1, sort_keys=True)
-    write(out / DATA, text + "\n")  # first: it says whose folder this is
-    _parquet(out / "branches.parquet", dynamics.found, source)
-    pictures = _pictures(out, dynamics, extent, jobs, source, said)
-    write(out / "README.md", _readme(dynamics, pictures))
+    sweeps = {name: _sweep(name, jobs, progress) for name in extent.figures}
+    figures = _figures(dynamics, extent, sweeps)
+    page = dynamics_page(dynamics, figures, COMMAND, first=FIRST, starts=STARTS)
+    write_files(out, (DATA, _document(dynamics, extent, source)), page, figures, ("png", "svg"))
+    _parquet(out / "branches.parquet", dynamics.survey, source)
+    for name, made in sweeps.items():
+        write_sweep(out / f"{name}.parquet", made, source)
     return dynamics
 
 
@@ -171,110 +146,97 @@ def measure(extent: DynamicsExtent, progress: Progress) -> Dynamics:
     over = swept_model.of_model(MODEL, FIRST, "omega")
     first = settle(over.flow(FIRST), np.zeros(4))
     step = progress.stage("Branches of periodic orbits")
-    found = survey(
+    branches = survey(
         over, [(FIRST, first)], extent.low, extent.high, depth=extent.depth, progress=step
     )
-    windows = all_windows(found)
+    windows = all_windows(branches)
     after = {}
     for p in range(1, 9):
-        for one in main_windows(windows, p):
-            if one is None:
-                continue
-            kind = "S" if one.symmetric else "AS"
-            low, high = outside(over, one.low, -1.0)[1], outside(over, one.high, 1.0)[1]
-            after[p, kind + " low"], after[p, kind + " high"] = low.response, high.response
+        for one, kind in zip(main_windows(windows, p), KINDS, strict=True):
+            if one is not None:
+                after[p, f"{kind} low"] = outside(over, one.low, -1.0)[1].response
+                after[p, f"{kind} high"] = outside(over, one.high, 1.0)[1].response
     step = progress.stage("Coexisting attractors", len(extent.shared))
-    shared = {w: tuple(_coexisting(w, step)) for w in extent.shared}
+    shared = {}
+    for omega in extent.shared:
+        shared[omega] = _coexisting(omega)
+        step()
     chatter = tuple((w, settle(over.flow(w), np.zeros(4))) for w in extent.chatter)
     mains = symmetric_mains(windows)
     between = gaps(MODEL, mains, progress=progress.stage("Between the windows", len(mains) - 1))
-    said = statements(found, windows, between, chatter)
     return Dynamics(
-        found, tuple(windows), main_cascades(windows), after, shared, chatter, tuple(said)
+        branches,
+        tuple(windows),
+        main_cascades(windows),
+        after,
+        shared,
+        chatter,
+        tuple(statements(branches, windows, between, chatter)),
     )
 
 
-def _coexisting(omega: float, progress: Callable[[], None]) -> list[str]:
-    over = swept_model.of_model(MODEL, omega, "omega")
-    met = coexisting(over.flow(omega), starts(scale_of(MODEL, omega), STARTS))
-    progress()
-    return [_named(orbit) for orbit in met]
+def _coexisting(omega: float) -> tuple[str, ...]:
+    flow = swept_model.of_model(MODEL, omega, "omega").flow(omega)
+    return tuple(map(_named, coexisting(flow, starts(scale_of(MODEL, omega), STARTS))))
 
 
 def _named(orbit: Orbit) -> str:
     return orbit.response + (" (AS)" if orbit.symmetric is False and orbit.p == orbit.q else "")
 
 
-def _pictures(
-    out: Path,
-    dynamics: Dynamics,
-    extent: DynamicsExtent,
-    jobs: int,
-    source: Mapping[str, Any],
-    progress: Progress,
-) -> list[str]:
-    """Draw everything; names of the pictures without their endings. Sweeps are written too."""
-    drawn = {
-        "branches": dynamics_pictures.branches(dynamics.found, extent.low, extent.high),
+def _sweep(name: str, jobs: int, progress: Progress) -> sweep.Sweep:
+    low, high, steps = FIGURES[name]
+    values = np.linspace(low, high, steps)
+    plan = sweep.SweepPlan(ModelSubject(MODEL), "omega", values, **sweep.follow("down", "up"))
+    return sweep.run(plan, jobs, progress=progress.stage(f"Sweep for {name}"))
+
+
+def _figures(
+    dynamics: Dynamics, extent: DynamicsExtent, sweeps: Mapping[str, sweep.Sweep]
+) -> dict[str, Figure]:
+    figures = {
+        "branches": dynamics_pictures.branches(dynamics.survey, extent.low, extent.high),
         "fig3": dynamics_pictures.portraits(_portraits(dynamics)),
     }
-    for name in extent.figures:
-        low, high, steps = FIGURES[name]
-        plan = sweep.SweepPlan(
-            ModelSubject(MODEL),
-            "omega",
-            np.linspace(low, high, steps),
-            **sweep.follow("down", "up"),
-        )
-        made = sweep.run(plan, jobs, progress=progress.stage(f"Sweep for {name}"))
-        write_sweep(out / f"{name}.parquet", made, source)
-        marks = bifurcation_plots.marks(dynamics.found.points, low, high)
+    for name, made in sweeps.items():
+        marks = bifurcation_plots.marks(dynamics.survey.points, *FIGURES[name][:2])
         shown = marks if name != "fig2a" else ()
-        drawn[name] = bifurcation_plots.diagram(made, shown, TITLE)
-    for name, figure in drawn.items():
-        png = io.BytesIO()
-        to_png(figure, png)
-        write(out / f"{name}.png", png.getvalue())
-        write(out / f"{name}.svg", to_svg(figure))
-    return list(drawn)
+        figures[name] = bifurcation_plots.diagram(made, shown, TITLE)
+    return figures
 
 
 def _portraits(dynamics: Dynamics) -> dict[int, list[Portrait]]:
     """For each p the symmetric response and the twins, in the middle of their main windows."""
-    over = dynamics.found.branches[0].curve.family
+    over = dynamics.survey.branches[0].curve.family
     panels: dict[int, list[Portrait]] = {}
     for p in range(1, 9):
-        for one in main_windows(dynamics.windows, p):
+        for one, kind in zip(main_windows(dynamics.windows, p), ("", " AS"), strict=True):
             if one is None:
                 continue
-            middle = 0.5 * (one.low.value + one.high.value)
-            branch = dynamics.found.branches[one.branch]
+            low, high = one.low.value, one.high.value
             inside = [
                 q
-                for q in branch.points
-                if q.stable and q.response == one.response
-                and one.low.value <= q.value <= one.high.value
-            ]  # fmt: skip
+                for q in dynamics.survey.branches[one.branch].points
+                if q.stable and q.response == one.response and low <= q.value <= high
+            ]
             if not inside:
                 continue
-            point = min(inside, key=lambda q: abs(q.value - middle))
+            point = min(inside, key=lambda q: abs(q.value - 0.5 * (low + high)))
             flow = over.flow(point.value)
-            curve = flow.run(point.orbit.start, point.orbit.n, points=800).strobes[:, :2]
-            other = None if one.symmetric else twin(flow, point.orbit)
-            panels.setdefault(p, []).append(
-                Portrait(
-                    f"{one.response}{'' if one.symmetric else ' AS'}, ω = {point.value:.4f}",
-                    MODEL.b,
-                    curve,
-                    None
-                    if other is None
-                    else flow.run(other.start, other.n, points=800).strobes[:, :2],
-                )
-            )
+            orbits = [point.orbit, None if one.symmetric else twin(flow, point.orbit)]
+            curves = [
+                flow.run(orbit.start, orbit.n, points=800).strobes[:, :2]
+                for orbit in orbits
+                if orbit is not None
+            ]
+            title = f"{one.response}{kind}, ω = {point.value:.4f}"
+            panels.setdefault(p, []).append(Portrait(title, MODEL.b, tuple(curves)))
     return panels
 
 
-def _plain(dynamics: Dynamics, extent: DynamicsExtent, said: Mapping[str, Any]) -> dict[str, Any]:
+def _document(
+    dynamics: Dynamics, extent: DynamicsExtent, source: Mapping[str, Any]
+) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "command": COMMAND,
@@ -282,22 +244,22 @@ def _plain(dynamics: Dynamics, extent: DynamicsExtent, said: Mapping[str, Any]) 
         "from": extent.low,
         "to": extent.high,
         "windows": [w.as_dict() for w in dynamics.windows],
-        "points": [{**p.as_dict(), "caption": caption(p, "ω")} for p in dynamics.found.points],
+        "points": [{**p.as_dict(), "caption": caption(p, "ω")} for p in dynamics.survey.points],
         "cascades": {str(p): c.as_dict() for p, c in dynamics.cascades.items()},
-        "coexisting": {f"{w:g}": list(names) for w, names in dynamics.shared.items()},
+        "coexisting": {f"{w:g}": names for w, names in dynamics.shared.items()},
         "from_rest": {f"{w:g}": orbit.response for w, orbit in dynamics.chatter},
-        "statements": [s.as_dict() for s in dynamics.statements],
-        "provenance": dict(said),
+        "statements": [asdict(s) for s in dynamics.statements],
+        "provenance": dict(source),
     }
 
 
-def _parquet(path: Path, found: Survey, said: Mapping[str, Any]) -> None:
+def _parquet(path: Path, branches: Survey, source: Mapping[str, Any]) -> None:
     """Every followed orbit, one row each."""
     rows = [
         {
             "branch": number,
-            "parent": found.parents[number],
-            found.parameter: point.value,
+            "parent": branches.parents[number],
+            branches.parameter: point.value,
             "response": point.response,
             "symmetric": branch.curve.symmetric,
             "stable": point.stable,
@@ -306,103 +268,11 @@ def _parquet(path: Path, found: Survey, said: Mapping[str, Any]) -> None:
             "x1_max": float(point.orbit.extremes[0, 1]),
             "start": [float(x) for x in point.orbit.start],
         }
-        for number, branch in enumerate(found.branches)
+        for number, branch in enumerate(branches.branches)
         for point in branch.points
     ]
-    table = pa.Table.from_pylist(rows)
-    note = json.dumps({"format": FORMAT, "provenance": dict(said)}, sort_keys=True)
+    note = json.dumps({"format": FORMAT, "provenance": dict(source)}, sort_keys=True)
     content = io.BytesIO()
-    pq.write_table(table.replace_schema_metadata({"designer": note}), content)
+    table = pa.Table.from_pylist(rows).replace_schema_metadata({"designer": note})
+    pq.write_table(table, content)
     write(path, content.getvalue())
-
-
-def _readme(dynamics: Dynamics, pictures: Sequence[str]) -> str:
-    lines = [
-        "# The paper's Sections 3 and 4, measured",
-        "",
-        f"Made by `{COMMAND}`; the data are in `dynamics.json` and `branches.parquet`.",
-        "",
-        "The model is the corrected Eq. (4) with the paper's parameters; ω falls from right to "
-        "left. Points and ends of windows are located on the exact flow, to 1e-8 or better; five "
-        "digits are shown. S is symmetric, AS stands for the two asymmetric twins.",
-        "",
-        "## What the paper says, and what is found",
-        "",
-        "| paper | found | verdict | shown by |",
-        "|---|---|---|---|",
-    ]
-    lines += [
-        f"| {s.paper} | {s.found} | **{s.verdict}** | `{s.command}` |" for s in dynamics.statements
-    ]
-    lines += ["", "## Windows of 1-p-p", ""]
-    lines += [
-        "The widest window of each kind on the branches followed: the symmetric branch through "
-        f"1-1-1 at ω = {FIRST}, and what leaves it. Responses that these do not lead to are not "
-        "looked for here; *What coexists* shows some. What lies outside is what the last orbit "
-        "settles to 5e-4 (relative) past the end.",
-        "",
-        "| p | kind | from ω | ended by | outside | to ω | ended by | outside |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for p in range(1, 9):
-        for one, kind in zip(main_windows(dynamics.windows, p), ("S", "AS"), strict=True):
-            if one is None:
-                lines.append(f"| {p} | {kind} | none on the branches followed | | | | | |")
-                continue
-            low, high = dynamics.after[p, f"{kind} low"], dynamics.after[p, f"{kind} high"]
-            lines.append(
-                f"| {p} | {kind} | {one.low.value:.5f} | {one.low.why} | {low} | "
-                f"{one.high.value:.5f} | {one.high.why} | {high} |"
-            )
-    lines += ["", "## Cascades", "", "From the main symmetric window of each p, as ω falls:", ""]
-    lines += [f"- {c.describe()}" for c in dynamics.cascades.values()]
-    lines += ["", "## What coexists", ""]
-    lines += [
-        f"From {STARTS} starts at each ω (mirror twins count as one, aperiodic motions are not "
-        "told apart):",
-        "",
-        "| ω | attractors |",
-        "|---|---|",
-    ]
-    lines += [f"| {w:g} | {', '.join(names)} |" for w, names in dynamics.shared.items()]
-    lines += ["", "## Narrower windows of 1-p-p and other responses of period 1", ""]
-    lines += ["| response | from ω | ended by | to ω | ended by |", "|---|---|---|---|---|"]
-    main = [w for p in range(1, 9) for w in main_windows(dynamics.windows, p)]
-    for w in dynamics.windows:
-        if w not in main and w.response.startswith("1-"):
-            lines.append(
-                f"| {w.response} {'S' if w.symmetric else 'AS'} | {w.low.value:.6f} | {w.low.why} "
-                f"| {w.high.value:.6f} | {w.high.why} |"
-            )
-    lost = sum(b.ends.count(End.LOST) for b in dynamics.found.branches)
-    unseen = [w for w in dynamics.windows if NOT_LOCATED in (w.low.why, w.high.why)]
-    lines += ["", "## Pictures", ""]
-    lines.append(
-        f"{len(dynamics.found.branches)} branches were followed, {sum(_lengths(dynamics))} orbits "
-        f"in all; {lost} of their ends are for want of convergence. {len(unseen)} of the "
-        f"{len(dynamics.windows)} windows, those of longer periods included, end where no "
-        f"bifurcation was located{_named_windows(unseen)}.\n"
-    )
-    lines += [f"![{_CAPTIONS[name]}]({name}.png)\n\n{_CAPTIONS[name]}\n" for name in pictures]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _named_windows(windows: Sequence[BranchWindow]) -> str:
-    if not windows:
-        return ""
-    names = [f"{w.response} from ω = {w.low.value:.6f} to {w.high.value:.6f}" for w in windows]
-    return f" ({'; '.join(names)})"
-
-
-def _lengths(dynamics: Dynamics) -> list[int]:
-    return [len(branch.points) for branch in dynamics.found.branches]
-
-
-_CAPTIONS = {
-    "branches": "Followed branches: least x1 of each orbit over ω; solid where stable.",
-    "fig3": "Fig. 3: phase portraits of 1-p-p, symmetric and as twins in black and red; shaded: "
-    "contact.",
-    "fig2a": "Fig. 2(a): ω from 0.1 to 1.8, attractor followed down and up.",
-    "fig2b": "Fig. 2(b): the windows at low ω.",
-    "fig2c": "Fig. 2(c): around the pitchfork of 1-1-1.",
-}

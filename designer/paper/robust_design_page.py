@@ -78,7 +78,7 @@ def lever_chart(cases: Sequence[Case]) -> Figure:
 def robust_design_page(cases: Sequence[Case], command: str, model: str) -> Page:
     """``README.md`` of the report."""
     searched = [case for case in cases if "search" in case]
-    head = [
+    head: list[Block] = [
         Markup(
             f"Made by `{command}` from `examples/{model}`. Boards are those of `bench-1`, 1 % "
             "resistors and capacitors; those of the searches are drawn from a stream that no study "

@@ -39,9 +39,6 @@ class Statement:
     command: str
     """The command line that shows it."""
 
-    def as_dict(self) -> dict[str, object]:
-        return dict(self.__dict__)
-
 
 def main_windows(
     windows: Sequence[BranchWindow], p: int

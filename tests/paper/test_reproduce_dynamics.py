@@ -31,7 +31,8 @@ from designer.dynamics.orbit import failed
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model_file import read_model_file
 from designer.paper import reproduce_dynamics
-from designer.paper.reproduce_dynamics import Dynamics, DynamicsExtent, measure, reproduce
+from designer.paper.dynamics_page import Dynamics
+from designer.paper.reproduce_dynamics import DynamicsExtent, measure, reproduce
 from designer.paper.response_order import Gap, faults, gaps
 from designer.paper.statements import (
     AGREES,
@@ -259,7 +260,7 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
     found = reproduce(out, extent=few)
     data = json.loads((out / "dynamics.json").read_text(encoding="utf-8"))
     captions = [p.pop("caption") for p in data["points"]]
-    assert data["points"] == [p.as_dict() for p in found.found.points]
+    assert data["points"] == [p.as_dict() for p in found.survey.points]
     assert all(
         f" at ω = {p['value']:.9g}: " in c for p, c in zip(data["points"], captions, strict=True)
     )
@@ -276,7 +277,7 @@ def test_the_folder_holds_what_was_found(tmp_path: Path, monkeypatch: pytest.Mon
         "provenance"
     ] == json.loads(json.dumps(said))
     rows = pq.read_table(out / "branches.parquet").to_pylist()
-    assert len(rows) == sum(len(b.points) for b in found.found.branches)
+    assert len(rows) == sum(len(b.points) for b in found.survey.branches)
     text = (out / "README.md").read_text(encoding="utf-8")
     assert text.splitlines()[2].startswith("Made by `designer reproduce dynamics")
     pictures = re.findall(r"\((\w+\.png)\)", text)
