@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, new_figure, styled
-from designer.base.page import Block, Page, PageSection, Picture, SmallPrint, Table, table
+from designer.base.page import Block, Page, PageSection, Picture, Table, table
 
 Case = Mapping[str, Any]
 COLOURS = ("#b0b0b0", "#e69f00", "#56b4e9", "#009e73", "#0072b2")
@@ -93,13 +93,12 @@ def robust_design_page(cases: Sequence[Case], command: str, model: str) -> Page:
         "with one lever moved to where the search put it, and of the found design with it moved "
         "back.",
     ]
-    for case in searched:
-        levers += [SmallPrint(case["name"]), _levers(case["search"]["contributions"])]
+    levers += [PageSection(c["name"], [_levers(c["search"]["contributions"])]) for c in searched]
     confirmed = [case for case in cases if "confirmation" in case]
     sections = [
         PageSection("Yields", _yields(cases)),
-        PageSection("On ngspice", [b for case in confirmed for b in _ngspice(case)]),
-        PageSection("Places", [b for c in searched for b in (SmallPrint(c["name"]), _places(c))]),
+        PageSection("On ngspice", [_ngspice(case) for case in confirmed]),
+        PageSection("Places", [PageSection(c["name"], [_places(c)]) for c in searched]),
         PageSection("Blame", [_blame(cases)]),
         PageSection("Price and parts", [_bills(cases)]),
         PageSection("What each lever is worth", levers),
@@ -132,7 +131,7 @@ def _yields(cases: Sequence[Case]) -> list[Block]:
     return out
 
 
-def _ngspice(case: Case) -> list[Block]:
+def _ngspice(case: Case) -> PageSection:
     """What ngspice says of the same boards."""
     answer = case["confirmation"]
     rows = []
@@ -141,7 +140,7 @@ def _ngspice(case: Case) -> list[Block]:
         gate = "passed" if passed else "not passed"
         rows.append((known["expect"], gate, str(row["asked"]), str(row["agreed"])))
     columns = ("response", "numerics gate", "boards asked", "agree")
-    return [SmallPrint(f"{case['name']}, rung {answer['rung']}"), table(columns, rows)]
+    return PageSection(f"{case['name']}, rung {answer['rung']}", [table(columns, rows)])
 
 
 def _places(case: Case) -> Table | None:

@@ -34,13 +34,6 @@ LAZY = {
         ("jobs.synthesise_job", "report.simulate_plots"),
         ("jobs.trade_job", "base.figure_style"),
         ("jobs.trade_job", "fidelity.trade_files"),
-        ("paper.reproduce_circuit", "base.figure_style"),
-        ("paper.reproduce_circuit", "paper.circuit_page"),
-        ("paper.reproduce_circuit", "paper.circuit_pictures"),
-        ("paper.reproduce_tolerance", "base.figure_style"),
-        ("paper.reproduce_tolerance", "paper.tolerance_page"),
-        ("paper.robust_design", "base.figure_style"),
-        ("paper.robust_design", "paper.robust_design_page"),
     },
     STARTS: {
         ("jobs.json_answers", "circuit.design"),
