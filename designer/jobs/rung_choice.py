@@ -22,7 +22,6 @@ from designer.fidelity.rung_errors import BOARD
 from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
 from designer.jobs.options import Options
-from designer.yields.ngspice_sampling import NOMINAL_SAMPLES, OWN_SAMPLES
 from designer.yields.study_layers import RUNGS, RungName
 
 TRADE = "trade.json"
@@ -30,7 +29,7 @@ TRADE = "trade.json"
 SEARCH = "search.json"
 """What ``jobs.search_job`` writes."""
 EARLIER = " (of the design that stood here before the search)"
-LEAST = min(OWN_SAMPLES, NOMINAL_SAMPLES)
+LEAST = 40
 """Boards of each response that ngspice is asked about, whatever a trade says."""
 
 

@@ -33,7 +33,7 @@ from designer.jobs import design_files, folder_numbers, rung_choice, synthesise_
 from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
-from designer.jobs.rung_choice import SEARCH
+from designer.jobs.rung_choice import LEAST, SEARCH
 from designer.jobs.study_folder import FolderStores
 from designer.jobs.study_job import run_into
 from designer.jobs.study_stage import SPICE_TIMEOUT
@@ -51,7 +51,7 @@ from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields import ngspice_runs
 from designer.yields.limiting_parts import limitings
-from designer.yields.ngspice_sampling import OWN_SAMPLES, Ask, StartKind, Why
+from designer.yields.ngspice_sampling import Ask, StartKind, Why
 from designer.yields.study_layers import RungName
 from designer.yields.tolerance_study import check, tolerance
 from designer.yields.verdict import Answer, Verdict
@@ -242,7 +242,7 @@ def _confirmed(
         "seed": options.seed,
         "samples": options.samples,
         "rung": RUNG,
-        "boards": OWN_SAMPLES,
+        "boards": LEAST,
         **grade_inputs(modelfile, catalog),
     }
     wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
@@ -313,12 +313,12 @@ def _confirm(
 
 
 def to_confirm(answers: Iterable[Answer]) -> list[Ask]:
-    """The first `OWN_SAMPLES` boards of each response that the exact circuit has an answer to, from
+    """The first `LEAST` boards of each response that the exact circuit has an answer to, from
     their own orbit: one without is replaced by the next."""
     count: Counter[int] = Counter()
     asks = []
     for a in sorted(answers, key=lambda a: (a.question, a.sample)):
-        if a.verdict is not Verdict.FAILED and count[a.question] < OWN_SAMPLES:
+        if a.verdict is not Verdict.FAILED and count[a.question] < LEAST:
             count[a.question] += 1
             asks.append(Ask(a.sample, a.question, StartKind.OWN, Why.RANDOM))
     return asks

@@ -12,8 +12,10 @@ settings. What was tried stands in the outcome, whether it helped or not.
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, Literal, TypeVar
 
@@ -22,6 +24,8 @@ from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob
 
 T = TypeVar("T")
+R = TypeVar("R")
+J = TypeVar("J")
 
 Remedy = Literal["step", "method", "tolerance", "start"]
 REMEDIES: tuple[Remedy, ...] = ("step", "method", "tolerance", "start")
@@ -67,36 +71,67 @@ def did_not_converge(failure: SimulationFailed) -> bool:
 
 
 def run(
-    pool: SpicePool, tasks: Sequence[Task[T]], allowed: Sequence[Remedy] = REMEDIES
+    pool: SpicePool, tasks: Iterable[Task[T] | None], allowed: Sequence[Remedy] = REMEDIES
 ) -> Iterator[tuple[int, AidedRun[T]]]:
     """Run tasks and yield ``(index, outcome)`` as they finish, in no certain order.
 
-    All tasks are run first; those that did not converge go on to the next remedy together, so
-    that the workers stay busy. ``allowed`` : in the order of `REMEDIES`.
+    A run that did not converge is made again with the next remedy before another task begins.
+
+    Parameters
+    ----------
+    tasks : taken as the jobs of `SpicePool.map`, with None where the next task depends on an
+        outcome that is still to come.
+    allowed : in the order of `REMEDIES`.
 
     Raises
     ------
     EnvironmentMissing : see `SpicePool.map`.
     """
-    tried: tuple[Remedy, ...] = ()
-    left = list(range(len(tasks)))
-    for remedy in (None, *allowed):
-        tried = tried if remedy is None else (*tried, remedy)
-        changed = [_changed(tasks[i].settings, tried) for i in left]
-        jobs = (
-            tasks[i].make(settings, nudge)
-            for i, (settings, nudge) in zip(left, changed, strict=True)
-        )
-        again = []
-        for k, result in pool.map(jobs):
-            curable = isinstance(result, SimulationFailed) and did_not_converge(result)
-            if curable and len(tried) < len(allowed):
-                again.append(left[k])
-            else:
-                yield left[k], AidedRun(result, changed[k][0], tried)
-        left = sorted(again)
-        if not left:
-            return
+    first = (None if task is None else (task, ()) for task in tasks)
+    queue: RunQueue[tuple[Task[T], tuple[Remedy, ...]], SpiceJob[T]] = RunQueue(first, _job)
+    for number, result in pool.map(queue):
+        index, (task, tried) = queue.ended(number)
+        curable = isinstance(result, SimulationFailed) and did_not_converge(result)
+        if curable and len(tried) < len(allowed):
+            queue.again.append((index, (task, (*tried, allowed[len(tried)]))))
+        else:
+            yield index, AidedRun(result, _changed(task.settings, tried)[0], tried)
+
+
+class RunQueue(Iterator[J | None], Generic[R, J]):
+    """Runs as a pool takes them, those that follow from another first; ``make`` makes the job.
+
+    It gives None while there is none but one may follow from those under way.
+    """
+
+    def __init__(self, first: Iterator[R | None], make: Callable[[R], J]) -> None:
+        self.again: deque[tuple[int, R]] = deque()
+        """Runs that follow from others, each with the index in ``first`` of the one it began as."""
+        self._first, self._make = first, make
+        self._indices, self._numbers = itertools.count(), itertools.count()
+        self._begun: dict[int, tuple[int, R]] = {}
+
+    def __next__(self) -> J | None:
+        if self.again:
+            index, run = self.again.popleft()
+        else:
+            new = next(self._first, None)
+            if new is None:
+                if self._begun:
+                    return None
+                raise StopIteration
+            index, run = next(self._indices), new
+        self._begun[next(self._numbers)] = index, run
+        return self._make(run)
+
+    def ended(self, number: int) -> tuple[int, R]:
+        """The run that was taken as so many-th, with its index; it is then forgotten."""
+        return self._begun.pop(number)
+
+
+def _job(run: tuple[Task[T], tuple[Remedy, ...]]) -> SpiceJob[T]:
+    task, tried = run
+    return task.make(*_changed(task.settings, tried))
 
 
 def _changed(settings: SolverSettings, remedies: Sequence[Remedy]) -> tuple[SolverSettings, float]:

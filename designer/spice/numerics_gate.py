@@ -33,7 +33,7 @@ from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import Rung, limit_into
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import Read, Reading, read
+from designer.spice.read_orbit import BRIEF, Read, Reading, read
 from designer.spice.simulator import SimulationFailed, SpiceJob
 
 STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 20
@@ -147,6 +147,9 @@ class GateSubject:
     """The op-amps' model in ngspice."""
     judged: int = 0
     """Periods that are judged at least."""
+    brief: bool = False
+    """Whether half as many strobes may show that there is no period, where the exact circuit has
+    none."""
 
     @property
     def circuit(self) -> Circuit:
@@ -198,6 +201,7 @@ def job(
         generator=subject.circuit.generator.net,
         moving=subject.system.displacement[0] if subject.system.displacement else 0,
         keep=keep,
+        brief=subject.brief and not subject.orbit.n,
     )
     text = deck.write(
         subject.circuit,
@@ -218,7 +222,8 @@ def job(
 
 def length(subject: GateSubject) -> int:
     """Drive periods that the run of a subject takes."""
-    judged = max(4 * (subject.orbit.n or MAX_PERIOD), subject.judged)
+    unperiodic = BRIEF if subject.brief else 4 * MAX_PERIOD
+    judged = max(4 * subject.orbit.n or unperiodic, subject.judged)
     return max(subject.discard + judged, SHORTEST)
 
 

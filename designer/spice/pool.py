@@ -14,6 +14,7 @@ usual ``if __name__ == "__main__":``, as every user of spawn does.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -99,11 +100,15 @@ class SpicePool:
         """End all workers at once and remove their folders. May be called twice."""
         self._cleanup()
 
-    def map(self, jobs: Iterable[SpiceJob[T]]) -> Iterator[tuple[int, T | SimulationFailed]]:
+    def map(self, jobs: Iterable[SpiceJob[T] | None]) -> Iterator[tuple[int, T | SimulationFailed]]:
         """Run jobs and yield ``(index, result)`` as they finish, in no certain order.
 
         Jobs are taken from the iterable only as workers become free. Giving the iterator up early
         ends the jobs under way.
+
+        Parameters
+        ----------
+        jobs : any number of them; None where the next depends on a result that is still to come.
 
         Raises
         ------
@@ -116,23 +121,24 @@ class SpicePool:
             raise RuntimeError("this pool is at work: finish or close the other iterator first")
         self._mapping = True
         try:
-            yield from self._results(enumerate(jobs))
+            yield from self._results(iter(jobs))
         finally:
             for worker in [w for w in self._workers if w.task is not None]:
                 self._discard(worker)
             self._mapping = False
 
     def _results(
-        self, source: Iterator[tuple[int, SpiceJob[T]]]
+        self, source: Iterator[SpiceJob[T] | None]
     ) -> Iterator[tuple[int, T | SimulationFailed]]:
         waiting: deque[_Task] = deque()
+        numbers = itertools.count()
         while True:
             busy = sum(w.task is not None for w in self._workers)
             while len(waiting) < self._jobs - busy:
-                indexed = next(source, None)
-                if indexed is None:
+                job = next(source, None)
+                if job is None:
                     break
-                waiting.append(_Task(indexed[0], pickle.dumps(indexed[1])))
+                waiting.append(_Task(next(numbers), pickle.dumps(job)))
             if not waiting and not busy:
                 return
             self._hand_out(waiting)

@@ -17,6 +17,9 @@ from designer.spice.simulator import Waveforms
 
 STROBE_TOLERANCE = 2e-3
 """Of the peak of each state."""
+BRIEF = 2 * MAX_PERIOD
+"""Drive periods in which no strobe of the second half need be like one before it, whatever the
+period: the shortest proof that there is none."""
 ENGINE_ERROR = 5e-4
 """Of the peak of the moving state: contacts shallower, misses nearer than this are undecided."""
 
@@ -45,6 +48,9 @@ class Reading:
     """Index of the state that moves in the clearance."""
     keep: bool = False
     """Whether to return a trace."""
+    brief: bool = False
+    """Whether `BRIEF` periods may show that there is no period, instead of four times the longest;
+    for a board that has none on the exact circuit."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,7 @@ class Read:
 
 
 def read(waveforms: Waveforms, reading: Reading) -> Read:
-    """Classify the run after ``guarded_reading.discard`` periods."""
+    """Classify the run after ``reading.discard`` periods."""
     time = waveforms.axis
     x = np.stack([waveforms.signals[net] for net in reading.nets], axis=1) - reading.shift
     last = int(np.floor(time[-1] / reading.period * (1.0 + 1e-9)))
@@ -75,6 +81,8 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
     n = _period(strobes, peak)
     if n == 0:
         tried = (len(strobes) - 1) // 4
+        if reading.brief and _never_repeats(strobes, peak):
+            tried = MAX_PERIOD
         status = OrbitStatus.APERIODIC if tried >= MAX_PERIOD else OrbitStatus.NOT_SETTLED
         reason = f"no period up to {min(tried, MAX_PERIOD)} in {len(strobes)} strobes"
         return Read(
@@ -139,6 +147,17 @@ def _period(strobes: Array, peak: Array) -> int:
         if (gap <= STROBE_TOLERANCE * peak).all():
             return n
     return 0
+
+
+def _never_repeats(strobes: Array, peak: Array) -> bool:
+    """Whether each period up to the longest is missed by a strobe of the last `MAX_PERIOD`."""
+    if len(strobes) <= BRIEF:
+        return False
+    last, tolerance = strobes[-MAX_PERIOD:], STROBE_TOLERANCE * peak
+    return all(
+        bool((np.abs(last - strobes[-MAX_PERIOD - n : -n]) > tolerance).any())
+        for n in range(1, MAX_PERIOD + 1)
+    )
 
 
 def _entries(t: Array, g: Array) -> tuple[Array, float, float]:

@@ -161,23 +161,43 @@ def listen(
     before: dict[int, list[Hearing]] = {}
     for h in known:
         before.setdefault(h.sample // CHUNK, []).append(h)
-    rows: list[Hearing] = []
-    for number, here in sorted(wanted.items()):
+    held: dict[int, dict[tuple[int, int, str], Hearing]] = {}
+    missing: dict[int, list[Ask]] = {}
+    for number, here in wanted.items():
         block = range(number * CHUNK, (number + 1) * CHUNK)
-        held = {_order(h): h for h in (store.read(block) if store is not None else ())}
-        held |= {_order(h): h for h in before.get(number, ())}
-        missing = [ask for ask in here if _order(ask) not in held]
-        for _ in range(len(here) - len(missing)):
+        rows = [*(store.read(block) if store is not None else ()), *before.get(number, ())]
+        held[number] = {_order(row): row for row in rows}
+        missing[number] = [ask for ask in here if _order(ask) not in held[number]]
+        for _ in range(len(here) - len(missing[number])):
             step()
-        if missing:
-            held |= {_order(h): h for h in ngspice_runs.hear(plan, missing, pool, jobs, step)}
-        heard = [replace(held[_order(ask)], why=ask.why) for ask in here if _order(ask) in held]
-        held |= {_order(h): h for h in heard}
-        _put(store, block, heard if last else [held[key] for key in sorted(held)])
-        rows += heard
+
+    def finish(number: int) -> None:
+        mine = held[number]
+        for ask in wanted[number]:
+            if _order(ask) in mine:
+                mine[_order(ask)] = replace(mine[_order(ask)], why=ask.why)
+        if last:
+            mine = {_order(ask): mine[_order(ask)] for ask in wanted[number] if _order(ask) in mine}
+        block = range(number * CHUNK, (number + 1) * CHUNK)
+        _put(store, block, [mine[key] for key in sorted(mine)])
+
+    todo = [ask for asks in missing.values() for ask in asks]
+    left = {number: len(asks) for number, asks in missing.items()}
+    for number in [n for n, count in left.items() if not count]:
+        finish(number)
+    for k, row in ngspice_runs.answered(plan, missing.values(), pool, jobs):
+        number = todo[k].sample // CHUNK
+        if row is not None:
+            held[number][_order(row)] = row
+            step()
+        left[number] -= 1
+        if not left[number]:
+            finish(number)
     if store is not None:
         store.say_ignored()
-    return rows
+    return [
+        held[n][_order(ask)] for n, here in wanted.items() for ask in here if _order(ask) in held[n]
+    ]
 
 
 def held(

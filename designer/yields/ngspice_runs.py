@@ -9,8 +9,10 @@ takes to come within `REMAINDER` of its attractor. `yields.ngspice_sampling` say
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from designer.base.arrays import Array
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.spice import convergence_aids as remedies, numerics_gate
+from designer.spice.convergence_aids import RunQueue, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
@@ -27,6 +30,8 @@ from designer.spice.simulator import SimulationFailed
 from designer.yields import exact_rung
 from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, StartKind, is_answer
 from designer.yields.verdict import StudyPlan
+
+T = TypeVar("T")
 
 UNKNOWN_PERIODS = 20
 """Drive periods for a sample without a period: 64 more follow, in which none must be found."""
@@ -60,6 +65,11 @@ class Query:
     refinements: int = OWN_REFINEMENTS
     """How often the step is halved at most."""
 
+    @property
+    def steps(self) -> float:
+        """Steps of the run, which its time goes with."""
+        return numerics_gate.length(self.subject) * self.subject.period / self.settings.max_step
+
 
 @dataclass(frozen=True)
 class NgspiceAnswer:
@@ -87,49 +97,108 @@ def hear(
     rung: Rung = "ideal",
     refinements: int = NOMINAL_REFINEMENTS,
 ) -> list[Hearing]:
-    """ngspice's answers, in the order of ``asks``; ``progress`` is called once for each.
+    """ngspice's answers in the order of ``asks``, without those that cannot be asked; see
+    `answered`. progress : called once for each answer."""
+    answers: dict[int, Hearing] = {}
+    for k, answer in answered(plan, [asks], pool, jobs, rung=rung, refinements=refinements):
+        if answer is not None:
+            answers[k] = answer
+            progress()
+    return [answers[k] for k in sorted(answers)]
 
-    The exact rung is asked again for the boards in question: where to start and how long to run
-    is its to say. refinements : of runs from the nominal orbit. rung : the op-amps' model. Above
-    ``ideal`` a board's own orbit is only near ngspice's, so that as many periods are discarded as
-    shrink a deviation to a hundredth.
+
+def answered(
+    plan: StudyPlan,
+    blocks: Iterable[Sequence[Ask]],
+    pool: SpicePool,
+    jobs: int,
+    *,
+    rung: Rung = "ideal",
+    refinements: int = NOMINAL_REFINEMENTS,
+) -> Iterator[tuple[int, Hearing | None]]:
+    """ngspice's answers as they come, with the number of the ask, counted through all blocks.
+
+    The exact rung is asked again for the boards of a block, before the last runs of the block
+    before have ended: where to start and how long to run is its to say. Of a block the longest
+    runs come first.
+
+    Parameters
+    ----------
+    rung : the op-amps' model. Above ``ideal`` a board's own orbit is only near ngspice's, so that
+        as many periods are discarded as shrink a deviation to a hundredth.
+    refinements : how often the step is halved at most, of runs from the nominal orbit.
+
+    Yields
+    ------
+    None where the exact rung has no orbit or the response no settings.
     """
+    asked: dict[int, tuple[int, Ask]] = {}
+    known: deque[tuple[int, Hearing | None]] = deque()
+
+    def queries() -> Iterator[Query]:
+        first = 0
+        for block in blocks:
+            ready = []
+            for k, (ask, query) in enumerate(_queries(plan, block, jobs, rung, refinements), first):
+                if isinstance(query, Query):
+                    ready.append((k, ask, query))
+                else:
+                    known.append((k, query))
+            for k, ask, query in sorted(ready, key=lambda one: -one[2].steps):
+                asked[len(asked)] = k, ask
+                yield query
+            first += len(block)
+
+    for number, (query, answer) in confirmed(pool, queries()):
+        yield from _taken(known)
+        k, ask = asked[number]
+        yield k, _hearing(ask, answer, query.subject.discard)
+    yield from _taken(known)
+
+
+def _taken(items: deque[T]) -> Iterator[T]:
+    """The items, each of which is then gone."""
+    while items:
+        yield items.popleft()
+
+
+def _hearing(ask: Ask, answer: NgspiceAnswer, periods: int) -> Hearing:
+    return Hearing(
+        ask.sample,
+        ask.question,
+        ask.kind,
+        ask.why,
+        answer.response,
+        answer.reason,
+        answer.remedies,
+        periods,
+        answer.symmetric,
+        answer.either,
+    )
+
+
+def _queries(
+    plan: StudyPlan, asks: Sequence[Ask], jobs: int, rung: Rung, refinements: int
+) -> Iterator[tuple[Ask, Query | Hearing | None]]:
+    """Each ask with the run that answers it, or with what is known without one."""
     subjects = _subjects(plan, asks, jobs)
-    queries: dict[int, Query] = {}
-    heard: dict[int, Hearing] = {}
-    for k, ask in enumerate(asks):
+    for ask in asks:
         subject, question = subjects.get((ask.sample, ask.question)), plan.questions[ask.question]
         if subject is None or question.settings is None:
+            yield ask, None
             continue
         halvings = OWN_REFINEMENTS
         if ask.kind is StartKind.NOMINAL:
             way = periods_to_settle(_flow(subject), question.start.start, subject.orbit)
             if way > MOST_PERIODS:
-                heard[k] = _too_long(ask, way)
-                progress()
+                yield ask, _too_long(ask, way)
                 continue
             subject = replace(subject, start=question.start.start, discard=int(way))
             halvings = refinements
         elif rung != "ideal":
             subject = replace(subject, discard=way_to_rung(subject.orbit))
-        subject = replace(subject, rung=rung)
-        expected = subject.orbit.response
-        queries[k] = Query(subject, question.settings, expected, halvings)
-    answers = confirm(pool, list(queries.values()), progress)
-    for (k, query), said in zip(queries.items(), answers, strict=True):
-        heard[k] = Hearing(
-            asks[k].sample,
-            asks[k].question,
-            asks[k].kind,
-            asks[k].why,
-            said.response,
-            said.reason,
-            said.remedies,
-            query.subject.discard,
-            said.symmetric,
-            said.either,
-        )
-    return [heard[k] for k in sorted(heard)]
+        subject = replace(subject, rung=rung, brief=True)
+        yield ask, Query(subject, question.settings, subject.orbit.response, halvings)
 
 
 def _subjects(
@@ -221,45 +290,48 @@ def confirm(
     not settled: it is made again, longer (`longer`). Neither is done where it would take more than
     `MOST_AGAIN` periods' steps. ``progress`` is called once a query.
     """
-    heard: list[NgspiceAnswer | None] = [None] * len(queries)
-    asked = [_Try(k, q.subject, q.settings) for k, q in enumerate(queries)]
-    while asked:
-        # The longest first: the workers then end together.
-        asked.sort(key=lambda one: (-one.steps, one.query))
-        again = []
-        for i, outcome in remedies.run(
-            pool, [numerics_gate.task(t.subject, t.settings) for t in asked]
-        ):
-            tried = asked[i]
-            follows = _after(tried, queries[tried.query], _heard(outcome))
-            if isinstance(follows, _Try):
-                again.append(follows)
-            else:
-                heard[tried.query] = follows
-                progress()
-        asked = again
-    return [h for h in heard if h is not None]
+    # The longest first: the workers then end together.
+    order = sorted(range(len(queries)), key=lambda k: -queries[k].steps)
+    answers: dict[int, NgspiceAnswer] = {}
+    for number, (_, answer) in confirmed(pool, (queries[k] for k in order)):
+        answers[order[number]] = answer
+        progress()
+    return [answers[k] for k in range(len(queries))]
+
+
+def confirmed(
+    pool: SpicePool, queries: Iterable[Query]
+) -> Iterator[tuple[int, tuple[Query, NgspiceAnswer]]]:
+    """`confirm` as the answers come, with the number of the query."""
+    queue = RunQueue((_Try(q, q.subject, q.settings) for q in queries), _task)
+    for number, outcome in remedies.run(pool, queue):
+        index, tried = queue.ended(number)
+        follows = _after(tried, _heard(outcome))
+        if isinstance(follows, _Try):
+            queue.again.append((index, follows))
+        else:
+            yield index, (tried.query, follows)
 
 
 @dataclass(frozen=True)
 class _Try:
-    """A run to be made. query : its number. halved : how often its step has been. before : the last
-    answer at a larger step, None where there was none."""
+    """A run to be made. halved : how often its step has been. before : the last answer at a larger
+    step, None where there was none."""
 
-    query: int
+    query: Query
     subject: GateSubject
     settings: SolverSettings
     halved: int = 0
     before: str | None = None
 
-    @property
-    def steps(self) -> float:
-        """Steps of the run, which its time goes with."""
-        return numerics_gate.length(self.subject) * self.subject.period / self.settings.max_step
+
+def _task(tried: _Try) -> Task[Read]:
+    return numerics_gate.task(tried.subject, tried.settings)
 
 
-def _after(tried: _Try, query: Query, said: NgspiceAnswer) -> _Try | NgspiceAnswer:
-    """What is asked next, or what is heard in the end."""
+def _after(tried: _Try, said: NgspiceAnswer) -> _Try | NgspiceAnswer:
+    """What is asked next, or the answer in the end."""
+    query = tried.query
     none = not is_answer(said.response)
     if not none and said.response == (tried.before or query.expected):
         return said

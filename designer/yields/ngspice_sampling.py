@@ -21,8 +21,10 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.yields.verdict import Answer, Question, Verdict
 
-OWN_SAMPLES = 40
-"""How many samples of each response ngspice repeats from their own orbit (all, where fewer)."""
+OWN_SAMPLES = 10
+"""Of the first so many samples of each response ngspice starts those with a period from their own
+orbit too. A run from the nominal orbit that ends on the exact circuit's response shows that it
+stays there: only where it ends elsewhere, or near a boundary, does the own orbit say more."""
 NOMINAL_SAMPLES = 50
 """How many it starts from the nominal orbit, at least."""
 SLOW = 0.9
@@ -191,14 +193,13 @@ def distance(answer: Answer, nominal: Orbit) -> float:
 
 
 def ask_random(answers: Iterable[Answer], nominal: int = NOMINAL_SAMPLES) -> list[Ask]:
-    """Of the random subset: the first `OWN_SAMPLES` from their own orbit, the first ``nominal``
-    from the nominal orbit, and every slow one from there."""
+    """Of the random subset: of the first `OWN_SAMPLES` those with a period from their own orbit,
+    the first ``nominal`` from the nominal orbit, and every slow one from there."""
     asks = []
     for a in answers:
         if not _orbits(a):
             continue
-        if a.sample < OWN_SAMPLES:
-            asks.append(Ask(a.sample, a.question, StartKind.OWN, Why.RANDOM))
+        asks += _ask_own(a)
         if a.sample < nominal:
             asks.append(Ask(a.sample, a.question, StartKind.NOMINAL, Why.RANDOM))
         elif a.sample < SUBSET and a.radius > SLOW:
@@ -243,14 +244,20 @@ def ask_differing(
 
 
 def ask_all(answers: Iterable[Answer]) -> list[Ask]:
-    """Every sample from the nominal orbit; the first `OWN_SAMPLES` from their own too."""
+    """Every sample from the nominal orbit; of the first `OWN_SAMPLES` those with a period from
+    their own too."""
     asks = []
     for a in answers:
         if _orbits(a):
-            if a.sample < OWN_SAMPLES:
-                asks.append(Ask(a.sample, a.question, StartKind.OWN, Why.RANDOM))
+            asks += _ask_own(a)
             asks.append(Ask(a.sample, a.question, StartKind.NOMINAL, Why.ALL))
     return asks
+
+
+def _ask_own(answer: Answer) -> list[Ask]:
+    if answer.sample >= OWN_SAMPLES or answer.response == OrbitStatus.APERIODIC:
+        return []
+    return [Ask(answer.sample, answer.question, StartKind.OWN, Why.RANDOM)]
 
 
 def _orbits(answer: Answer) -> bool:

@@ -107,13 +107,14 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
             first.modelfile, first.design, checked, CATALOG, samples=2, seed=1
         )
         answers = Samples(plan, range(2))(2, lambda: None)
-        heard = hear(plan, ask_random(answers), pool, 2)
+        asks = ask_random(answers)
+        heard = hear(plan, asks, pool, 2)
     for c in checked:
         assert c.gate is not None
         assert c.gate.passed
         assert c.agrees, (c.model.orbit.response, c.circuit.response)
     known = {(a.sample, a.question): a for a in answers}
-    assert len(heard) == 2 * len(answers)
+    assert len(heard) == len(asks) >= len(answers)
     assert all(h.agrees(known[h.sample, h.question]) is not False for h in heard)
     study = Study(checked, plan, tuple(range(len(checked))), {}, tuple(answers), heard=tuple(heard))
     source = provenance(first.modelfile, CATALOG.hash, seed=1, spread={})

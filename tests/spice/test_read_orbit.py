@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +15,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
-from designer.spice.read_orbit import ENGINE_ERROR, Read, Reading, read
+from designer.spice.read_orbit import BRIEF, ENGINE_ERROR, Read, Reading, read
 from designer.spice.simulator import Waveforms
 
 NETS = ("v1", "v2", "v3", "v4")
@@ -117,6 +118,21 @@ def test_chaos_is_aperiodic() -> None:
     assert got.status is OrbitStatus.APERIODIC
     assert got.n == 0
     assert got.reason
+
+
+def test_half_as_many_strobes_show_chaos_but_no_long_period() -> None:
+    """Chaos repeats nothing; a period of ten needs forty strobes to be seen, and is not denied."""
+    flow = flow_at(1.2)
+    x = flow.run(np.zeros(4), 200).strobes[-1]
+    reading = reading_of(1.2)
+    chaos = waveforms(flow, x, reading.discard + BRIEF)
+    assert read(chaos, replace(reading, brief=True)).orbit.status is OrbitStatus.APERIODIC
+    assert read(chaos, reading).orbit.status is OrbitStatus.NOT_SETTLED
+    t = np.linspace(1e-3, (2 + BRIEF) * 2 * np.pi, (2 + BRIEF) * 1000)
+    wave = np.sin(t) + 0.1 * np.sin(t / 10)
+    signals = dict.fromkeys((*NETS, "vg"), wave)
+    ten = read(Waveforms(t, signals, "", 0.0), replace(reading_of(1.0), brief=True))
+    assert ten.orbit.status is OrbitStatus.NOT_SETTLED
 
 
 def test_a_drifting_start_is_not_periodic() -> None:

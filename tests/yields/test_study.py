@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -302,12 +302,12 @@ class Listener(Progress):
 
 @pytest.mark.parametrize(
     ("there", "said"),
-    [(0, ["ngspice, 180 runs"]), (20, ["ngspice, 100 runs, 80 more are there"]), (50, [])],
+    [(0, ["ngspice, 120 runs"]), (20, ["ngspice, 60 runs, 60 more are there"]), (50, [])],
 )
 def test_only_runs_that_are_not_on_disk_are_announced(
     there: int, said: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """90 boards a response: 40 from their own orbit, 50 from the nominal one."""
+    """60 runs a response: 10 from a board's own orbit, 50 from the nominal one."""
     p = plan(200)
     setting: Any = object()
     p = replace(p, questions=tuple(replace(q, settings=setting) for q in p.questions))
@@ -315,12 +315,11 @@ def test_only_runs_that_are_not_on_disk_are_announced(
         tmp_path, NGSPICE, Hearing, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
     )
 
-    def hear(_plan: Any, asks: Any, *_: Any) -> list[Hearing]:
-        return [
-            Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
-        ]
+    def answered(_plan: Any, blocks: Any, *_: Any) -> Iterator[tuple[int, Hearing]]:
+        for k, a in enumerate(ask for block in blocks for ask in block):
+            yield k, Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False)
 
-    monkeypatch.setattr(ngspice_runs, "hear", hear)
+    monkeypatch.setattr(ngspice_runs, "answered", answered)
     answers = Fixed(10**9)(None, range(200))(1, None)
     asks = ask_random(answers)
     layers.listen(p, [a for a in asks if a.sample < there], store, None, 1, lambda: None)  # type: ignore[arg-type]
@@ -333,7 +332,7 @@ def test_only_runs_that_are_not_on_disk_are_announced(
     work = Work(1, pool, Kept(), Here(1), progress, "auto")  # type: ignore[arg-type]
     checked: Any = (None, None)
     study = Study(checked, p, (0, 1), {}, tuple(answers))
-    assert len(work._heard(study, asks)) == len(asks) == 180
+    assert len(work._heard(study, asks)) == len(asks) == 120
     assert progress.stages == said
 
 
