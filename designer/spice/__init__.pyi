@@ -10,6 +10,10 @@ from . import (
 from .batch_backend import (
     program_version as program_version,
 )
+from .convergence_aids import (
+    RunQueue as RunQueue,
+    Task as Task,
+)
 from .deck import (
     SolverSettings as SolverSettings,
 )

@@ -336,8 +336,10 @@ def _after(tried: _Try, said: NgspiceAnswer) -> _Try | NgspiceAnswer:
     if not none and said.response == (tried.before or query.expected):
         return said
     fine, more = 2**tried.halved, longer(tried.subject)
+    # A few strobes of a motion without a period may look like one.
+    brief = tried.subject.brief and query.expected == OrbitStatus.APERIODIC
     if (
-        said.response == OrbitStatus.NOT_SETTLED
+        (said.response == OrbitStatus.NOT_SETTLED or (brief and not none))
         and tried.subject.judged < LONG
         and fine * numerics_gate.length(more) <= MOST_AGAIN
     ):
