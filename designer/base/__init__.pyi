@@ -163,15 +163,17 @@ from .report_pieces import (
     check_ours as check_ours,
 )
 from .schema import (
-    STRICT as STRICT,
+    FIRST_FORMAT as FIRST_FORMAT,
     Accepts as Accepts,
     FieldProblems as FieldProblems,
-    Problem as Problem,
+    FileTable as FileTable,
+    any_table as any_table,
     checked as checked,
     choice as choice,
     did_you_mean as did_you_mean,
-    exactly as exactly,
     flag as flag,
+    fraction as fraction,
+    keys_of as keys_of,
     line as line,
     lines as lines,
     number as number,
@@ -179,9 +181,12 @@ from .schema import (
     parse_toml as parse_toml,
     physical as physical,
     physical_span as physical_span,
+    several as several,
     shown as shown,
     span as span,
+    text as text,
     validated as validated,
+    whole as whole,
 )
 from .seal import (
     BLANK as BLANK,

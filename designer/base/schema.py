@@ -1,13 +1,17 @@
 """Checks of hand-written files that end in an ``InputError``: file, field, found, expected.
 
-A field of a table states in one place what it accepts and how that reads in a message:
+A table of a file is a frozen dataclass; each field says what its key accepts and how that reads in
+a message:
 
-    supply: Annotated[float, number("V", "a number > 0", lambda x: x > 0)] = 15.0
+    @dataclass(frozen=True)
+    class Rails(FileTable):
+        supply: Annotated[float, number("V", "a number > 0", lambda x: x > 0)] = 15.0
 
-pydantic walks the tables (missing keys, unknown keys, nesting); ``checked`` turns the first thing
-it dislikes into an ``InputError``, ``validated`` each of them. Nothing is converted silently: a
-text is no number where the field has no unit, 1 is not true, and a key that nobody reads is an
-error.
+``validated`` makes such a record from the tables of a TOML file: pydantic walks them (missing keys,
+unknown keys, nesting), and each thing that it refuses becomes an ``InputError``; ``checked`` raises
+the first of them. Nothing is converted silently: a text is no number where the field has no unit, 1
+is not true, and a key that nobody reads is an error. Records that the code makes itself are not
+checked.
 """
 
 from __future__ import annotations
@@ -17,37 +21,36 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar, get_args
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic import ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from designer.base.errors import MISSING, InputError
 from designer.base.units import parse_quantity
 
-STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
-"""For every table: unknown keys are errors, nothing is converted, nothing changes later."""
-
-ModelT = TypeVar("ModelT", bound=BaseModel)
-
 
 @dataclass(frozen=True)
-class Problem:
-    """What is wrong with one key of a field that is a table."""
+class FileTable:
+    """Base of the records that tables of files are read into."""
 
-    key: str
-    """The key; "" for the field itself."""
-    found: object
-    """The value that stands there."""
-    expected: str
-    """What would be accepted, in words."""
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+
+TableT = TypeVar("TableT", bound=FileTable)
 
 
 class FieldProblems(ValueError):
-    """Everything that is wrong with one field that is a table."""
+    """Everything that is wrong with one field that is a table.
 
-    def __init__(self, problems: Sequence[Problem]) -> None:
+    problems : their fields are keys of that table, or "" for all of it.
+    """
+
+    def __init__(self, problems: Sequence[InputError]) -> None:
         super().__init__("; ".join(problem.expected for problem in problems))
         self.problems = tuple(problems)
 
@@ -62,17 +65,23 @@ class Accepts:
 
     expected: str
     """What is accepted, in words."""
-    check: Callable[[Any], Any]
+    check: Callable[..., Any]
     """Returns the value that a field's content stands for."""
+    in_folder: bool = False
+    """Whether ``check`` also takes the folder of the file."""
 
     def __get_pydantic_core_schema__(
         self, _source: object, _handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._checked)
+        return core_schema.with_info_plain_validator_function(self._validate)
 
-    def _checked(self, value: object) -> object:
+    def _validate(self, value: object, info: core_schema.ValidationInfo) -> Any:
+        return self.read(value, *([info.context] if self.in_folder else []))
+
+    def read(self, value: object, *folder: Path | None) -> Any:
+        """As ``check``, with all that is expected in the message of the ValueError."""
         try:
-            return self.check(value)
+            return self.check(value, *folder)
         except FieldProblems:
             raise
         except ValueError as error:
@@ -80,22 +89,35 @@ class Accepts:
             raise ValueError(self.expected + detail) from None
 
 
-def number(
-    unit: str,
-    expected: str,
-    fine: Callable[[float], bool] = math.isfinite,
-    *,
-    optional: bool = False,
-) -> Accepts:
+def number(unit: str, expected: str, fine: Callable[[float], bool] = math.isfinite) -> Accepts:
     """A finite number for which ``fine`` holds; with a unit also as text ("22.1k", "100nF")."""
 
-    def check(value: object) -> float | None:
-        if value is None and optional:
-            return None
+    def check(value: object) -> float:
         result = _quantity(value, unit)
         if not fine(result):
             raise ValueError
         return result
+
+    return Accepts(expected, check)
+
+
+def fraction(example: str, *, zero: bool = False) -> Accepts:
+    """A number in (0, 1), or in [0, 1) with ``zero``. example : as in "0.01 is 1 %"."""
+    low = "[" if zero else "("
+    return number(
+        "",
+        f"a fraction in {low}0, 1): {example}",
+        lambda value: 0.0 < value < 1.0 or (zero and value == 0.0),
+    )
+
+
+def whole(expected: str, least: float, most: float = math.inf) -> Accepts:
+    """A whole number from ``least`` to ``most``."""
+
+    def check(value: object) -> int:
+        if type(value) is not int or not least <= value <= most:
+            raise ValueError
+        return value
 
     return Accepts(expected, check)
 
@@ -170,6 +192,17 @@ def flag() -> Accepts:
     return Accepts("true or false", check)
 
 
+def any_table(expected: str) -> Accepts:
+    """A table of any keys."""
+
+    def check(value: object) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise ValueError
+        return value
+
+    return Accepts(expected, check)
+
+
 def line(expected: str, longest: int = 200) -> Accepts:
     """Printable text of one line, not blank."""
 
@@ -185,27 +218,43 @@ def line(expected: str, longest: int = 200) -> Accepts:
     return Accepts(expected, check)
 
 
-def lines(expected: str) -> Accepts:
-    """A list of texts of one line each."""
-    one = line(expected).check
+def text(pattern: str, expected: str) -> Accepts:
+    """Text that a regular expression matches as a whole."""
 
-    def check(value: object) -> tuple[str, ...]:
-        if not isinstance(value, list | tuple):
-            raise ValueError
-        return tuple(one(item) for item in value)
-
-    return Accepts(expected, check)
-
-
-def exactly(wanted: int, expected: str) -> Accepts:
-    """One integer: the format number of a file."""
-
-    def check(value: object) -> int:
-        if type(value) is not int or value != wanted:
+    def check(value: object) -> str:
+        if not isinstance(value, str) or not re.fullmatch(pattern, value, re.ASCII):
             raise ValueError
         return value
 
     return Accepts(expected, check)
+
+
+def several(
+    expected: str, each: Accepts, *, least: int = 0, single: bool = False, again: bool = False
+) -> Accepts:
+    """A list of at least so many of what ``each`` accepts, as a tuple.
+
+    single : one of them may stand for a list of it. again : whether one that is listed a second
+    time counts a second time.
+    """
+
+    def check(value: object) -> tuple[Any, ...]:
+        listed = [value] if single and isinstance(value, str) else value
+        if not isinstance(listed, list) or len(listed) < least:
+            raise ValueError
+        values = [each.check(item) for item in listed]
+        return tuple(values if again else dict.fromkeys(values))
+
+    return Accepts(expected, check)
+
+
+def lines(expected: str) -> Accepts:
+    """A list of texts of one line each."""
+    return several(expected, line(""), again=True)
+
+
+FIRST_FORMAT = whole("1, the format that this version reads", 1, 1)
+"""The format number of a file."""
 
 
 def did_you_mean(found: str, known: Iterable[str]) -> str:
@@ -234,67 +283,80 @@ def parse_toml(text: str, file: str | None) -> dict[str, Any]:
         content = text.splitlines()
         row = int(place[1]) if place else max(len(content), 1)
         found = content[row - 1].strip() if row <= len(content) else ""
-        said = message[: place.start()] if place else message
+        reason = message[: place.start()] if place else message
         raise InputError(
-            file, f"line {row}", found or "the end of the file", f"valid TOML ({said})"
+            file, f"line {row}", found or "the end of the file", f"valid TOML ({reason})"
         ) from None
 
 
 def checked(
-    model: type[ModelT], data: Mapping[str, object], file: str | None, *, within: str = ""
-) -> ModelT:
-    """``data`` as ``model``, or an ``InputError`` for the first thing that does not fit, by the
+    table: type[TableT], data: Mapping[str, object], file: str | None, *, within: str = ""
+) -> TableT:
+    """``data`` as a record, or an ``InputError`` for the first thing that does not fit, by the
     order of ``validated``."""
-    table, problems = validated(model, data, file, within=within)
-    if table is None:
+    record, problems = validated(table, data, file, within=within)
+    if record is None:
         raise problems[0]
-    return table
+    return record
 
 
 def validated(
-    model: type[ModelT], data: Mapping[str, object], file: str | None, *, within: str = ""
-) -> tuple[ModelT | None, list[InputError]]:
-    """``data`` as ``model``; or None, and an ``InputError`` for each thing that does not fit.
+    table: type[TableT],
+    data: Mapping[str, object],
+    file: str | None,
+    *,
+    within: str = "",
+    folder: Path | None = None,
+) -> tuple[TableT | None, list[InputError]]:
+    """``data`` as a record; or None, and an ``InputError`` for each thing that does not fit.
 
     Unknown keys come first: a misspelt key is also a missing one, and its spelling is the cause. A
-    key that is missing because it is misspelt is not said again. ``within`` is put in front of the
-    field's name.
+    key that is missing because it is misspelt is not said again.
+
+    within : what is put in front of the field's name. folder : where files lie that it names.
     """
     try:
-        return model.model_validate(data), []
+        record: TableT = _adapter(table).validate_python(data, context=folder)
+        return record, []
     except ValidationError as error:
         problems = error.errors(include_url=False)
     out: list[InputError] = []
     misspelt: set[tuple[int | str, ...]] = set()
-    for problem in sorted(problems, key=lambda p: p["type"] != "extra_forbidden"):
+    for problem in sorted(problems, key=lambda p: p["type"] != _UNKNOWN):
         place = problem["loc"]
         field = _dotted((within, *place) if within else place)
-        if problem["type"] == "extra_forbidden":
-            owner = _model_at(model, place[:-1])
-            known = sorted(owner.model_fields) if owner else []
+        if problem["type"] == _UNKNOWN:
+            known = sorted(keys_of(_table_at(table, place[:-1])))
             expected = one_of(str(place[-1]), known)
             misspelt |= {(*place[:-1], name) for name in known if f'mean "{name}"?' in expected}
             out.append(InputError(file, field, f"unknown key {place[-1]!r}", expected))
         elif problem["type"] == "missing":
             if place not in misspelt:
-                out.append(InputError(file, field, MISSING, _expected(model, place)))
+                out.append(InputError(file, field, MISSING, _expected(table, place)))
         else:
-            out += _wrong(file, field, dict(problem), _expected(model, place))
+            out += _wrong(file, field, dict(problem), _expected(table, place))
     return None, out
+
+
+_UNKNOWN = "unexpected_keyword_argument"
+"""pydantic's name of an unknown key."""
+
+
+_adapter: Callable[[Any], TypeAdapter[Any]] = cache(TypeAdapter)
 
 
 def _wrong(
     file: str | None, field: str, problem: Mapping[str, Any], expected: str
 ) -> list[InputError]:
     """The value of a field that is not what it accepts."""
-    said = problem["ctx"]["error"] if problem["type"] == "value_error" else None
-    if isinstance(said, FieldProblems):
-        return [
-            InputError(file, f"{field}.{p.key}" if p.key else field, p.found, p.expected)
-            for p in said.problems
-        ]
+    error = problem["ctx"]["error"] if problem["type"] == "value_error" else expected
+    if not isinstance(error, FieldProblems):
+        return [InputError(file, field, shown(problem["input"]), str(error))]
     return [
-        InputError(file, field, shown(problem["input"]), expected if said is None else str(said))
+        p
+        if p.file is not None
+        else InputError(file, f"{field}.{p.field}" if p.field else field, p.found, p.expected)
+        for p in error.problems
     ]
 
 
@@ -331,36 +393,55 @@ def _dotted(place: tuple[int | str, ...]) -> str:
     return text or "the file"
 
 
-def _model_at(model: type[BaseModel], place: tuple[int | str, ...]) -> type[BaseModel] | None:
+def keys_of(table: type[FileTable]) -> dict[str, Any]:
+    """The keys that a table may have, each with the annotation of its field."""
+    hints = get_type_hints(table, include_extras=True)
+    return {_key(field.name, hints[field.name]): hints[field.name] for field in fields(table)}
+
+
+def _key(name: str, annotation: Any) -> str:
+    """The key of a field: its name, or the alias that its annotation states."""
+    metadata = get_args(annotation)[1:] if get_origin(annotation) is Annotated else ()
+    return next((each.alias for each in metadata if isinstance(each, FieldInfo)), None) or name
+
+
+def _table_at(table: type[FileTable], place: tuple[int | str, ...]) -> type[FileTable]:
     """The table that a place lies in."""
-    current: type[BaseModel] | None = model
+    current = table
     for part in place:
-        if isinstance(part, int) or current is None:
-            continue
-        info = current.model_fields.get(part)
-        current = _nested(info.annotation) if info else None
+        if isinstance(part, str):
+            nested = _nested(keys_of(current)[part])
+            assert nested is not None
+            current = nested
     return current
 
 
-def _nested(annotation: object) -> type[BaseModel] | None:
-    """The table inside an annotation such as ``tuple[Table, ...]`` or ``Table | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _nested(annotation: object) -> type[FileTable] | None:
+    """The table inside an annotation such as ``tuple[Rails, ...]`` or ``Rails | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, FileTable):
         return annotation
-    for argument in get_args(annotation):
-        found = _nested(argument)
-        if found is not None:
-            return found
-    return None
+    return next((t for t in map(_nested, get_args(annotation)) if t is not None), None)
 
 
-def _expected(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
+def _expected(table: type[FileTable], place: tuple[int | str, ...]) -> str:
     """In words, what the field at a place accepts."""
     keys = [part for part in place if isinstance(part, str)]
-    owner = _model_at(model, tuple(keys[:-1])) if keys else None
-    info = owner.model_fields.get(keys[-1]) if owner else None
-    if info is None:
+    if not keys:
         return "a table"
-    for item in info.metadata:
-        if isinstance(item, Accepts):
-            return item.expected
-    return info.description or "a value"
+    annotation = keys_of(_table_at(table, tuple(keys[:-1])))[keys[-1]]
+    kind, *metadata = get_args(annotation) if get_origin(annotation) is Annotated else [annotation]
+    for each in metadata:
+        if isinstance(each, Accepts):
+            return each.expected
+    nested = _nested(kind)
+    assert nested is not None
+    listed = get_origin(kind) is tuple
+    what = "tables" if listed and isinstance(place[-1], str) else "a table"
+    if len(keys_of(nested)) > _MOST_KEYS:
+        header = ".".join(keys)
+        return f"{what} [[{header}]]" if listed else f"{what} [{header}]"
+    return f"{what.replace('tables', 'a list of tables')} of {', '.join(keys_of(nested))}"
+
+
+_MOST_KEYS = 5
+"""Keys that a message lists of a table; one with more is named by its header."""

@@ -11,39 +11,49 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, Field
-
 from designer.base.csv_tables import csv_text
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import read_text
 from designer.base.schema import (
-    STRICT,
+    FIRST_FORMAT,
     Accepts,
+    FileTable,
     checked,
     choice,
-    exactly,
     line,
     lines,
     one_of,
     parse_toml,
 )
 from designer.board.bom import COLUMNS, Line
-from designer.catalog.folders import LAYOUTS
+from designer.catalog.read import LAYOUTS
 
 FIELDS = (*COLUMNS, "package", "comment")
 """What a column may show: a field of the bill; the footprint's name; value, grade and number."""
 _MAX_BYTES = 100_000
 
 
+def _text() -> Accepts:
+    def check(value: object) -> str:
+        if not isinstance(value, str) or not value.isprintable() or len(value) > 200:
+            raise ValueError
+        return value
+
+    return Accepts("text of one line, possibly empty", check)
+
+
+_TEXT = _text()
+
+
 @dataclass(frozen=True)
-class LayoutColumn:
+class LayoutColumn(FileTable):
     """A column of a bill."""
 
-    title: str
+    title: Annotated[str, line("a heading of one line")]
     """Heading of the column."""
-    field: str | None
+    field: Annotated[str | None, choice(*FIELDS)] = None
     """One of ``FIELDS``; None for a column of one text."""
-    text: str
+    text: Annotated[str | None, _TEXT] = None
     """Text of every cell, where ``field`` is None."""
 
 
@@ -73,7 +83,7 @@ class Layout:
 
     def _cell(self, column: LayoutColumn, one: Line) -> str:
         if column.field is None:
-            return column.text
+            return column.text or ""
         if column.field == "designators":
             return self.separator.join(one.designators)
         if column.field == "package":
@@ -110,7 +120,7 @@ def _layout(name: str, folders: Sequence[Path]) -> Layout:
 
 def _read(name: str, path: Path) -> Layout:
     text = read_text(path, "a layout that can be read", most=_MAX_BYTES)
-    table = checked(_LayoutTable, parse_toml(text, str(path)), str(path))
+    table = checked(_File, parse_toml(text, str(path)), str(path))
     for number, column in enumerate(table.columns, start=1):
         if (column.field is None) == (column.text is None):
             found = "neither" if column.field is None else "both"
@@ -119,31 +129,12 @@ def _read(name: str, path: Path) -> Layout:
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None or not titles:
         raise InputError(path, "columns", twice or MISSING, "columns, each title once")
-    columns = tuple(LayoutColumn(c.title, c.field, c.text or "") for c in table.columns)
-    return Layout(name, table.separator, columns)
+    return Layout(name, table.separator, table.columns)
 
 
-def _text() -> Accepts:
-    def check(value: object) -> str:
-        if not isinstance(value, str) or not value.isprintable() or len(value) > 200:
-            raise ValueError
-        return value
-
-    return Accepts("text of one line, possibly empty", check)
-
-
-class _ColumnTable(BaseModel):
-    model_config = STRICT
-    title: Annotated[str, line("a heading of one line")]
-    field: Annotated[str | None, choice(*FIELDS)] = None
-    text: Annotated[str | None, _text()] = None
-
-
-class _LayoutTable(BaseModel):
-    model_config = STRICT
-    format: Annotated[int, exactly(1, "1, the format that this version reads")]
-    separator: Annotated[str, _text()] = " "
-    columns: tuple[_ColumnTable, ...] = Field(
-        strict=False, description="a list of tables of title and field, or title and text"
-    )
+@dataclass(frozen=True)
+class _File(FileTable):
+    format: Annotated[int, FIRST_FORMAT]
+    columns: tuple[LayoutColumn, ...]
+    separator: Annotated[str, _TEXT] = " "
     sources: Annotated[tuple[str, ...], lines("a list of where the columns are described")] = ()

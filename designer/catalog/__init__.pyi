@@ -31,9 +31,7 @@ from .diode_curve import (
 )
 from .entries import (
     FORBIDDEN as FORBIDDEN,
-    PRICE_CLASSES as PRICE_CLASSES,
     DiodeEntry as DiodeEntry,
-    Figure as Figure,
     Kind as Kind,
     Mounting as Mounting,
     OpAmp as OpAmp,
@@ -43,7 +41,11 @@ from .entries import (
     ReferenceEntry as ReferenceEntry,
     Use as Use,
 )
-from .folders import (
+from .fields import (
+    PRICE_CLASSES as PRICE_CLASSES,
+    Figure as Figure,
+)
+from .read import (
     LAYOUTS as LAYOUTS,
 )
 from .vendor_model import (

@@ -40,7 +40,7 @@ from designer.catalog.entries import (
     Use,
     mounting_of,
 )
-from designer.catalog.folders import read_folders
+from designer.catalog.read import read_folders
 from designer.catalog.shortage import Offer, no_part, no_values, other_case
 
 _SAME = 1e-9  # relative; values and grades closer than this are the same

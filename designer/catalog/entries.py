@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
+from pydantic import Field
+
+from designer.base.errors import MISSING, InputError
+from designer.base.schema import FieldProblems, FileTable, choice, flag, fraction, line, number
 from designer.base.units import decode_value, encode_value
-from designer.catalog.vendor_model import VendorModel
+from designer.catalog import fields
+from designer.catalog.fields import Figure
+from designer.catalog.vendor_model import VendorModel, vendor_model
 
 Kind = Literal["resistor", "capacitor"]
 Use = Literal["signal", "supply", "array"]
@@ -21,36 +27,8 @@ FORBIDDEN = "!"
 
 UNITS: dict[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
 
-PRICE_CLASSES = (0.01, 0.05, 0.25, 1.0, 5.0, math.inf)
-"""Upper ends, in euro apiece at a hundred pieces, of the price classes 1 to 6."""
-
-
 ASSUMED_IMPEDANCE = 1.0
 """Dynamic impedance [Ω] of a reference whose data sheet gives none."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure of a data sheet."""
-
-    min: float | None
-    """Minimum; None where the sheet gives none."""
-    typ: float | None
-    """Typical; None where the sheet gives none."""
-    max: float | None
-    """Maximum; None where the sheet gives none."""
-    source: str
-    """Where in which data sheet the figure stands."""
-    assumed: bool = False
-    """Whether no data sheet gives it, or it could not be compared with one."""
-
-    @property
-    def nominal(self) -> float:
-        """The typical value; where none is given, the bound that is."""
-        for value in (self.typ, self.max, self.min):
-            if value is not None:
-                return value
-        raise AssertionError("a figure has at least one value")
 
 
 def mounting_of(footprint: str) -> Literal["smd", "tht"]:
@@ -61,134 +39,168 @@ def mounting_of(footprint: str) -> Literal["smd", "tht"]:
 
 
 @dataclass(frozen=True)
-class Rating:
+class Rating(FileTable):
     """What a part stands."""
 
-    power: float | None
+    power: Annotated[float | None, fields.positive("W")] = None
     """Power [W]; None where it does not apply."""
-    voltage: float | None
+    voltage: Annotated[float | None, fields.positive("V")] = None
     """Voltage [V]; None where it does not apply."""
 
 
 @dataclass(frozen=True)
-class PartCase:
+class PartCase(FileTable):
     """Another case that a part is sold in."""
 
-    part_number: str
+    part_number: Annotated[str, fields.CODE_TEXT]
     """The maker's part number, which is ordered."""
-    footprint: str
+    footprint: Annotated[str, fields.FOOTPRINT]
     """Footprint in KiCad, as "Library:Name"."""
-    manufacturer: str | None = None
+    manufacturer: Annotated[str | None, fields.NAME] = None
     """The maker, where it is another."""
-    pins: Mapping[str, str] | None = field(default=None, hash=False)
+    pins: Annotated[Mapping[str, str] | None, fields.pins()] = field(default=None, hash=False)
     """Pin numbers by name as of the part, where they differ."""
 
 
 @dataclass(frozen=True)
-class Price:
+class Price(FileTable):
     """What a part of a price class counts with where prices are added."""
 
-    name: str
-    """Number of the price class, as text."""
-    euro: float
+    price_class: Annotated[int, fields.PRICE]
+    """Number of the price class."""
+    euro: Annotated[float, number("", "a number >= 0, euro apiece", lambda value: value >= 0.0)]
     """Euro apiece at a hundred pieces."""
-    source: str
+    source: Annotated[str, line("where the figure comes from")]
     """Where the price comes from."""
-    assumed: bool
+    assumed: Annotated[bool, flag()] = False
     """Whether it is an assumption."""
 
     @property
-    def price_class(self) -> int:
-        return int(self.name)
+    def name(self) -> str:
+        return str(self.price_class)
 
 
 @dataclass(frozen=True)
-class SectionPins:
+class SectionPins(FileTable):
     """One amplifier of a package, with its pin numbers."""
 
-    name: str
+    name: Annotated[str, line("a letter or name")]
     """Letter of the section, such as "A"."""
-    inverting: str
+    inverting: Annotated[str, fields.PIN]
     """Pin number of the inverting input."""
-    noninverting: str
+    noninverting: Annotated[str, fields.PIN]
     """Pin number of the non-inverting input."""
-    output: str
+    output: Annotated[str, fields.PIN]
     """Pin number of the output."""
 
 
 @dataclass(frozen=True)
-class OpAmp:
+class CatalogEntry(FileTable):
+    """What is known of everything that is bought by one part number."""
+
+    name: Annotated[str, fields.NAME]
+    """Its name in the catalogue."""
+    manufacturer: Annotated[str, fields.NAME]
+    """Name of the maker."""
+    part_number: Annotated[str, fields.CODE_TEXT]
+    """The maker's part number, which is ordered."""
+
+
+@dataclass(frozen=True)
+class BoardEntry(CatalogEntry):
+    """What a board needs beside its op-amps, resistors and capacitors."""
+
+    price: Annotated[int, fields.PRICE]
+    """Price class."""
+    footprint: Annotated[str, fields.FOOTPRINT]
+    """Footprint in KiCad, as "Library:Name"."""
+    sources: Annotated[tuple[str, ...], fields.SOURCES]
+    """Where the figures come from."""
+
+
+@dataclass(frozen=True)
+class OpAmp(CatalogEntry):
     """An op-amp package. Voltages and currents are those at a supply of ± ``rated_supply``.
 
     What only the finer simulation models use may be missing.
     """
 
-    name: str
-    """Its name in the catalogue."""
-    manufacturer: str
-    """Name of the maker."""
-    part_number: str
-    """The maker's part number, which is ordered."""
-    pins: tuple[SectionPins, ...]
+    pins: Annotated[tuple[SectionPins, ...], Field(alias="section")]
     """The sections, with their pin numbers."""
-    supply_pins: tuple[str, str]
+    supply_pins: Annotated[tuple[str, str], fields.pair_of_pins()]
     """Pin numbers of the positive and the negative supply."""
-    rated_supply: float
+    rated_supply: Annotated[float, fields.positive("V")]
     """Supply per rail that the figures are given at [V]."""
-    supply: Figure
+    supply: Annotated[Figure, fields.figure("V")]
     """Supply voltage per rail [V]."""
-    swing: Figure
+    swing: Annotated[Figure, fields.figure("V")]
     """Output swing into 10 kΩ, about ground [V]."""
-    saturation: Figure
+    saturation: Annotated[Figure, fields.figure("V")]
     """Output limit, about ground [V]."""
-    offset: Figure
+    offset: Annotated[Figure, fields.figure("V", signed=True)]
     """Input offset voltage [V]."""
-    bias: Figure
+    bias: Annotated[Figure, fields.figure("A", signed=True)]
     """Input bias current [A]."""
-    gain: Figure
+    gain: Annotated[Figure, fields.figure("V/V")]
     """Open-loop gain [V/V]."""
-    gbw: Figure
+    gbw: Annotated[Figure, fields.figure("Hz")]
     """Gain-bandwidth product [Hz]."""
-    slew: Figure
+    slew: Annotated[Figure, fields.figure("V/s")]
     """Slew rate [V/s]."""
-    output_current: Figure
+    output_current: Annotated[Figure, fields.figure("A")]
     """Short-circuit output current [A]."""
-    output_resistance: Figure
+    output_resistance: Annotated[Figure, fields.figure("Ω")]
     """Open-loop output resistance [Ω]."""
-    common_mode: Figure
+    common_mode: Annotated[Figure, fields.figure("V", signed=True)]
     """Input common-mode range [V], its lower and upper end as min and max."""
-    supply_current: Figure
+    supply_current: Annotated[Figure, fields.figure("A")]
     """Supply current per section [A]."""
-    noise: Figure
+    noise: Annotated[Figure, fields.figure("V/√Hz")]
     """Input voltage noise at 1 kHz [V/√Hz]."""
-    offset_sigma: float
+    offset_sigma: Annotated[float, fields.positive("V")]
     """Standard deviation of the normal distribution that a tolerance study draws offsets from
     [V]."""
-    offset_limit: float
+    offset_limit: Annotated[float, fields.positive("V")]
     """Where that distribution is cut, ± [V]."""
-    price: int
+    price: Annotated[int, fields.PRICE]
     """Price class."""
-    footprint: str
+    footprint: Annotated[str, fields.FOOTPRINT]
     """Footprint in KiCad, as "Library:Name"."""
-    sources: tuple[str, ...]
+    sources: Annotated[tuple[str, ...], fields.SOURCES]
     """Where the figures come from."""
-    recovery: Figure | None = None
+    recovery: Annotated[Figure | None, fields.figure("s")] = None
     """Recovery from saturation after a hard overdrive is reversed [s]."""
-    phase_margin: Figure | None = None
+    phase_margin: Annotated[Figure | None, fields.figure("°")] = None
     """Phase margin at unity gain [degrees]."""
-    swing_2k: Figure | None = None
+    swing_2k: Annotated[Figure | None, fields.figure("V")] = None
     """Output swing into 2 kΩ [V]."""
-    noise_corner: Figure | None = None
+    noise_corner: Annotated[Figure | None, fields.figure("Hz")] = None
     """Corner frequency of the 1/f noise [Hz]."""
-    phase_reversal: bool = False
+    phase_reversal: Annotated[bool, flag()] = False
     """Whether the output goes high when an input falls below the common-mode range."""
-    spice: VendorModel | None = None
+    spice: Annotated[VendorModel | None, vendor_model()] = None
     """A vendor's model, used instead of ours on the finest rung."""
     # What no simulation knows of stays out of repr, which is part of what a study is known by.
-    input_current: Figure | None = field(default=None, repr=False)
+    input_current: Annotated[Figure | None, fields.figure("A")] = field(default=None, repr=False)
     """Absolute maximum of the current into an input [A]; None where no sheet gives it."""
     cases: tuple[PartCase, ...] = field(default=(), repr=False)
     """Other cases that it is sold in, with the same pins."""
+
+    def __post_init__(self) -> None:
+        pins = [*self.supply_pins]
+        for section in self.pins:
+            pins += [section.inverting, section.noninverting, section.output]
+        names = [section.name for section in self.pins]
+        problems = [
+            InputError(None, key, name, "a name or pin that is used once")
+            for key, used in (("section.name", names), ("section", pins))
+            for name in dict.fromkeys(used)
+            if used.count(name) > 1
+        ]
+        if not self.pins:
+            problems.append(InputError(None, "section", MISSING, "at least one section"))
+        if problems:
+            raise FieldProblems(problems)
 
     @property
     def sections(self) -> int:
@@ -204,33 +216,21 @@ class OpAmp:
         return supply - (self.rated_supply - self.saturation.nominal)
 
 
-@dataclass(frozen=True)
-class DiodeEntry:
+@dataclass(frozen=True, kw_only=True)
+class DiodeEntry(BoardEntry):
     """A diode."""
 
-    name: str
-    """Its name in the catalogue."""
-    manufacturer: str
-    """Name of the maker."""
-    part_number: str
-    """The maker's part number, which is ordered."""
-    forward_voltage: Figure
+    forward_voltage: Annotated[Figure, fields.figure("V")]
     """Forward voltage [V]."""
-    reverse_current: Figure
+    reverse_current: Annotated[Figure, fields.figure("A")]
     """Reverse current [A]."""
-    capacitance: Figure
+    capacitance: Annotated[Figure, fields.figure("F")]
     """Capacitance at 0 V [F]."""
-    recovery: Figure
+    recovery: Annotated[Figure, fields.figure("s")]
     """Reverse recovery time [s]."""
-    reverse_voltage: Figure
+    reverse_voltage: Annotated[Figure, fields.figure("V")]
     """Largest reverse voltage [V]."""
-    price: int
-    """Price class."""
-    footprint: str
-    """Footprint in KiCad, as "Library:Name"."""
-    sources: tuple[str, ...]
-    """Where the figures come from."""
-    pins: Mapping[str, str] = field(
+    pins: Annotated[Mapping[str, str], fields.pins("cathode", "anode")] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )
     """Number of the footprint's pad by name; KiCad's have the cathode at 1."""
@@ -238,33 +238,21 @@ class DiodeEntry:
     """Other cases that it is sold in."""
 
 
-@dataclass(frozen=True)
-class ReferenceEntry:
+@dataclass(frozen=True, kw_only=True)
+class ReferenceEntry(BoardEntry):
     """A shunt voltage reference."""
 
-    name: str
-    """Its name in the catalogue."""
-    manufacturer: str
-    """Name of the maker."""
-    part_number: str
-    """The maker's part number, which is ordered."""
-    voltage: float
+    voltage: Annotated[float, fields.positive("V")]
     """The voltage that it keeps [V]."""
-    grade: float
+    grade: Annotated[float, fields.GRADE]
     """Tolerance of the voltage, ± as a fraction."""
-    temperature_coefficient: float
+    temperature_coefficient: Annotated[float, fields.per_kelvin()]
     """Size of the voltage's relative change with temperature [1/K]."""
-    current: Figure
+    current: Annotated[Figure, fields.figure("A")]
     """The currents that it regulates in [A]."""
-    price: int
-    """Price class."""
-    footprint: str
-    """Footprint in KiCad, as "Library:Name"."""
-    sources: tuple[str, ...]
-    """Where the figures come from."""
-    impedance: Figure | None = None
+    impedance: Annotated[Figure | None, fields.figure("Ω")] = None
     """Dynamic impedance [Ω]; None where it is not known."""
-    pins: Mapping[str, str] = field(
+    pins: Annotated[Mapping[str, str], fields.pins("cathode", "anode")] = field(
         default_factory=lambda: {"cathode": "1", "anode": "2"}, hash=False
     )
     """Number of the footprint's pad by name; a name that is neither cathode nor anode is not
@@ -283,59 +271,46 @@ class ReferenceEntry:
         return self.impedance.nominal if self.impedance else ASSUMED_IMPEDANCE
 
 
-@dataclass(frozen=True)
-class TrimmerEntry:
+@dataclass(frozen=True, kw_only=True)
+class TrimmerEntry(BoardEntry):
     """A trimming potentiometer."""
 
-    name: str
-    """Its name in the catalogue."""
-    manufacturer: str
-    """Name of the maker."""
-    part_number: str
-    """The maker's part number, which is ordered."""
-    value: float
+    value: Annotated[float, fields.positive("Ω")]
     """Resistance of the track [Ω]."""
-    grade: float
+    grade: Annotated[float, fields.GRADE]
     """Tolerance, ± as a fraction."""
-    rating: Rating
+    rating: Rating = Rating()
     """Power and voltage that it stands."""
-    pins: Mapping[str, str] = field(hash=False)
+    pins: Annotated[Mapping[str, str], fields.pins("low", "wiper", "high")] = field(hash=False)
     """Pin numbers of its ends "low" and "high", and of its wiper."""
-    price: int
-    """Price class."""
-    footprint: str
-    """Footprint in KiCad, as "Library:Name"."""
-    sources: tuple[str, ...]
-    """Where the figures come from."""
-    assumed: tuple[str, ...] = ()
+    assumed: Annotated[tuple[str, ...], fields.ASSUMED] = ()
     """What could not be compared with a data sheet, in words."""
     cases: tuple[PartCase, ...] = ()
     """Other cases that it is sold in."""
-    adjustability: float = 0.0
+    adjustability: Annotated[
+        float,
+        number("", "a fraction in [0, 0.1): 1e-4 is ± 0.01 %", lambda v: 0.0 <= v < 0.1),
+    ] = 0.0
     """How finely it can be set as a divider, ± as a fraction of the voltage across it."""
 
 
-@dataclass(frozen=True)
-class Header:
+@dataclass(frozen=True, kw_only=True)
+class Header(BoardEntry):
     """Pin headers of one to many ways."""
 
-    name: str
-    """Its name in the catalogue."""
-    manufacturer: str
-    """Name of the maker."""
-    part_number: str
+    part_number: Annotated[
+        str, fields.with_ways('a part number with "{ways}" or "{ways:02}" in it')
+    ]
     """What is ordered; ``{ways}`` and ``{ways:02}`` in it stand for the number of ways."""
-    ways: tuple[int, int]
+    ways: Annotated[tuple[int, int], fields.ways()]
     """Least and largest number of ways."""
-    rating: Rating
+    rating: Rating = Rating()
     """Power and voltage that it stands."""
-    price: int
-    """Price class."""
-    footprint: str
+    footprint: Annotated[
+        str, fields.with_ways('a KiCad footprint with "{ways}" or "{ways:02}" in it')
+    ]
     """KiCad's; ``{ways}`` and ``{ways:02}`` in it stand for the number of ways."""
-    sources: tuple[str, ...]
-    """Where the figures come from."""
-    assumed: tuple[str, ...] = ()
+    assumed: Annotated[tuple[str, ...], fields.ASSUMED] = ()
     """What could not be compared with a data sheet, in words."""
 
     def number(self, ways: int) -> str:
@@ -351,15 +326,15 @@ AGAIN = "{value}"
 """Stands in a part number's suffix for the value once more."""
 
 
-@dataclass(frozen=True)
-class PartNumber:
+@dataclass(frozen=True, kw_only=True)
+class PartNumber(FileTable):
     """The rule of a family's part numbers: prefix, value, suffix."""
 
-    prefix: str
+    prefix: Annotated[str, fields.CODE_TEXT] = ""
     """What stands before the value."""
-    code: str
+    code: Annotated[str, fields.VALUE_CODE]
     """Name of the code that the value is written in (``units.VALUE_CODES``)."""
-    suffix: str
+    suffix: Annotated[str, fields.CODE_TEXT] = ""
     """What stands after the value; ``{value}`` in it stands for the value once more."""
 
     def of(self, value: float) -> str:
@@ -378,50 +353,56 @@ class PartNumber:
         return decode_value(self.code, spelled)
 
 
-@dataclass(frozen=True)
-class PartFamily:
-    """Parts of one kind, grade and case that differ in their value."""
+@dataclass(frozen=True, kw_only=True)
+class FamilyBase(FileTable):
+    """What a file says of parts of one kind, grade and case that differ in their value."""
 
-    name: str
+    name: Annotated[str, fields.NAME]
     """Its name in the catalogue."""
-    kind: Kind
+    kind: Annotated[Kind, choice(*UNITS)]
     """Kind of the parts."""
-    manufacturer: str
+    manufacturer: Annotated[str, fields.NAME]
     """Name of the maker."""
-    series: tuple[str, ...]
+    series: Annotated[tuple[str, ...], fields.SERIES_NAMES] = ()
     """The E series of its values."""
-    range: tuple[float, float]
-    """Least and largest value [Ω or F]."""
-    grade: float
+    grade: Annotated[float, fields.GRADE]
     """Tolerance, ± as a fraction."""
-    temperature_coefficient: float
+    temperature_coefficient: Annotated[float, fields.per_kelvin()]
     """Size of the relative change with temperature [1/K]."""
-    rating: Rating
+    rating: Rating = Rating()
     """Power and voltage that it stands."""
-    footprint: str
+    footprint: Annotated[str, fields.FOOTPRINT]
     """Footprint in KiCad, as "Library:Name"."""
-    dielectric: str
+    dielectric: Annotated[str, line("text of one line: what it is made of")]
     """What the parts are made of."""
-    price: int
+    price: Annotated[int, fields.PRICE]
     """Price class."""
     part_number: PartNumber
     """The rule of its part numbers."""
-    sources: tuple[str, ...]
+    sources: Annotated[tuple[str, ...], fields.SOURCES]
     """Where the figures come from."""
-    assumed: tuple[str, ...]
+    assumed: Annotated[tuple[str, ...], fields.ASSUMED] = ()
     """What could not be compared with a data sheet, in words."""
-    values: tuple[float, ...] = field(repr=False)
-    """Values that can be bought [Ω or F], ascending."""
-    drift: float | None = None
+    drift: Annotated[float | None, fraction("0.005 is 0.5 %", zero=True)] = None
     """Most that a value changes in the data sheet's endurance test, a fraction; None where not
     known."""
-    use: Use = "signal"
+    use: Annotated[Use, choice("signal", "supply", "array")] = "signal"
     """"supply" for families that no signal goes through, "array" for several parts of one value in
     one case; "signal" for all others."""
+    matching: Annotated[float | None, fraction("0.001 is 0.1 %")] = None
+    """Most that the values of an array's elements differ by, a fraction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartFamily(FamilyBase):
+    """Parts of one kind, grade and case that differ in their value."""
+
+    range: tuple[float, float]
+    """Least and largest value [Ω or F]."""
+    values: tuple[float, ...] = field(repr=False)
+    """Values that can be bought [Ω or F], ascending."""
     elements: int = 1
     """Parts in one case."""
-    matching: float | None = None
-    """Most that the values of an array's elements differ by, a fraction."""
 
     @property
     def share(self) -> float:

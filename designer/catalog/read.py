@@ -1,4 +1,8 @@
-"""Catalogue files, TOML or CSV, ``format = 1`` (docs/catalogue.md), read into entries.
+"""Catalogue files, TOML or CSV, ``format = 1`` (docs/catalogue.md), and the folders that hold them.
+
+1. the folder that the caller names, then those of the environment variable DESIGNER_CATALOGS
+2. the user's own: ``catalogs`` in the configuration folder of this system
+3. the catalogue that comes with the tool
 
 Each rule for part numbers is tried on every value of its family, and on the example that the file
 gives with it, when the file is read.
@@ -6,48 +10,136 @@ gives with it, when the file is read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+import hashlib
+import importlib.resources
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from pydantic import BaseModel
+import platformdirs
 
-from designer.base.errors import MISSING, InputError, InputErrors, problems_in
+from designer.base.errors import MISSING, InputError, InputErrors
 from designer.base.eseries import series_values
-from designer.base.guarded_reading import csv_rows, decode, read_bytes
-from designer.base.schema import one_of, parse_toml, validated
+from designer.base.guarded_reading import csv_rows, decode, read_bytes, reading
+from designer.base.schema import (
+    FIRST_FORMAT,
+    Accepts,
+    FieldProblems,
+    FileTable,
+    keys_of,
+    one_of,
+    parse_toml,
+    validated,
+    whole,
+)
 from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.entries import (
     UNITS,
     DiodeEntry,
+    FamilyBase,
     Header,
     OpAmp,
-    PartCase,
     PartFamily,
-    PartNumber,
     Price,
-    Rating,
     ReferenceEntry,
-    SectionPins,
     TrimmerEntry,
 )
-from designer.catalog.tables import (
-    CaseTable,
-    DiodeTable,
-    FamilyTable,
-    FileTables,
-    HeaderTable,
-    OpAmpTable,
-    PriceTable,
-    ReferenceTable,
-    TrimmerTable,
-)
-from designer.catalog.vendor_model import read_vendor_model
+from designer.catalog.fields import CODE_TEXT, quantities, quantity
 
 Entry = PartFamily | OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry | Header | Price
 
+ENVIRONMENT = "DESIGNER_CATALOGS"
+"""Environment variable: folders to search first, separated as in PATH."""
+LAYOUTS = "bom-layouts"
+"""Folder of layouts beside the catalogue's files (``board.bom_layouts``)."""
 _MAX_BYTES = 4_000_000
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What the folders hold; an entry of the same sort and name in an earlier one counts."""
+
+    entries: tuple[Entry, ...]
+    """What the files hold, earlier folders first."""
+    hash: str
+    """Hash of the content of all files, wherever they lie."""
+    folders: tuple[Path, ...]
+    """The folders that were read, in order."""
+
+
+def read_folders(extra: Path | None = None) -> Contents:
+    """Read all catalogue folders, ``extra`` first.
+
+    Raises
+    ------
+    InputError : a named folder does not exist, or a file in one is wrong; names file and field.
+    """
+    folders = _folders(extra)
+    digest = hashlib.sha256()
+    held: dict[tuple[type[Entry], str], Entry] = {}
+    for folder in folders:
+        for key, entry in _read_folder(folder, digest).items():
+            held.setdefault(key, entry)
+    return Contents(tuple(held.values()), digest.hexdigest(), folders)
+
+
+def _folders(extra: Path | None) -> tuple[Path, ...]:
+    named = [] if extra is None else [("the catalogue folder", Path(extra))]
+    listed = os.environ.get(ENVIRONMENT, "").split(os.pathsep)
+    named += [(ENVIRONMENT, Path(text)) for text in listed if text]
+    for origin, folder in named:
+        if not folder.is_dir():
+            raise InputError(None, origin, str(folder), "a folder of catalogue files")
+    own = Path(platformdirs.user_config_dir("designer", appauthor=False)) / "catalogs"
+    return (
+        *(folder for _, folder in named),
+        *([own] if own.is_dir() else []),
+        _shipped(),
+    )
+
+
+def _shipped() -> Path:
+    """In a wheel inside the package; in a checkout at its top level, beside the package."""
+    package = Path(str(importlib.resources.files("designer")))
+    for folder in (package / "catalogs", package.parent / "catalogs"):
+        if folder.is_dir():
+            return folder
+    raise InputError(None, "catalogs", MISSING, "the catalogue that comes with the tool")
+
+
+def _read_folder(folder: Path, digest: hashlib._Hash) -> dict[tuple[type[Entry], str], Entry]:
+    """The entries of a folder, files in the order of their names; other files are left alone."""
+    held: dict[tuple[type[Entry], str], Entry] = {}
+    with reading(folder, "a folder of catalogue files", "the folder"):
+        files = [path for path in folder.iterdir() if path.suffix in (".toml", ".csv")]
+    for path in sorted(files, key=lambda each: each.name):
+        content, entries = read_catalog_file(path)
+        _digest(digest, path.name, content)
+        twice = []
+        for entry in entries:
+            key = type(entry), entry.name
+            if key in held:
+                expected = "names that this folder uses once"
+                twice.append(InputError(path, "name", entry.name, expected))
+            held[key] = entry
+        _raise(twice)
+    for path in sorted((folder / LAYOUTS).glob("*.toml"), key=lambda each: each.name):
+        _digest(digest, f"{LAYOUTS}/{path.name}", read_bytes(path, "a layout that can be read"))
+    return held
+
+
+def _digest(digest: hashlib._Hash, name: str, content: bytes) -> None:
+    digest.update(f"{name} {len(content)}\n".encode())
+    digest.update(content)
+
+
+def _raise(problems: Sequence[InputError]) -> None:
+    """Raises the only problem, or all of them as InputErrors."""
+    if problems:
+        raise problems[0] if len(problems) == 1 else InputErrors(problems)
 
 
 def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
@@ -62,63 +154,127 @@ def read_catalog_file(path: Path) -> tuple[bytes, tuple[Entry, ...]]:
     text = decode(content, path)
     if path.suffix == ".csv":
         return content, _from_csv(text, str(path))
-    entries = _from_toml(text, str(path))
+    file, problems = validated(_File, parse_toml(text, str(path)), str(path), folder=path.parent)
+    _raise(problems)
+    assert file is not None
     # A model beside the file is content too: the catalogue's hash follows it.
-    spice = [e.spice for e in entries if isinstance(e, OpAmp) and e.spice is not None]
-    return b"\n".join([content, *(model.content for model in spice)]), entries
+    models = [opamp.spice.content for opamp in file.opamp if opamp.spice is not None]
+    return b"\n".join([content, *models]), file.entries
 
 
-def _from_toml(text: str, file: str) -> tuple[Entry, ...]:
-    data = parse_toml(text, file)
-    tables, problems = validated(FileTables, data, file)
-    entries: list[Entry] = []
-    for key, (table, make) in _SORTS.items():
-        rows = _rows(table, data.get(key)) if tables is None else getattr(tables, key)
-        for index, row in enumerate(rows, start=1):
-            if row is not None:
-                _collect(partial(make, row, file, f"{key}[{index}]"), entries, problems)
-    return _all_right(entries, problems)
+@dataclass(frozen=True)
+class _Example(FileTable):
+    value: Annotated[float | str, Accepts('a number, or text such as "22.1k"', quantity)]
+    part_number: Annotated[str, CODE_TEXT]
 
 
-def _rows(table: type[BaseModel], rows: object) -> list[BaseModel | None]:
-    """The tables of one sort in a file of which something is wrong; None for those that are."""
-    if not isinstance(rows, list):
-        return []
-    return [validated(table, row, None)[0] if isinstance(row, dict) else None for row in rows]
+@dataclass(frozen=True, kw_only=True)
+class FamilyTable(FamilyBase):
+    """A family as a file states it."""
+
+    range: Annotated[tuple[float | str, ...], quantities("a range [low, high]", 2)] = ()
+    """Least and largest value of the series."""
+    values: Annotated[tuple[float | str, ...], quantities("a list of values")] = ()
+    """Values beside those of the series."""
+    example: _Example | None = None
+    """A value with its part number, by which the rule is tried."""
+    elements: Annotated[int | None, whole("a whole number from 2 to 16", 2, 16)] = None
+    """Parts in one case of an array."""
+
+    def __post_init__(self) -> None:
+        problems = list(self._problems())
+        if problems:
+            raise FieldProblems(problems)
+
+    @property
+    def family(self) -> PartFamily:
+        """The family with every value that can be bought."""
+        stated = {field.name: getattr(self, field.name) for field in fields(FamilyBase)}
+        ends = self._sold[0], self._sold[-1]
+        return PartFamily(**stated, range=ends, values=self._sold, elements=self.elements or 1)
+
+    @cached_property
+    def _sold(self) -> tuple[float, ...]:
+        """What can be bought: the values that are listed, and those of the series in the range."""
+        unit = UNITS[self.kind]
+        values = {parse_quantity(value, unit) for value in self.values}
+        if self.range:
+            low, high = (parse_quantity(end, unit) for end in self.range)
+            values.update(series_values(self.series, low, high).tolist())
+        if any(value <= 0.0 for value in values):
+            raise ValueError("a value that is not > 0")
+        return tuple(sorted(values))
+
+    def _problems(self) -> Iterator[InputError]:
+        unit = UNITS[self.kind]
+        sold: tuple[float, ...] = ()
+        try:
+            sold = self._sold
+            if not sold:
+                expected = "values, or series and a range that holds some"
+                yield InputError(None, "values", MISSING, expected)
+        except InputError as error:  # raised by the series
+            yield error
+        except ValueError as error:
+            yield InputError(None, "range", str(error), f"quantities in {unit}, ascending")
+        for key, stated in (("elements", self.elements), ("matching", self.matching)):
+            if (stated is not None) is not (self.use == "array"):
+                expected = f'{key} with use = "array", and only there'
+                yield InputError(None, key, MISSING if stated is None else stated, expected)
+        for value in sold:
+            try:
+                self.part_number.of(value)
+            except ValueError as error:
+                expected = f"a code that can spell {format_quantity(value, unit)} ({error})"
+                yield InputError(None, "part_number.code", self.part_number.code, expected)
+                break
+        if self.example is not None:
+            yield from self._wrong_example(self.example, unit)
+
+    def _wrong_example(self, example: _Example, unit: str) -> Iterator[InputError]:
+        try:
+            number = self.part_number.of(parse_quantity(example.value, unit))
+        except ValueError as error:
+            yield InputError(None, "example.value", example.value, f"a value ({error})")
+            return
+        if number != example.part_number:
+            expected = f"{number}, by the rule"
+            yield InputError(None, "example.part_number", example.part_number, expected)
 
 
-def _collect(make: Callable[[], Entry], entries: list[Entry], problems: list[InputError]) -> None:
-    """Make one more entry, or note what is wrong with it."""
-    try:
-        entries.append(make())
-    except InputError as error:
-        problems += problems_in(error)
+@dataclass(frozen=True)
+class _File(FileTable):
+    """The tables of a TOML file."""
 
+    format: Annotated[int, FIRST_FORMAT]
+    family: tuple[FamilyTable, ...] = ()
+    opamp: tuple[OpAmp, ...] = ()
+    diode: tuple[DiodeEntry, ...] = ()
+    reference: tuple[ReferenceEntry, ...] = ()
+    trimmer: tuple[TrimmerEntry, ...] = ()
+    header: tuple[Header, ...] = ()
+    price: tuple[Price, ...] = ()
 
-def _all_right(entries: Sequence[Entry], problems: Sequence[InputError]) -> tuple[Entry, ...]:
-    """The entries.
-
-    Raises
-    ------
-    InputError : the problem, or InputErrors: every problem.
-    """
-    if problems:
-        raise problems[0] if len(problems) == 1 else InputErrors(problems)
-    return tuple(entries)
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        families = (table.family for table in self.family)
+        others = (self.opamp, self.diode, self.reference, self.trimmer, self.header, self.price)
+        return (*families, *(entry for entries in others for entry in entries))
 
 
 def _from_csv(text: str, file: str) -> tuple[Entry, ...]:
     """Part families, one a row; the columns are the keys of a TOML table, and ``format``."""
     rows = csv_rows(text, file)
-    known = ["format", *sorted(FamilyTable.model_fields)]
-    entries: list[Entry] = []
+    known = ["format", *sorted(keys_of(FamilyTable))]
     _, header = next(rows, (1, []))
     problems = [
         InputError(file, "line 1", f"unknown column {name!r}", one_of(name, known))
         for name in header
         if name not in known
     ]
-    for number, row in rows if not problems else ():
+    _raise(problems)
+    families = []
+    for number, row in rows:
         place = f"line {number}"
         if not row:
             continue
@@ -130,12 +286,13 @@ def _from_csv(text: str, file: str) -> tuple[Entry, ...]:
         if cells.pop("format", "") != "1":
             expected = "1 in a column format"
             problems.append(InputError(file, f"{place}.format", "no 1", expected))
-        cut = {key: _cell(key, cell) for key, cell in cells.items() if cell}
-        table, wrong = validated(FamilyTable, cut, file, within=place)
+        stated = {key: _cell(key, cell) for key, cell in cells.items() if cell}
+        table, wrong = validated(FamilyTable, stated, file, within=place)
         problems += wrong
         if table is not None:
-            _collect(partial(_family, table, file, place), entries, problems)
-    return _all_right(entries, problems)
+            families.append(table.family)
+    _raise(problems)
+    return tuple(families)
 
 
 def _cell(key: str, cell: str) -> object:
@@ -154,135 +311,3 @@ def _cell(key: str, cell: str) -> object:
         except ValueError:
             return cell
     return cell
-
-
-def _family(table: FamilyTable, file: str, place: str) -> PartFamily:
-    problems: list[InputError] = []
-
-    def refuse(key: str, found: object, expected: str) -> None:
-        problems.append(InputError(file, f"{place}.{key}", found, expected))
-
-    unit = UNITS[table.kind]
-    values: tuple[float, ...] = ()
-    try:
-        values = _values(table, unit)
-        if not values:
-            refuse("values", MISSING, "values, or series and a range that holds some")
-    except InputError as error:  # raised by the series, which do not know the file
-        refuse(error.field, error.found, error.expected)
-    except ValueError as error:
-        refuse("range", str(error), f"quantities in {unit}, ascending")
-    for key, stated in (("elements", table.elements), ("matching", table.matching)):
-        if (stated is not None) is not (table.use == "array"):
-            expected = f'{key} with use = "array", and only there'
-            refuse(key, MISSING if stated is None else stated, expected)
-    rule = PartNumber(table.part_number.prefix, table.part_number.code, table.part_number.suffix)
-    for value in values:
-        try:
-            rule.of(value)
-        except ValueError as error:
-            spelled = format_quantity(value, unit)
-            refuse("part_number.code", rule.code, f"a code that can spell {spelled} ({error})")
-            break
-    if table.example is not None:
-        try:
-            made = rule.of(parse_quantity(table.example.value, unit))
-            if made != table.example.part_number:
-                refuse("example.part_number", table.example.part_number, f"{made}, by the rule")
-        except ValueError as error:
-            refuse("example.value", table.example.value, f"a value ({error})")
-    _all_right((), problems)
-    return PartFamily(
-        name=table.name,
-        kind=table.kind,
-        manufacturer=table.manufacturer,
-        series=table.series,
-        range=(values[0], values[-1]),
-        grade=table.grade,
-        temperature_coefficient=table.temperature_coefficient,
-        rating=Rating(table.rating.power, table.rating.voltage),
-        footprint=table.footprint,
-        dielectric=table.dielectric,
-        price=table.price,
-        part_number=rule,
-        sources=table.sources,
-        assumed=table.assumed,
-        values=values,
-        drift=table.drift,
-        use=table.use,
-        elements=table.elements or 1,
-        matching=table.matching,
-    )
-
-
-def _values(table: FamilyTable, unit: str) -> tuple[float, ...]:
-    """What can be bought: the values that are listed, and those of the series in the range."""
-    values = {parse_quantity(value, unit) for value in table.values}
-    if table.range:
-        low, high = (parse_quantity(end, unit) for end in table.range)
-        values.update(series_values(table.series, low, high).tolist())
-    if any(value <= 0.0 for value in values):
-        raise ValueError("a value that is not > 0")
-    return tuple(sorted(values))
-
-
-def _opamp(table: OpAmpTable, file: str, place: str) -> OpAmp:
-    sections = tuple(SectionPins(**dict(section)) for section in table.section)
-    problems: list[InputError] = []
-    pins = [*table.supply_pins]
-    for section in sections:
-        pins += [section.inverting, section.noninverting, section.output]
-    names = [section.name for section in sections]
-    for key, used in (("section.name", names), ("section", pins)):
-        for name in dict.fromkeys(used):
-            if used.count(name) > 1:
-                expected = "a name or pin that is used once"
-                problems.append(InputError(file, f"{place}.{key}", name, expected))
-    if not sections:
-        problems.append(InputError(file, f"{place}.section", MISSING, "at least one section"))
-    spice = None
-    if table.spice is not None:
-        named = table.spice
-        try:
-            spice = read_vendor_model(named.file, named.subckt, named.pins, Path(file).parent)
-        except InputError as error:
-            if error.file is None:
-                error = InputError(file, f"{place}.{error.field}", error.found, error.expected)
-            problems.append(error)
-    _all_right((), problems)
-    figures = {key: value for key, value in table if key not in ("section", "spice")}
-    cases = _cases(table.cases)
-    return OpAmp(**{**figures, "pins": sections, "spice": spice, "cases": cases})
-
-
-def _cases(tables: Iterable[CaseTable]) -> tuple[PartCase, ...]:
-    return tuple(PartCase(**dict(table)) for table in tables)
-
-
-def _cased(entry: type[DiodeEntry] | type[ReferenceEntry]) -> Callable[[Any, str, str], Entry]:
-    return lambda table, _file, _place: entry(**{**dict(table), "cases": _cases(table.cases)})
-
-
-def _trimmer(table: TrimmerTable, _file: str, _place: str) -> TrimmerEntry:
-    rating = Rating(**dict(table.rating))
-    return TrimmerEntry(**{**dict(table), "rating": rating, "cases": _cases(table.cases)})
-
-
-def _header(table: HeaderTable, _file: str, _place: str) -> Header:
-    return Header(**{**dict(table), "rating": Rating(**dict(table.rating))})
-
-
-def _price(table: PriceTable, _file: str, _place: str) -> Price:
-    return Price(str(table.price_class), table.euro, table.source, table.assumed)
-
-
-_SORTS: dict[str, tuple[type[BaseModel], Callable[[Any, str, str], Entry]]] = {
-    "family": (FamilyTable, _family),
-    "opamp": (OpAmpTable, _opamp),
-    "diode": (DiodeTable, _cased(DiodeEntry)),
-    "reference": (ReferenceTable, _cased(ReferenceEntry)),
-    "trimmer": (TrimmerTable, _trimmer),
-    "header": (HeaderTable, _header),
-    "price": (PriceTable, _price),
-}
-"""By the name of its tables in a file: what a sort of entry is checked and made by."""

@@ -18,10 +18,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import Annotated
 
-from designer.base.errors import InputError
+from designer.base.errors import InputError, problems_in
 from designer.base.guarded_reading import inside, read_bytes
 from designer.base.netlist_guard import check_netlist
+from designer.base.schema import Accepts, FieldProblems, FileTable, line, lines, validated
 
 PINS = ("inp", "inn", "out", "vcc", "vee")
 ELEMENTS = "BCDEFGHIJKLMQRSVWX"
@@ -72,6 +74,32 @@ class VendorModel:
         ]
 
 
+@dataclass(frozen=True)
+class _Named(FileTable):
+    """A model as a catalogue entry names it."""
+
+    file: Annotated[str, line("the name of a file beside this one")]
+    subckt: Annotated[str, line("the name of a subcircuit in it")]
+    pins: Annotated[tuple[str, ...], lines("its pins in order, of " + ", ".join(PINS))]
+
+
+def vendor_model() -> Accepts:
+    """A table that names a model in the folder of the file."""
+
+    def check(value: object, folder: Path) -> VendorModel:
+        if not isinstance(value, dict):
+            raise ValueError
+        named, problems = validated(_Named, value, None)
+        if named is None:
+            raise FieldProblems(problems)
+        try:
+            return read_vendor_model(named.file, named.subckt, named.pins, folder)
+        except InputError as error:
+            raise FieldProblems(problems_in(error)) from None
+
+    return Accepts("a table of file, subckt, pins", check, in_folder=True)
+
+
 def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path) -> VendorModel:
     """The model in the file ``name`` inside a folder.
 
@@ -81,7 +109,7 @@ def read_vendor_model(name: str, subckt: str, pins: Sequence[str], folder: Path)
         read, is too large, or holds a line that is refused; the subcircuit or its pins are not
         what was said.
     """
-    path = inside(folder, name, "spice.file")
+    path = inside(folder, name, "file")
     content = read_bytes(path, "an op-amp's SPICE model that can be read", most=MOST_BYTES)
     if sorted(pins) != sorted(PINS):
         raise InputError(path, "pins", ", ".join(pins), "each once: " + ", ".join(PINS))

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from designer.base.errors import InputError
+from designer.base.schema import Accepts, FileTable, choice, number, physical
 from designer.model.mechanics import Clearance, SecondOrderSystem
 
 Sides = Literal["both", "upper", "lower"]
@@ -29,8 +30,16 @@ slowest and the fastest motion are then so far apart that the linear algebra, or
 period, comes to no end (docs/stability.md)."""
 
 
+_SIDES = choice("both", "upper", "lower")
+
+
+def _plain(domain: str) -> Accepts:
+    """A number; the model holds it to the domain, which is only told here."""
+    return number("", f"a number {domain}")
+
+
 @dataclass(frozen=True)
-class Dimensionless:
+class Dimensionless(FileTable):
     """Dimensionless parameters, Eq. (3). Each lies in its domain and within ``TRIED``.
 
     Raises
@@ -38,21 +47,21 @@ class Dimensionless:
     InputError : a parameter lies outside its domain, or outside what was tried of it.
     """
 
-    m: float
+    m: Annotated[float, _plain("in (0, 1)")]
     """Mass ratio M2/(M1 + M2), in (0, 1)."""
-    k: float
+    k: Annotated[float, _plain("in (0, 1)")]
     """Stiffness ratio K2/(K1 + K2), in (0, 1)."""
-    k0: float
+    k0: Annotated[float, _plain("in [0, 1)")]
     """Stop stiffness ratio K0/(K0 + K1), in [0, 1)."""
-    c: float
+    c: Annotated[float, _plain("in [0, 1)")]
     """Damping ratio C2/(C1 + C2), in [0, 1)."""
-    zeta: float
+    zeta: Annotated[float, _plain("> 0")]
     """Damping C1/(2 sqrt(K1 M1)), > 0."""
-    f20: float
+    f20: Annotated[float, _plain("in [0, 1]")]
     """Share of the force on the second mass P2/(P1 + P2), in [0, 1]."""
-    b: float
+    b: Annotated[float, _plain("> 0")]
     """Clearance B K1/(P1 + P2), > 0."""
-    sides: Sides = "both"
+    sides: Annotated[Sides, _SIDES] = "both"
     """The stops that exist."""
 
     def __post_init__(self) -> None:
@@ -110,30 +119,30 @@ def _close(value: float) -> str:
 
 
 @dataclass(frozen=True)
-class Mechanical:
+class Mechanical(FileTable):
     """Parameters of Eq. (1)-(2) in SI units."""
 
-    M1: float
+    M1: Annotated[float, physical("kg")]
     """Mass that carries the clearance [kg]."""
-    M2: float
+    M2: Annotated[float, physical("kg")]
     """Second mass [kg]."""
-    C1: float
+    C1: Annotated[float, physical("N s/m")]
     """Damping between the masses [N s/m]."""
-    C2: float
+    C2: Annotated[float, physical("N s/m", zero=True)]
     """Damping between the second mass and ground [N s/m]."""
-    K0: float
+    K0: Annotated[float, physical("N/m", zero=True)]
     """Stiffness of the stops [N/m]."""
-    K1: float
+    K1: Annotated[float, physical("N/m")]
     """Stiffness between the masses [N/m]."""
-    K2: float
+    K2: Annotated[float, physical("N/m", zero=True)]
     """Stiffness between the second mass and ground [N/m]."""
-    B: float
+    B: Annotated[float, physical("m")]
     """Distance of a stop from the rest position [m]."""
-    P1: float
+    P1: Annotated[float, physical("N", zero=True)]
     """Amplitude of the force on the first mass [N]."""
-    P2: float
+    P2: Annotated[float, physical("N", zero=True)]
     """Amplitude of the force on the second mass [N]."""
-    sides: Sides = "both"
+    sides: Annotated[Sides, _SIDES] = "both"
     """The stops that exist."""
 
     def __post_init__(self) -> None:

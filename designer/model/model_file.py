@@ -20,39 +20,23 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
-
-from pydantic import BaseModel, Field
+from typing import Annotated, Any
 
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
-from designer.base.schema import (
-    STRICT,
-    Accepts,
-    checked,
-    choice,
-    exactly,
-    line,
-    number,
-    parse_toml,
-    physical,
-)
+from designer.base.schema import FIRST_FORMAT, FileTable, any_table, checked, line, parse_toml
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
 from designer.model import model_limits
-from designer.model.board_table import BoardSpec, BoardTable
-from designer.model.circuit_table import CircuitSpec, CircuitTable
+from designer.model.board_table import BoardSpec
+from designer.model.circuit_table import CircuitSpec
 from designer.model.measured_values import MeasuredBoards, read_measured
-from designer.model.model import Dimensionless, Mechanical, Sides
-from designer.model.response_table import (
-    Response,
-    ResponseTable,
-    response_of,
-)
+from designer.model.model import Dimensionless, Mechanical
+from designer.model.response_table import Response, ResponseTable
 from designer.model.rules_table import overrides
-from designer.model.search_table import SearchSpec, SearchTable
-from designer.model.spread_table import BENCH_1, SpreadSpec, SpreadTable
+from designer.model.search_table import SearchSpec
+from designer.model.spread_table import BENCH_1, SpreadSpec
 from designer.model.tuning_bands import Bands
 
 MAX_BYTES = 1_000_000
@@ -143,13 +127,18 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     file = None if source is None else str(source)
     data = parse_toml(text, file)
     model_limits.check(data, file)
-    tables = checked(_File, data, file)
+    try:
+        tables = checked(_File, data, file)
+    except InputError as error:  # a model outside its domain does not know the file
+        raise InputError(file, error.field, error.found, error.expected) from None
     model, mechanical = _models(tables, file)
     responses = tuple(
-        response_of(table, index, mechanical, file)
-        for index, table in enumerate(tables.response, start=1)
+        each.response(keys, index, mechanical, file)
+        for index, (each, keys) in enumerate(
+            zip(tables.response, data.get("response", ()), strict=True), start=1
+        )
     )
-    circuit = CircuitSpec(**dict(tables.circuit))
+    circuit = tables.circuit
     if circuit.saturation is not None and circuit.saturation > circuit.supply:
         raise InputError(
             file,
@@ -157,39 +146,48 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
             circuit.saturation,
             f"a voltage within the supply of {circuit.supply:g} V",
         )
-    spread = tables.spread.spec(circuit.resistor_grade, circuit.capacitor_grade, file)
-    title = tables.title or (source.stem if source is not None else "untitled")
-    tuning = Bands(**dict(tables.tuning))
-    made = ModelFile(
-        title,
-        model,
-        mechanical,
-        responses,
-        circuit,
-        text,
-        source,
-        spread,
-        tuning=tuning,
-        board=BoardSpec(**dict(tables.board)),
-        search=SearchSpec(**dict(tables.search)),
+    tables.spread.check(circuit.resistor_grade, circuit.capacitor_grade, file)
+    return ModelFile(
+        title=tables.title or (source.stem if source is not None else "untitled"),
+        model=model,
+        mechanical=mechanical,
+        responses=responses,
+        circuit=circuit,
+        text=text,
+        source=source,
+        spread=tables.spread,
+        tuning=tables.tuning,
+        board=tables.board,
+        rules=overrides(tables.rules, file),
+        search=tables.search,
     )
-    return replace(made, rules=overrides(tables.rules, file))
+
+
+@dataclass(frozen=True)
+class _File(FileTable):
+    """The tables of a file."""
+
+    format: Annotated[int, FIRST_FORMAT]
+    title: Annotated[str | None, line("text of one line")] = None
+    model: Dimensionless | None = None
+    mechanical: Mechanical | None = None
+    response: tuple[ResponseTable, ...] = ()
+    circuit: CircuitSpec = field(default_factory=CircuitSpec)
+    tuning: Bands = field(default_factory=Bands)
+    board: BoardSpec = field(default_factory=BoardSpec)
+    rules: Annotated[dict[str, Any], any_table("tables [rules.<id>]")] = field(default_factory=dict)
+    search: SearchSpec = field(default_factory=SearchSpec)
+    spread: SpreadSpec = BENCH_1
 
 
 def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
     if tables.model is not None and tables.mechanical is not None:
         raise InputError(file, "mechanical", "[model] and [mechanical]", "one of the two")
-    try:
-        if tables.model is not None:
-            return Dimensionless(**dict(tables.model)), None
-        if tables.mechanical is not None:
-            mechanical = Mechanical(**dict(tables.mechanical))
-            return _dimensionless(mechanical, file), mechanical
-    except InputError as error:
-        if error.file is not None:
-            raise
-        raise InputError(file, error.field, error.found, error.expected) from None
-    raise InputError(file, "model", MISSING, "a table [model] or a table [mechanical]")
+    if tables.mechanical is not None:
+        return _dimensionless(tables.mechanical, file), tables.mechanical
+    if tables.model is None:
+        raise InputError(file, "model", MISSING, "a table [model] or a table [mechanical]")
+    return tables.model, None
 
 
 # Which quantity of Eq. (1)-(2) to look at when a dimensionless one leaves its domain.
@@ -214,7 +212,7 @@ def _dimensionless(mechanical: Mechanical, file: str | None) -> Dimensionless:
     except InputError as error:
         name = error.field.removeprefix("model.")
         if name not in _CAUSES:
-            raise
+            raise InputError(file, error.field, error.found, error.expected) from None
         cause, formula = _CAUSES[name]
         raise InputError(
             file,
@@ -222,72 +220,6 @@ def _dimensionless(mechanical: Mechanical, file: str | None) -> Dimensionless:
             getattr(mechanical, cause),
             f"a value that makes {name} = {formula} {error.expected}",
         ) from None
-
-
-# What the fields of a file accept.
-
-
-def _plain(domain: str) -> Accepts:
-    """A number; ``Dimensionless`` holds it to the domain, which is only told here."""
-    return number("", f"a number {domain}")
-
-
-def _band() -> Accepts:
-    return number("", "a number in [0, 1)", lambda value: 0.0 <= value < 1.0)
-
-
-# The tables of a file, key by key.
-
-
-class _ModelTable(BaseModel):
-    model_config = STRICT
-    m: Annotated[float, _plain("in (0, 1)")]
-    k: Annotated[float, _plain("in (0, 1)")]
-    k0: Annotated[float, _plain("in [0, 1)")]
-    c: Annotated[float, _plain("in [0, 1)")]
-    zeta: Annotated[float, _plain("> 0")]
-    f20: Annotated[float, _plain("in [0, 1]")]
-    b: Annotated[float, _plain("> 0")]
-    sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
-
-
-class _MechanicalTable(BaseModel):
-    model_config = STRICT
-    M1: Annotated[float, physical("kg")]
-    M2: Annotated[float, physical("kg")]
-    C1: Annotated[float, physical("N s/m")]
-    C2: Annotated[float, physical("N s/m", zero=True)]
-    K0: Annotated[float, physical("N/m", zero=True)]
-    K1: Annotated[float, physical("N/m")]
-    K2: Annotated[float, physical("N/m", zero=True)]
-    B: Annotated[float, physical("m")]
-    P1: Annotated[float, physical("N", zero=True)]
-    P2: Annotated[float, physical("N", zero=True)]
-    sides: Annotated[Sides, choice("both", "upper", "lower")] = "both"
-
-
-class _TuningTable(BaseModel):
-    model_config = STRICT
-    frequency: Annotated[float, _band()] = Bands.frequency
-    amplitude: Annotated[float, _band()] = Bands.amplitude
-    offset: Annotated[float, number("", "a number >= 0", lambda value: value >= 0.0)] = Bands.offset
-
-
-class _File(BaseModel):
-    model_config = STRICT
-    format: Annotated[int, exactly(1, "1, the format that this version reads")]
-    title: Annotated[str | None, line("text of one line")] = None
-    model: _ModelTable | None = Field(None, description="a table [model]")
-    mechanical: _MechanicalTable | None = Field(None, description="a table [mechanical]")
-    response: tuple[ResponseTable, ...] = Field(
-        (), strict=False, description="one table [[response]] for each response"
-    )
-    circuit: CircuitTable = Field(CircuitTable(), description="a table [circuit]")
-    tuning: _TuningTable = Field(_TuningTable(), description="a table [tuning]")
-    board: BoardTable = Field(BoardTable(), description="a table [board]")
-    rules: dict[str, object] = Field({}, description="tables [rules.<id>]")
-    search: SearchTable = Field(SearchTable(), description="a table [search]")
-    spread: SpreadTable = Field(default=SpreadTable(), description="a table [spread]")
 
 
 def need_responses(modelfile: ModelFile, more: str = "") -> None:

@@ -10,6 +10,8 @@ import re
 from collections.abc import Mapping
 
 from designer.base.errors import InputError
+from designer.base.schema import keys_of
+from designer.model.model import Dimensionless, Mechanical
 
 KNOWN = (
     "this version knows two masses in a chain with stops on the first, at one distance, and forces "
@@ -44,11 +46,8 @@ OF_A_MODEL = (
     (r"[Ff]_?0|preload\w*|constant|gravity|g", "a constant force"),
 )
 """Patterns of keys of ``[model]`` and ``[mechanical]``, and what each would be."""
-MODELS = {
-    "model": frozenset("m k k0 c zeta f20 b sides".split()),
-    "mechanical": frozenset("M1 M2 C1 C2 K0 K1 K2 B P1 P2 sides".split()),
-}
-"""The keys that the two tables have."""
+MODELS = {"model": Dimensionless, "mechanical": Mechanical}
+"""The two tables that a model may be given in."""
 
 
 def check(data: Mapping[str, object], file: str | None) -> None:
@@ -65,20 +64,14 @@ def check(data: Mapping[str, object], file: str | None) -> None:
     for key, what in TABLES.items():
         if key in data:
             raise InputError(file, key, f"a table {key!r}", _unknown(key, what))
-    for table, known in MODELS.items():
+    for table, record in MODELS.items():
         content = data.get(table)
-        if isinstance(content, Mapping):
-            _check_model(table, [str(key) for key in content if key not in known], file)
-
-
-def _check_model(table: str, keys: list[str], file: str | None) -> None:
-    """Refuse the first of the unknown keys that is of another system."""
-    for key in keys:
-        for pattern, what in OF_A_MODEL:
-            if re.fullmatch(pattern, key, re.ASCII):
-                raise InputError(
-                    file, f"{table}.{key}", f"unknown key {key!r}", _unknown(key, what)
-                )
+        known = keys_of(record)
+        for key in content if isinstance(content, Mapping) else ():
+            for pattern, what in OF_A_MODEL:
+                if key not in known and re.fullmatch(pattern, key, re.ASCII):
+                    found = f"unknown key {key!r}"
+                    raise InputError(file, f"{table}.{key}", found, _unknown(key, what))
 
 
 def _unknown(key: str, what: str) -> str:

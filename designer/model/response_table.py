@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Literal, NoReturn
 
-from pydantic import BaseModel
-
 from designer.base.errors import MISSING, InputError
-from designer.base.schema import STRICT, Accepts, choice, flag, number, physical, shown, span
+from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, shown, span
 from designer.model.model import Mechanical
 from designer.model.si_units import FREQUENCIES, angular_frequency
 
@@ -51,80 +50,23 @@ class Expect:
         return not twin_exact and (n, p, q) == (self.n, self.q, self.p)
 
 
-@dataclass(frozen=True)
-class Response:
-    """A response that the board shall show."""
-
-    omega: float | None
-    """Dimensionless frequency; None for "best": the tool chooses it."""
-    expect: Expect | None = None
-    """The wanted n-p-q, or None where any is of interest."""
-    twin: Twin = "either"
-    """"either" accepts the mirror twin of ``expect`` as well; "exact" does not."""
-    symmetric: bool | None = None
-    """Whether the orbit has to be symmetric (True), asymmetric (False) or either (None)."""
-    b: float | tuple[float, float] | None = None
-    """Clearance at which this response is wanted: a value, a range to choose from, or None for the
-    model's own."""
-
-    def accepts(self, n: int, p: int, q: int) -> bool:
-        """Whether n-p-q is what is expected here; without an expectation, anything is."""
-        return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
-
-
-def response_of(
-    table: ResponseTable, index: int, mechanical: Mechanical | None, file: str | None
-) -> Response:
-    place = f"response[{index}]"
-
-    def refuse(key: str, found: object, expected: str) -> NoReturn:
-        raise InputError(file, f"{place}.{key}", found, expected)
-
-    given = [key for key in _FREQUENCY if getattr(table, key) is not None]
-    if len(given) > 1:
-        many = {2: "two", 3: "three"}[len(given)]
-        refuse(given[-1], " and ".join(given), f"one of the {many}")
-    omega = None if table.omega == "best" else table.omega
-    angular = table.frequency if table.Omega is None else table.Omega
-    if angular is not None:
-        key = given[0]
-        if mechanical is None:
-            told = table.Omega if key == "Omega" else angular / (2.0 * math.pi)
-            unit = "rad/s" if key == "Omega" else "Hz"
-            refuse(key, told, f"omega: {key} in {unit} needs a table [mechanical]")
-        omega = mechanical.omega(angular)
-        if not 0.0 < omega < math.inf:
-            refuse(key, angular, "a frequency within the range of numbers")
-    elif table.omega is None:
-        more = ", or Omega in rad/s, or frequency in Hz"
-        refuse("omega", MISSING, _OMEGA + ("" if mechanical is None else more))
-    if table.twin == "exact" and table.expect is None:
-        refuse("twin", shown(table.twin), "an expect that it can apply to")
-    assert not isinstance(omega, str)
-    return Response(omega, table.expect, table.twin, table.symmetric, table.b)
-
-
 _OMEGA = 'a number > 0, or "best"'
 _FREQUENCY = ("omega", "Omega", "frequency")
 """The keys that give a response's frequency."""
+
+
+def _omega() -> Accepts:
+    """None for "best"."""
+    frequency = number("", _OMEGA, _positive)
+    return Accepts(_OMEGA, lambda value: None if value == "best" else frequency.check(value))
 
 
 def _positive(value: float) -> bool:
     return value > 0.0
 
 
-def _omega() -> Accepts:
-    frequency = number("", _OMEGA, _positive)
-
-    def check(value: object) -> object:
-        return value if value == "best" else frequency.check(value)
-
-    return Accepts(_OMEGA, check)
-
-
 def _frequency() -> Accepts:
     """A frequency in Hz, or a text with its unit; the value is in rad/s."""
-    expected = f"a number > 0 in Hz, or text such as {FREQUENCIES}"
 
     def check(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -134,15 +76,13 @@ def _frequency() -> Accepts:
             raise ValueError
         return angular
 
-    return Accepts(expected, check)
+    return Accepts(f"a number > 0 in Hz, or text such as {FREQUENCIES}", check)
 
 
 def _expect() -> Accepts:
     def check(value: object) -> Expect:
-        if not isinstance(value, str):
-            raise ValueError
         try:
-            return Expect.parse(value)
+            return Expect.parse(str(value))
         except ValueError:
             raise ValueError from None
 
@@ -151,22 +91,76 @@ def _expect() -> Accepts:
 
 def _clearance() -> Accepts:
     expected = "a number > 0, or a range [low, high] of numbers > 0"
-    value_of, span_of = number("", expected, _positive), span("", expected, _positive)
-
-    def check(value: object) -> object:
-        return (span_of if isinstance(value, list) else value_of).check(value)
-
-    return Accepts(expected, check)
+    one, both = number("", expected, _positive), span("", expected, _positive)
+    return Accepts(expected, lambda value: (both if isinstance(value, list) else one).check(value))
 
 
-class ResponseTable(BaseModel):
-    """What a table may hold."""
+@dataclass(frozen=True)
+class Response(FileTable):
+    """A response that the board shall show."""
 
-    model_config = STRICT
-    omega: Annotated[float | Literal["best"] | None, _omega()] = None
-    Omega: Annotated[float | None, physical("rad/s")] = None
-    frequency: Annotated[float | None, _frequency()] = None
+    omega: Annotated[float | None, _omega()]
+    """Dimensionless frequency; None for "best": the tool chooses it."""
     expect: Annotated[Expect | None, _expect()] = None
+    """The wanted n-p-q, or None where any is of interest."""
     twin: Annotated[Twin, choice("either", "exact")] = "either"
+    """"either" accepts the mirror twin of ``expect`` as well; "exact" does not."""
     symmetric: Annotated[bool | None, flag()] = None
+    """Whether the orbit has to be symmetric (True), asymmetric (False) or either (None)."""
     b: Annotated[float | tuple[float, float] | None, _clearance()] = None
+    """Clearance at which this response is wanted: a value, a range to choose from, or None for the
+    model's own."""
+
+    def accepts(self, n: int, p: int, q: int) -> bool:
+        """Whether n-p-q is what is expected here; without an expectation, anything is."""
+        return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
+
+
+@dataclass(frozen=True)
+class ResponseTable(Response):
+    """A response as a file states it."""
+
+    omega: Annotated[float | None, _omega()] = None
+    """Dimensionless frequency; None where another key gives it, or for "best"."""
+    Omega: Annotated[float | None, physical("rad/s")] = None
+    """Angular frequency [rad/s]."""
+    frequency: Annotated[float | None, _frequency()] = None
+    """The same of a key in Hz [rad/s]."""
+
+    def response(
+        self, keys: Iterable[str], index: int, mechanical: Mechanical | None, file: str | None
+    ) -> Response:
+        """The response at its dimensionless frequency.
+
+        keys : those that the file has. index : number of the table in the file, from 1.
+
+        Raises
+        ------
+        InputError : no frequency, or more than one; one in SI units without SI values of the model;
+            a twin of nothing.
+        """
+
+        def refuse(key: str, found: object, expected: str) -> NoReturn:
+            raise InputError(file, f"response[{index}].{key}", found, expected)
+
+        given = [key for key in _FREQUENCY if key in keys]
+        if not given:
+            more = ", or Omega in rad/s, or frequency in Hz"
+            refuse("omega", MISSING, _OMEGA + ("" if mechanical is None else more))
+        if len(given) > 1:
+            many = {2: "two", 3: "three"}[len(given)]
+            refuse(given[-1], " and ".join(given), f"one of the {many}")
+        key, omega = given[0], self.omega
+        angular = self.frequency if self.Omega is None else self.Omega
+        if angular is not None:
+            if mechanical is None:
+                value, unit = (
+                    (angular, "rad/s") if key == "Omega" else (angular / (2.0 * math.pi), "Hz")
+                )
+                refuse(key, value, f"omega: {key} in {unit} needs a table [mechanical]")
+            omega = mechanical.omega(angular)
+            if not 0.0 < omega < math.inf:
+                refuse(key, angular, "a frequency within the range of numbers")
+        if self.twin == "exact" and self.expect is None:
+            refuse("twin", shown(self.twin), "an expect that it can apply to")
+        return Response(omega, self.expect, self.twin, self.symmetric, self.b)

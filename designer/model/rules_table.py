@@ -10,13 +10,12 @@ The reason is required, and goes where the rule's outcome goes.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BaseModel
-
 from designer.base.errors import InputError
-from designer.base.schema import STRICT, Accepts, checked, line, one_of, shown
-from designer.base.units import format_quantity
+from designer.base.schema import Accepts, FileTable, checked, line, number, one_of, shown
+from designer.base.units import format_quantity, parse_quantity
 from designer.catalog.design_rule import DesignRule, Override
 from designer.catalog.design_rules import RULES
 
@@ -39,8 +38,8 @@ def overrides(tables: Mapping[str, Any], file: str | None) -> dict[str, Override
     }
 
 
-class _Table(BaseModel):
-    model_config = STRICT
+@dataclass(frozen=True)
+class _Table(FileTable):
     limit: Annotated[object, Accepts("a limit in the rule's unit", lambda value: value)]
     reason: Annotated[str, line("the reason for another limit, text of one line", 500)]
 
@@ -48,28 +47,23 @@ class _Table(BaseModel):
 def _override(rule: DesignRule, table: dict[str, Any], file: str | None) -> Override:
     place = f"rules.{rule.id}"
     given = checked(_Table, table, file, within=place)
-    what = f"a number >= 0 in {rule.unit}" if rule.unit else "a number >= 0"
-    if rule.unit:
-        what += f', or text such as "{format_quantity(rule.limit or 1.0, rule.unit, 3)}"'
     try:
-        limit = _quantity(given.limit, rule.unit)
+        return Override(_limit(rule).read(given.limit), given.reason)
     except ValueError as error:
-        detail = f" ({error})" if str(error) else ""
-        raise InputError(file, f"{place}.limit", shown(given.limit), what + detail) from None
-    return Override(limit, given.reason)
+        raise InputError(file, f"{place}.limit", shown(given.limit), str(error)) from None
 
 
-def _quantity(value: object, unit: str) -> float:
-    from designer.base.units import parse_quantity
-
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError
-    if isinstance(value, str) and not unit:
-        raise ValueError("without quotes")
-    if unit == "mm" and isinstance(value, str):
-        result = 1e3 * parse_quantity(value, "m")
-    else:
-        result = parse_quantity(value, unit)
-    if result < 0.0:
-        raise ValueError
-    return result
+def _limit(rule: DesignRule) -> Accepts:
+    """What the limit of a rule may be, in its unit."""
+    expected = f"a number >= 0 in {rule.unit}" if rule.unit else "a number >= 0"
+    if rule.unit:
+        expected += f', or text such as "{format_quantity(rule.limit or 1.0, rule.unit, 3)}"'
+    plain = number(rule.unit, expected, lambda value: value >= 0.0)
+    if rule.unit != "mm":
+        return plain
+    return Accepts(
+        expected,
+        lambda value: plain.check(
+            1e3 * parse_quantity(value, "m") if isinstance(value, str) else value
+        ),
+    )

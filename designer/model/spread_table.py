@@ -11,10 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
-
 from designer.base.errors import MISSING, InputError
-from designer.base.schema import STRICT, Accepts, line, number, one_of, span
+from designer.base.schema import Accepts, FileTable, fraction, line, number, one_of, several, span
 from designer.base.units import parse_quantity
 from designer.model.distributions import Binned, Law, Normal, Uniform
 
@@ -56,79 +54,6 @@ class Offset:
     """Standard deviation before the cut [V]."""
     limit: float
     """The cut lies at ± this [V]."""
-
-
-@dataclass(frozen=True)
-class PartRule:
-    """What some parts have of their own; None: as the others."""
-
-    names: tuple[str, ...]
-    """Names of the parts, or of a kind: "resistors"."""
-    grade: float | None = None
-    """Their grade, a fraction."""
-    law: SpreadShape | None = None
-    """How they lie within their grade."""
-    tempco: tuple[float, float] | None = None
-    """Lowest and highest temperature coefficient [1/K]."""
-    ageing: tuple[float, float] | None = None
-    """Lowest and highest relative change by ageing."""
-
-
-@dataclass(frozen=True)
-class NetworkRule:
-    """Parts of one network."""
-
-    parts: tuple[str, ...]
-    """Names of the parts."""
-    share: float | None = None
-    """Share of a part's deviation that is common to all of them."""
-    family: str | None = None
-    """Family of the catalogue's arrays that they are bought as, which then says their share and
-    their grade."""
-
-
-@dataclass(frozen=True)
-class SpreadSpec:
-    """How the boards of a study differ; the defaults are ``bench-1``."""
-
-    resistors: SpreadShape = SpreadShape()
-    """How resistors lie within their grade."""
-    capacitors: SpreadShape = SpreadShape()
-    """How capacitors lie within their grade."""
-    offset: Offset | None = None
-    """Distribution of the op-amps' offsets; None: the catalogue's."""
-    saturation: float = 0.05
-    """Half-width of the output limits, a fraction."""
-    bias: DataSheet | tuple[float, float] = "typical"
-    """Input bias current [A]: the typical figure, what the data sheet gives, or lowest and
-    highest."""
-    gain_bandwidth: DataSheet | tuple[float, float] = "typical"
-    """Gain-bandwidth product [Hz]: the typical figure, what the data sheet gives, or lowest and
-    highest."""
-    supply: float = 0.0
-    """Half-width of the rails, a fraction."""
-    reference_grade: float | None = None
-    """Tolerance of the references, a fraction; None: the catalogue's."""
-    temperature: tuple[float, float] | None = None
-    """Lowest and highest temperature of the board [°C]."""
-    ageing: Literal["catalogue"] | tuple[float, float] | None = None
-    """Lowest and highest relative change of resistors and capacitors; "catalogue": each ± its
-    family's drift."""
-    reels: float = 0.0
-    """Share of a deviation that parts of one value, from one reel, have in common."""
-    network: tuple[NetworkRule, ...] = ()
-    """Parts that stand in one network."""
-    part: tuple[PartRule, ...] = ()
-    """What some parts have of their own."""
-    measured: str | None = None
-    """Name of the file with a bench's list of measured values; None for none."""
-
-
-BENCH_1 = SpreadSpec()
-"""What a file without the table says."""
-
-
-# What the fields accept.
 
 
 def _shape() -> Accepts:
@@ -180,22 +105,13 @@ def _offset() -> Accepts:
     return Accepts('0, or { sigma = "3 mV", limit = "10 mV" }', check)
 
 
-def _fraction(expected: str) -> Accepts:
-    return number("", expected, lambda value: 0.0 <= value < 1.0)
-
-
-def _share() -> Accepts:
-    return number("", "a share from 0 to 1", lambda value: 0.0 <= value <= 1.0)
-
-
 def _drift(expected: str, fine: Callable[[float], bool]) -> Accepts:
     """A half-width, or lowest and highest."""
     one, two = number("", expected, fine), span("", expected, fine)
 
     def check(value: object) -> tuple[float, float]:
         if isinstance(value, list):
-            low, high = two.check(value)
-            return low, high
+            return two.check(value)  # type: ignore[no-any-return]
         width = one.check(value)
         if width < 0.0:
             raise ValueError("± a number >= 0")
@@ -205,19 +121,19 @@ def _drift(expected: str, fine: Callable[[float], bool]) -> Accepts:
 
 
 def _tempco() -> Accepts:
-    said = "1/K: a number >= 0 such as 100e-6 for ±, or [low, high]"
-    return _drift(said, lambda value: abs(value) < 0.01)
+    expected = "1/K: a number >= 0 such as 100e-6 for ±, or [low, high]"
+    return _drift(expected, lambda value: abs(value) < 0.01)
 
 
 def _ageing(catalogue: bool = False) -> Accepts:
-    said = "a fraction >= 0 such as 0.005 for ±, or [low, high]"
-    said += ', or "catalogue"' if catalogue else ""
-    given = _drift(said, lambda value: abs(value) < 1.0)
+    expected = "a fraction >= 0 such as 0.005 for ±, or [low, high]"
+    expected += ', or "catalogue"' if catalogue else ""
+    either = _drift(expected, lambda value: abs(value) < 1.0)
 
     def check(value: object) -> object:
-        return value if catalogue and value == "catalogue" else given.check(value)
+        return value if catalogue and value == "catalogue" else either.check(value)
 
-    return Accepts(said, check)
+    return Accepts(expected, check)
 
 
 def _figure(unit: str, example: str) -> Accepts:
@@ -230,93 +146,113 @@ def _figure(unit: str, example: str) -> Accepts:
     return Accepts(expected, check)
 
 
-def _temperature() -> Accepts:
-    return span("", "a range [low, high] in °C, such as [0, 50]", lambda t: t > ABSOLUTE_ZERO)
+_SHARE = number("", "a share from 0 to 1", lambda value: 0.0 <= value <= 1.0)
 
 
 def _names() -> Accepts:
-    one = line("a name").check
+    expected = 'a part such as "R203", or a list of parts'
+    listed = several(expected, line("a name"), least=1, single=True, again=True)
 
     def check(value: object) -> tuple[str, ...]:
-        names = [value] if isinstance(value, str) else value
-        if not isinstance(names, list) or not names:
-            raise ValueError
-        read = tuple(str(one(name)) for name in names)
-        if len(set(read)) < len(read):
+        names: tuple[str, ...] = listed.check(value)
+        if len(set(names)) < len(names):
             raise ValueError("each of them once")
-        return read
+        return names
 
-    return Accepts('a part such as "R203", or a list of parts', check)
+    return Accepts(expected, check)
 
 
-class _PartTable(BaseModel):
-    model_config = STRICT
+@dataclass(frozen=True)
+class PartRule(FileTable):
+    """What some parts have of their own; None: as the others."""
+
     names: Annotated[tuple[str, ...], _names()]
-    grade: Annotated[float | None, _fraction("a fraction in [0, 1): 0.001 is 0.1 %")] = None
+    """Names of the parts, or of a kind: "resistors"."""
+    grade: Annotated[float | None, fraction("0.001 is 0.1 %", zero=True)] = None
+    """Their grade, a fraction."""
     law: Annotated[SpreadShape | None, _shape()] = None
+    """How they lie within their grade."""
     tempco: Annotated[tuple[float, float] | None, _tempco()] = None
+    """Lowest and highest temperature coefficient [1/K]."""
     ageing: Annotated[tuple[float, float] | None, _ageing()] = None
+    """Lowest and highest relative change by ageing."""
 
 
-class _NetworkTable(BaseModel):
-    model_config = STRICT
+@dataclass(frozen=True)
+class NetworkRule(FileTable):
+    """Parts of one network."""
+
     parts: Annotated[tuple[str, ...], _names()]
-    share: Annotated[float | None, _share()] = None
+    """Names of the parts."""
+    share: Annotated[float | None, _SHARE] = None
+    """Share of a part's deviation that is common to all of them."""
     family: Annotated[str | None, line("a family of arrays of the catalogue")] = None
+    """Family of the catalogue's arrays that they are bought as, which then says their share and
+    their grade."""
 
 
-class SpreadTable(BaseModel):
-    """The keys of ``[spread]``, each with what it accepts."""
+@dataclass(frozen=True)
+class SpreadSpec(FileTable):
+    """How the boards of a study differ; the defaults are ``bench-1``."""
 
-    model_config = STRICT
-    resistors: Annotated[SpreadShape, _shape()] = SpreadSpec.resistors
-    capacitors: Annotated[SpreadShape, _shape()] = SpreadSpec.capacitors
+    resistors: Annotated[SpreadShape, _shape()] = SpreadShape()
+    """How resistors lie within their grade."""
+    capacitors: Annotated[SpreadShape, _shape()] = SpreadShape()
+    """How capacitors lie within their grade."""
     offset: Annotated[Offset | None, _offset()] = None
-    saturation: Annotated[float, _fraction("a fraction in [0, 1): 0.05 is ± 5 %")] = (
-        SpreadSpec.saturation
-    )
+    """Distribution of the op-amps' offsets; None: the catalogue's."""
+    saturation: Annotated[float, fraction("0.05 is ± 5 %", zero=True)] = 0.05
+    """Half-width of the output limits, a fraction."""
     bias: Annotated[DataSheet | tuple[float, float], _figure("A", '["0 A", "200 pA"]')] = "typical"
+    """Input bias current [A]: the typical figure, what the data sheet gives, or lowest and
+    highest."""
     gain_bandwidth: Annotated[
         DataSheet | tuple[float, float], _figure("Hz", '["2.5 MHz", "4 MHz"]')
     ] = "typical"
-    supply: Annotated[float, _fraction("a fraction in [0, 1): 0.02 is ± 2 %")] = SpreadSpec.supply
-    reference_grade: Annotated[
-        float | None, _fraction("a fraction in [0, 1): 0.001 is ± 0.1 %")
+    """Gain-bandwidth product [Hz]: the typical figure, what the data sheet gives, or lowest and
+    highest."""
+    supply: Annotated[float, fraction("0.02 is ± 2 %", zero=True)] = 0.0
+    """Half-width of the rails, a fraction."""
+    reference_grade: Annotated[float | None, fraction("0.001 is ± 0.1 %", zero=True)] = None
+    """Tolerance of the references, a fraction; None: the catalogue's."""
+    temperature: Annotated[
+        tuple[float, float] | None,
+        span("", "a range [low, high] in °C, such as [0, 50]", lambda t: t > ABSOLUTE_ZERO),
     ] = None
-    temperature: Annotated[tuple[float, float] | None, _temperature()] = None
-    ageing: Annotated[Literal["catalogue"] | tuple[float, float] | None, _ageing(True)] = None
-    reels: Annotated[float, _share()] = SpreadSpec.reels
-    network: tuple[_NetworkTable, ...] = Field(
-        default=(), strict=False, description="tables [[spread.network]]"
-    )
-    part: tuple[_PartTable, ...] = Field(
-        default=(), strict=False, description="tables [[spread.part]]"
-    )
+    """Lowest and highest temperature of the board [°C]."""
+    ageing: Annotated[
+        Literal["catalogue"] | tuple[float, float] | None, _ageing(catalogue=True)
+    ] = None
+    """Lowest and highest relative change of resistors and capacitors; "catalogue": each ± its
+    family's drift."""
+    reels: Annotated[float, _SHARE] = 0.0
+    """Share of a deviation that parts of one value, from one reel, have in common."""
+    network: tuple[NetworkRule, ...] = ()
+    """Parts that stand in one network."""
+    part: tuple[PartRule, ...] = ()
+    """What some parts have of their own."""
     measured: Annotated[str | None, line("the name of a CSV file beside the model file")] = None
+    """Name of the file with a bench's list of measured values; None for none."""
 
-    def spec(self, resistor_grade: float, capacitor_grade: float, file: str | None) -> SpreadSpec:
-        """The checked table.
+    def check(self, resistor_grade: float, capacitor_grade: float, file: str | None) -> None:
+        """Refuse what its keys say only together.
 
         Raises
         ------
         InputError : what was picked out is not better than what was bought; a network that says
             both its share and its family, or neither.
         """
-        for number_, rule in enumerate(self.network, start=1):
+        for index, rule in enumerate(self.network, start=1):
             if (rule.share is None) is (rule.family is None):
                 found = MISSING if rule.share is None else "share and family"
                 expected = "a share, or the family of arrays that it is bought from"
-                raise InputError(file, f"spread.network[{number_}].share", found, expected)
-        for key, shape, grade in (
-            ("resistors", self.resistors, resistor_grade),
-            ("capacitors", self.capacitors, capacitor_grade),
-        ):
-            check_binned(shape, grade, f"spread.{key}", file)
-        read = {key: value for key, value in self if key not in ("network", "part")}
-        network = tuple(NetworkRule(**dict(table)) for table in self.network)
-        return SpreadSpec(
-            **read, network=network, part=tuple(PartRule(**dict(table)) for table in self.part)
-        )
+                raise InputError(file, f"spread.network[{index}].share", found, expected)
+        check_binned(self.resistors, resistor_grade, "spread.resistors", file)
+        check_binned(self.capacitors, capacitor_grade, "spread.capacitors", file)
+
+
+BENCH_1 = SpreadSpec()
+"""What a file without the table says."""
 
 
 def check_binned(shape: SpreadShape, grade: float, field: str, file: str | None) -> None:

@@ -17,7 +17,8 @@ from designer.base.errors import Unreachable
 from designer.board.bom import bill
 from designer.board.component import components
 from designer.catalog.catalog import Catalog
-from designer.catalog.entries import PRICE_CLASSES, Kind, OpAmp
+from designer.catalog.entries import Kind, OpAmp
+from designer.catalog.fields import PRICE_CLASSES
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import paper_values
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.catalog.entries import Figure, OpAmp
+from designer.catalog.entries import OpAmp
+from designer.catalog.fields import Figure
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.opamp_model import (
     HEAVY_LOAD,

@@ -10,7 +10,8 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.schema import one_of
 from designer.base.units import format_quantity
 from designer.catalog.catalog import Catalog
-from designer.catalog.entries import Figure, Kind, PartFamily
+from designer.catalog.entries import Kind, PartFamily
+from designer.catalog.fields import Figure
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.circuit.resistors import composites_of
 from designer.model.distributions import Law, Split, Uniform

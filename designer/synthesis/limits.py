@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.catalog.entries import Figure, OpAmp
+from designer.catalog.entries import OpAmp
+from designer.catalog.fields import Figure
 from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective

@@ -17,8 +17,9 @@ from designer.base.errors import InputError, InputErrors, Unreachable
 from designer.base.eseries import SERIES, eseries, series_values
 from designer.base.units import decode_value
 from designer.catalog.catalog import Catalog, load_catalog
-from designer.catalog.entries import PRICE_CLASSES, Figure, OpAmp
-from designer.catalog.folders import ENVIRONMENT
+from designer.catalog.entries import OpAmp
+from designer.catalog.fields import PRICE_CLASSES, Figure
+from designer.catalog.read import ENVIRONMENT
 
 SHIPPED = Path(__file__).resolve().parents[2] / "catalogs"
 
@@ -660,14 +661,14 @@ def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path: Path) ->
         "family[1].garde",
         "family[1].price",
         "family[1].sources",
+        "family[2].elements",
+        "family[2].part_number.code",
         "opamp[1].offset.source",
         "opamp[1].gain.mni",
         "opamp[1].gain.min",
-        "family[2].elements",
-        "family[2].part_number.code",
     ]
     assert "family[1].sources is missing, expected a list of data sheets" in said[2]
-    assert said[3].startswith("opamp[1].offset.source is missing, expected where the figure stands")
+    assert said[5].startswith("opamp[1].offset.source is missing, expected where the figure stands")
     assert all(p.file == str(mine / "own.toml") for p in caught.value.problems)
     assert caught.value.exit_status == 2
 

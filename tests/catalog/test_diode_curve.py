@@ -11,7 +11,7 @@ from designer.base.errors import InputError
 from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
 from designer.catalog.diode_curve import card, diode_model
-from designer.catalog.entries import Figure
+from designer.catalog.fields import Figure
 from designer.spice.batch_backend import BatchNgspice
 from designer.spice.worker import open_simulator
 

@@ -20,7 +20,7 @@ from designer.board.board_parts import board_circuit
 from designer.board.bom import bill, bill_csv
 from designer.board.component import components
 from designer.catalog.catalog import load_catalog
-from designer.catalog.entries import PRICE_CLASSES
+from designer.catalog.fields import PRICE_CLASSES
 from designer.centering.cure_branch import CureBranch, better_opamps, branch_of, branches
 from designer.centering.cure_slots import part_slots
 from designer.centering.cure_upgrade import (

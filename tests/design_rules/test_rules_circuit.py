@@ -10,7 +10,7 @@ import pytest
 
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override, judged
 from designer.catalog.design_rules import BY_ID
-from designer.catalog.entries import Figure
+from designer.catalog.fields import Figure
 from designer.circuit.dead_zone_kind import Kind, Sides
 from designer.circuit.netlist import GROUND, Capacitor, Diode, nominal_board
 from designer.circuit.reduction import Reduction

@@ -15,7 +15,7 @@ import pytest
 from designer.base.errors import InputError
 from designer.board.kicad_project import Project
 from designer.catalog.catalog import load_catalog
-from designer.catalog.folders import ENVIRONMENT
+from designer.catalog.read import ENVIRONMENT
 from designer.check.synthesis_result import Synthesis
 from designer.cli import entry
 from designer.jobs import kicad_files

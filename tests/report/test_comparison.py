@@ -14,7 +14,7 @@ import pytest
 from designer.base import figure_style
 from designer.base.manifest import MANIFEST
 from designer.catalog.catalog import load_catalog
-from designer.catalog.entries import PRICE_CLASSES
+from designer.catalog.fields import PRICE_CLASSES
 from designer.circuit import paper_values
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.paper_values import ComparedCircuit

@@ -40,7 +40,6 @@ LAZY = {
         ("jobs.json_answers", "model.model"),
         ("jobs.origin", "spice.batch_backend"),
         ("jobs.study_stage", "yields.dask_runner"),
-        ("model.rules_table", "base.units"),
     },
 }
 """Imports inside functions, outside the command line, each with its reason."""

@@ -16,7 +16,7 @@ from designer.board.board_parts import board_circuit
 from designer.board.component import Component, components
 from designer.board.pins import Pin
 from designer.catalog.design_rule import RuleOutcome
-from designer.catalog.entries import Figure
+from designer.catalog.fields import Figure
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.design import Certificate, Design

@@ -10,7 +10,7 @@ import pytest
 
 from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
-from designer.catalog.entries import Figure
+from designer.catalog.fields import Figure
 from designer.catalog.vendor_model import PINS, VendorModel
 from designer.circuit.netlist import Board, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
