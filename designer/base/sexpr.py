@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from designer.base.errors import InputError
@@ -20,10 +21,11 @@ LARGEST = 1e9
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _TOKEN = re.compile(
-    r'(?P<space>\s+)|(?P<open>\()|(?P<close>\))|"(?P<quoted>(?:[^"\\]|\\.)*)"'
-    r'|(?P<bare>[^\s()"]+)',
-    re.DOTALL,
+    r'^[^\S\n]*\#[^\n]*|\s*\n|[^\S\n]+|(\()|(\))|"((?:[^"\\]|\\.)*)"|([^\s()"]+)|(")',
+    re.DOTALL | re.MULTILINE,
 )
+"""A comment or space (no group), or a token: its group says of which kind it is."""
+_OPEN, _CLOSE, _QUOTED, _BARE_ATOM, _WITHOUT_END = range(1, 6)
 _BARE = re.compile(r'[^\s()"#]+[^\s()"]*')
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _MEANS = {"n": "\n", "r": "\r", "t": "\t"}
@@ -38,8 +40,22 @@ class Atom:
     """The word, without quotation marks."""
     quoted: bool = False
     """Whether it stands in quotation marks."""
-    place: tuple[int, int] = field(default=(0, 0), compare=False, repr=False)
-    """(line, column) from 1 where it begins."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The text that expressions were read from, for messages."""
+
+    text: str
+    """All of it."""
+    file: Path | None
+    """Its file."""
+
+    def error(self, offset: int, found: str, expected: str) -> InputError:
+        """Something wrong at this offset into the text."""
+        line = self.text.count("\n", 0, offset) + 1
+        column = offset - self.text.rfind("\n", 0, offset)
+        return InputError(self.file, f"line {line}, column {column}", found, expected)
 
 
 @dataclass(frozen=True)
@@ -48,23 +64,23 @@ class Expression:
 
     items: tuple[Atom | Expression, ...]
     """The atoms and lists, in order."""
-    place: tuple[int, int] = field(default=(0, 0), compare=False, repr=False)
-    """(line, column) from 1 where it begins, for messages."""
-    file: Path | None = field(default=None, compare=False, repr=False)
-    """The file that it was read from, for messages."""
+    source: _Source = field(default=_Source("", None), compare=False, repr=False)
+    """What it was read from, for messages."""
+    offset: int = field(default=0, compare=False, repr=False)
+    """Where it begins there, in characters."""
 
-    @property
+    @cached_property
     def name(self) -> str:
         """The first atom; empty where there is none."""
         first = self.items[0] if self.items else None
         return first.text if isinstance(first, Atom) else ""
 
-    @property
+    @cached_property
     def atoms(self) -> tuple[str, ...]:
         """The texts of the atoms after the name, in order."""
         return tuple(i.text for i in self.items[1:] if isinstance(i, Atom))
 
-    @property
+    @cached_property
     def children(self) -> tuple[Expression, ...]:
         """The lists in it, in order."""
         return tuple(i for i in self.items if isinstance(i, Expression))
@@ -108,7 +124,7 @@ class Expression:
 
     def error(self, found: str, expected: str) -> InputError:
         """Something wrong with this list, with its place in the file."""
-        return _error(self.file, self.place, f"({self.name} …): {found}", expected)
+        return self.source.error(self.offset, f"({self.name} …): {found}", expected)
 
 
 def expression(name: str, *values: Atom | Expression | str | float | bool | None) -> Expression:
@@ -134,54 +150,47 @@ def read(text: str, file: Path | None = None) -> Expression:
     ------
     InputError : not an S-expression, cut off, or more than one; with line and column.
     """
-    found = read_all(text, file)
-    if len(found) != 1:
-        place = found[1].place if found else (1, 1)
-        raise _error(file, place, f"{len(found)} expressions", "one")
-    return found[0]
+    expressions = read_all(text, file)
+    if len(expressions) != 1:
+        offset = expressions[1].offset if expressions else 0
+        raise _Source(text, file).error(offset, f"{len(expressions)} expressions", "one")
+    return expressions[0]
 
 
 def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
     """The expressions of a file; InputError as in ``read``."""
-    done: list[Expression] = []
-    stack: list[tuple[tuple[int, int], list[Atom | Expression]]] = []
-    line, line_start, at = 1, 0, 0
-    blank = True  # nothing but space on this line so far
-    while at < len(text):
-        place = (line, at - line_start + 1)
-        if blank and text[at] == "#":
-            end = text.find("\n", at)
-            at = len(text) if end < 0 else end
+    source = _Source(text, file)
+    finished: list[Expression] = []
+    stack: list[tuple[int, list[Atom | Expression]]] = []
+    for match in _TOKEN.finditer(text):
+        kind = match.lastindex
+        if kind is None:
             continue
-        match = _TOKEN.match(text, at)
-        if match is None:
-            raise _error(file, place, "text without an end", "a quotation mark that closes it")
-        kind, token = match.lastgroup, match.group()
-        if kind == "open":
+        if kind == _OPEN:
             if len(stack) == DEEPEST:
-                raise _error(file, place, f"more than {DEEPEST} levels", "a file as KiCad writes")
-            stack.append((place, []))
-        elif kind == "close":
-            if not stack:
-                raise _error(file, place, '")"', "nothing after the last expression")
-            began, items = stack.pop()
-            made = Expression(tuple(items), began, file)
-            (stack[-1][1] if stack else done).append(made)
-        elif kind != "space":
-            if not stack:
-                raise _error(file, place, token[:40], '"("')
-            quoted = kind == "quoted"
-            inside = _unescaped(match.group("quoted")) if quoted else token
-            stack[-1][1].append(Atom(inside, quoted, place))
-        at = match.end()
-        newlines = token.count("\n")
-        if newlines:
-            line += newlines
-            line_start = match.start() + token.rindex("\n") + 1
-        blank = (blank or newlines > 0) if kind == "space" else False
+                expected = "a file as KiCad writes"
+                raise source.error(match.start(), f"more than {DEEPEST} levels", expected)
+            stack.append((match.start(), []))
+        elif kind == _WITHOUT_END:
+            expected = "a quotation mark that closes it"
+            raise source.error(match.start(), "text without an end", expected)
+        elif not stack:
+            wrong = (
+                ('")"', "nothing after the last expression")
+                if kind == _CLOSE
+                else (match[0][:40], '"("')
+            )
+            raise source.error(match.start(), *wrong)
+        elif kind == _CLOSE:
+            offset, items = stack.pop()
+            (stack[-1][1] if stack else finished).append(Expression(tuple(items), source, offset))
+        elif kind == _QUOTED:
+            stack[-1][1].append(Atom(_unescaped(match[kind]), True))
+        else:
+            stack[-1][1].append(Atom(match[kind]))
     if stack:
-        raise _error(file, stack[-1][0], 'a "(" that nothing closes', "a whole file")
-    return tuple(done)
+        raise source.error(stack[-1][0], 'a "(" that nothing closes', "a whole file")
+    return tuple(finished)
 
 
 def expression_text(made: Expression) -> str:
@@ -237,8 +246,6 @@ def _item(value: Atom | Expression | str | float | bool) -> Atom | Expression:
 
 
 def _unescaped(text: str) -> str:
+    if "\\" not in text:
+        return text
     return _ESCAPE.sub(lambda m: _MEANS.get(m.group(1), m.group(1)), text)
-
-
-def _error(file: Path | None, place: tuple[int, int], found: str, expected: str) -> InputError:
-    return InputError(file, f"line {place[0]}, column {place[1]}", found, expected)
