@@ -14,6 +14,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from decimal import ROUND_HALF_EVEN, Context, Decimal
+from functools import lru_cache
 
 _PREFIXES = {
     "f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "": 0, "k": 3, "K": 3, "M": 6, "G": 9, "T": 12,
@@ -93,6 +94,7 @@ def told_apart(values: Sequence[float], digits: int, most: int = 12) -> list[str
     return [f"{value:.{digits}g}" for value in values]
 
 
+@lru_cache(maxsize=65536)  # each reading of a catalogue spells every value of it
 def encode_value(code: str, value: float) -> str:
     """``value`` (ohm or farad) as the named code of a part number spells it.
 
