@@ -43,7 +43,7 @@ class Atom:
 
 
 @dataclass(frozen=True)
-class _Source:
+class SourceText:
     """The text that expressions were read from, for messages."""
 
     text: str
@@ -64,7 +64,7 @@ class Expression:
 
     items: tuple[Atom | Expression, ...]
     """The atoms and lists, in order."""
-    source: _Source = field(default=_Source("", None), compare=False, repr=False)
+    source: SourceText = field(default=SourceText("", None), compare=False, repr=False)
     """What it was read from, for messages."""
     offset: int = field(default=0, compare=False, repr=False)
     """Where it begins there, in characters."""
@@ -153,13 +153,13 @@ def read(text: str, file: Path | None = None) -> Expression:
     expressions = read_all(text, file)
     if len(expressions) != 1:
         offset = expressions[1].offset if expressions else 0
-        raise _Source(text, file).error(offset, f"{len(expressions)} expressions", "one")
+        raise SourceText(text, file).error(offset, f"{len(expressions)} expressions", "one")
     return expressions[0]
 
 
 def read_all(text: str, file: Path | None = None) -> tuple[Expression, ...]:
     """The expressions of a file; InputError as in ``read``."""
-    source = _Source(text, file)
+    source = SourceText(text, file)
     finished: list[Expression] = []
     stack: list[tuple[int, list[Atom | Expression]]] = []
     for match in _TOKEN.finditer(text):

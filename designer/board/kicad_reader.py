@@ -206,18 +206,13 @@ def _check_version(board: Expression) -> None:
     found = board.get("version").text()
     if not (found.isascii() and found.isdecimal() and len(found) <= 8):  # a date, YYYYMMDD
         raise board.get("version").error(found, "the number of a file version")
-    version = int(found)
+    version, file = int(found), board.source.file
     if version > NEWEST:
-        raise InputError(
-            board.file,
-            "version",
-            found,
-            f"at most {NEWEST}, KiCad 9: this board is from a newer one",
-        )
+        expected = f"at most {NEWEST}, KiCad 9: this board is from a newer one"
+        raise InputError(file, "version", found, expected)
     if version < OLDEST:
-        raise InputError(
-            board.file, "version", found, f"at least {OLDEST}, KiCad 7: save the board with KiCad 9"
-        )
+        expected = f"at least {OLDEST}, KiCad 7: save the board with KiCad 9"
+        raise InputError(file, "version", found, expected)
 
 
 def _footprint(found: Expression) -> PlacedFootprint:
