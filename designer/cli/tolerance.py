@@ -26,7 +26,7 @@ from designer.cli.app import (
     compiling,
     session,
 )
-from designer.cli.verbs import BlameBudget, OwnSeed, WithBlame, print_answer, print_early
+from designer.cli.verbs import BlameBudget, EarlyTables, OwnSeed, WithBlame, print_answer
 
 
 class MapOver(StrEnum):
@@ -120,7 +120,7 @@ def tolerance(
         )
         options.check()
         command = partial(Options.command, verb="tolerance", model=model, out=out)
-        shown = partial(print_early, progress=progress, verb="tolerance", silent=json or quiet)
+        shown = EarlyTables(progress, "tolerance", silent=json or quiet)
         if measured is not None:
             from designer.jobs.measured_job import measured_into
 

@@ -106,7 +106,7 @@ def run(
         options = folder_numbers.of_study(model, folder, modelfile, options, given)
         modelfile = search_job.chosen(modelfile, folder, options, progress)
         command = partial(Options.command, verb="run", model=model, out=out)
-        shown = partial(print_early, progress=progress, verb="run", silent=json or quiet)
+        shown = EarlyTables(progress, "run", silent=json or quiet)
         outcome = study_job.run_into(modelfile, folder, options, progress, command, shown)
     return print_answer(outcome, json, quiet, "run")
 
@@ -314,11 +314,18 @@ def print_answer(outcome: JobOutcome, json: bool, quiet: bool, verb: str) -> int
     return 0 if outcome.satisfied else 1
 
 
-def print_early(answer: Mapping[str, Any], progress: Progress, verb: str, silent: bool) -> None:
-    """The tables of an answer whose yields stand, while the work goes on."""
-    if not silent:
-        with progress.aside():
-            _shown(answer, verb)
+class EarlyTables:
+    """Prints the tables of a verb's answer while the work goes on: the first time all of them, then
+    those of the study alone, since parts and settings stay as they are."""
+
+    def __init__(self, progress: Progress, verb: str, silent: bool) -> None:
+        self._progress, self._verb, self._silent = progress, verb, silent
+
+    def __call__(self, answer: Mapping[str, Any]) -> None:
+        if not self._silent:
+            with self._progress.aside():
+                _shown(answer, self._verb)
+        self._verb = "tolerance"
 
 
 def _shown(answer: Mapping[str, Any], verb: str) -> None:

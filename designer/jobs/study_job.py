@@ -57,7 +57,7 @@ def run_into(
     """The verbs ``run`` and ``tolerance``: design, check, study, report.
 
     command : the command line as the report states it (``Options.command``). shown : is given the
-    answer once its yields stand and are written, where blame or maps take time after that.
+    answer while work goes on: see `StudyStage`.
 
     Raises
     ------

@@ -6,6 +6,7 @@ studied and written in the same way, each at its own place in the folder.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -91,7 +92,8 @@ class StudyStage:
     progress: Progress
     """Told how far the work is."""
     shown: Callable[[Mapping[str, Any]], None]
-    """Called with the answer once the yields stand, where blame or maps take time after that."""
+    """Called with the answer once the yields of the exact circuit stand, where ngspice is asked
+    after that, and once all yields stand, where blame or maps take time after that."""
     design_seconds: float
     """Wall time that the design took [s]."""
     early: bool = False
@@ -134,6 +136,11 @@ class StudyStage:
                 m.modelfile, m.catalog, m.found, m.design, responses, study, said, cost, equations
             )
 
+        def sampled(study: Study) -> None:
+            document = _document(result_of(study))
+            self.progress.note("yields of the exact circuit; ngspice is now asked about boards")
+            self.shown(run_json(folder.json(DESIGN), json.loads(dumps(document))))
+
         def standing(study: Study) -> None:
             guard()
             self._write(result_of(study))
@@ -158,6 +165,7 @@ class StudyStage:
             stores=stores,
             runner=help_.runner,
             progress=self.progress,
+            sampled=sampled,
             standing=standing,
         )
         guard()
@@ -176,13 +184,7 @@ class StudyStage:
     def _write(self, result: RunResult) -> None:
         """``tolerance.json``, the boards of a list and the report, of what the study has."""
         folder, place = self.folder, self.place
-        document = study_json(
-            result.study,
-            result.provenance,
-            result.cost,
-            result.equations,
-            result.modelfile.mechanical,
-        )
+        document = _document(result)
         folder.write(place.prefix + TOLERANCE, dumps(document))
         if document["boards"] is not None:
             asked = [(c.model.omega, c.model.expected) for c in result.checked]
@@ -256,6 +258,16 @@ def checks(
     if gates is None and not any(g and isinstance(g.read, SimulationFailed) for g in met):
         kept.put("gates", key, met)
     return equations, checked
+
+
+def _document(result: RunResult) -> dict[str, Any]:
+    return study_json(
+        result.study,
+        result.provenance,
+        result.cost,
+        result.equations,
+        result.modelfile.mechanical,
+    )
 
 
 def _provenance(made: Synthesis, study: Study, options: Options) -> dict[str, Any]:

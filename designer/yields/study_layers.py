@@ -97,9 +97,13 @@ class Work:
     blame_budget: int = BUDGET
     """Steps that the blame may take."""
 
-    def made(self, study: Study) -> Study:
-        """A study of the plan's samples."""
-        return self._all_heard(self._sampled(study, study.plan.samples), NOMINAL_SAMPLES)
+    def sampled(self, study: Study) -> Study:
+        """With the exact circuit's answers of the plan's samples."""
+        return self._sampled(study, study.plan.samples)
+
+    def heard(self, study: Study) -> Study:
+        """With ngspice's answers about some of the boards, or all."""
+        return self._all_heard(study, NOMINAL_SAMPLES)
 
     def grown(self, study: Study) -> Study:
         """A study of as many samples as it takes; it stops at edges of blocks only."""

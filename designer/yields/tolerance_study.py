@@ -60,6 +60,7 @@ def tolerance(
     stores: Stores | None = None,
     runner: Runner | None = None,
     progress: Progress | None = None,
+    sampled: Callable[[Study], None] = lambda _: None,
     standing: Callable[[Study], None] | None = None,
 ) -> Study:
     """How many boards show each response, under the spread of the model file.
@@ -71,8 +72,9 @@ def tolerance(
     settings over which the yield is wanted (``yield_maps.OVERS``). checked : of the same design, to
     save the time of the gate. pool : where ngspice runs; without one ngspice is not asked. stores :
     where rows are read from and written to. runner : who computes blocks; this process if None.
-    standing : is given the study once its yields stand and the blame or maps are still to be worked
-    out.
+    sampled : is given the study once the exact circuit has every board and ngspice is still to be
+    asked. standing : is given the study once its yields stand and the blame or maps are still to be
+    worked out.
     """
     need_responses(synthesis.modelfile)
     said = Progress() if progress is None else progress
@@ -106,7 +108,13 @@ def tolerance(
         rung,
         blame_budget,
     )
-    study = work.grown(study) if until is not None else work.made(study)
+    if until is None:
+        study = work.sampled(study)
+        if pool is not None:
+            sampled(study)
+        study = work.heard(study)
+    else:
+        study = work.grown(study)
     if tuned:
         study = work.tuned(study, synthesis.modelfile.tuning)
     trim = dc_trim(synthesis)

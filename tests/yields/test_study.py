@@ -227,7 +227,9 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    study = Work(1, pool, Stores(), Here(1), Progress(), rung).made(study)
+    study = Work(1, pool, Stores(), Here(1), Progress(), rung).heard(
+        Work(1, pool, Stores(), Here(1), Progress(), rung).sampled(study)
+    )
     for both in study.combined:
         assert both is not None
         (difference,) = both.differences
