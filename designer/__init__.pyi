@@ -7,7 +7,7 @@ from .base.errors import (
 from .base.version import (
     __version__ as __version__,
 )
-from .board.bill_frame import (
+from .board.bom import (
     bill_of_materials as bill_of_materials,
 )
 from .catalog.catalog import (

@@ -194,9 +194,11 @@ from .seal import (
 )
 from .sexpr import (
     Atom as Atom,
+    Contents as Contents,
     Expression as Expression,
     expression as expression,
     expression_text as expression_text,
+    lists as lists,
     number_text as number_text,
     read as read,
     word as word,

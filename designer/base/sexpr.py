@@ -7,10 +7,11 @@ whose first character is ``#`` is a comment. Files hold one expression; a ``.kic
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TypeAlias
 
 from designer.base.errors import InputError
 
@@ -127,9 +128,31 @@ class Expression:
         return self.source.error(self.offset, f"({self.name} …): {found}", expected)
 
 
-def expression(name: str, *values: Atom | Expression | str | float | bool | None) -> Expression:
-    """A list: text is quoted, numbers are bare, truth is ``yes`` or ``no``, None is left out."""
-    return Expression((Atom(name), *(_item(v) for v in values if v is not None)))
+Value: TypeAlias = "Atom | Expression | str | float | bool | None"
+Contents: TypeAlias = "Value | tuple[Value, ...] | Mapping[str, Contents]"
+
+
+def expression(name: str, /, *values: Value, **inner: Contents) -> Expression:
+    """A list: text is quoted, numbers are bare, truth is ``yes`` or ``no``, None is left out.
+
+    inner : see ``lists``. ``expression("pad", "1", at=(1, 2))`` is ``(pad "1" (at 1 2))``.
+    """
+    items = [_item(value) for value in values if value is not None]
+    return Expression((Atom(name), *items, *lists(**inner)))
+
+
+def lists(**named: Contents) -> tuple[Expression, ...]:
+    """Lists by name, in order: each with its one value, a tuple of values, or the lists in it.
+
+    What is None is left out, and an empty tuple is a list of its name alone.
+    """
+    return tuple(_list(name, inner) for name, inner in named.items() if inner is not None)
+
+
+def _list(name: str, inner: Contents) -> Expression:
+    if isinstance(inner, Mapping):
+        return expression(name, **inner)
+    return expression(name, *(inner if isinstance(inner, tuple) else (inner,)))
 
 
 def word(text: str) -> Atom:

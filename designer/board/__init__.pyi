@@ -23,10 +23,12 @@ from .component import (
     pin_numbers as pin_numbers,
     to_buy as to_buy,
 )
-from .kicad_footprint import (
-    FILE_VERSION as FILE_VERSION,
+from .kicad_board import (
+    layers as layers,
 )
 from .kicad_names import (
+    BOARD_VERSION as BOARD_VERSION,
+    HEAD as HEAD,
     LIBRARY as LIBRARY,
     POWER as POWER,
     circuit_net as circuit_net,

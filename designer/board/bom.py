@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from designer.base.csv_tables import csv_text
+from designer.base.frames import frame
 from designer.base.natural_sort import natural_key
 from designer.base.views import View
-from designer.board.component import Component
+from designer.board.board_parts import Designed, board_circuit
+from designer.board.component import Component, components, to_buy
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMNS = (
     "quantity",
@@ -69,19 +75,19 @@ class Line:
         return {**row, "designators": " ".join(self.designators)}
 
 
-def bill(found: Iterable[Component]) -> tuple[Line, ...]:
+def bill(listed: Iterable[Component]) -> tuple[Line, ...]:
     """What is bought of these components, like parts together: by kind, then by value.
 
     The generator is an instrument and stands on no bill; nor does what is not fitted.
     """
-    groups: dict[tuple[str, str, str], list[Component]] = {}
-    for component in found:
+    groups: dict[tuple[object, ...], list[Component]] = {}
+    for component in listed:
         if View.BOM in component.views and component.bought is not None:
             bought = component.bought
             key = (component.kind, bought.manufacturer, bought.part_number)
             groups.setdefault(key, []).append(component)
-    lines = [(_place(here[0]), _line(here)) for here in groups.values()]
-    return tuple(line for _, line in sorted(lines, key=lambda pair: pair[0]))
+    alike = sorted(groups.values(), key=lambda group: _place(group[0]))
+    return tuple(_line(group) for group in alike)
 
 
 def _place(component: Component) -> tuple[object, ...]:
@@ -89,19 +95,19 @@ def _place(component: Component) -> tuple[object, ...]:
     return KINDS.index(component.kind), component.quantity or 0.0, number
 
 
-def _line(here: Sequence[Component]) -> Line:
-    first = here[0]
+def _line(alike: Sequence[Component]) -> Line:
+    first = alike[0]
     bought = first.bought
     assert bought is not None
-    said = [] if first.kind in ("resistor", "capacitor") else [c.description for c in here]
+    words = [] if first.kind in ("resistor", "capacitor") else [c.description for c in alike]
     if first.kind != "op-amp":
-        said += [c.role for c in here]
-    said += [c.bought.note for c in here if c.bought is not None and c.bought.note]
+        words += [c.role for c in alike]
+    words += [c.bought.note for c in alike if c.bought is not None and c.bought.note]
     return Line(
-        quantity=len(here),
-        designators=tuple(sorted((c.reference for c in here), key=natural_key)),
+        quantity=len(alike),
+        designators=tuple(sorted((c.reference for c in alike), key=natural_key)),
         value=first.value,
-        description="; ".join(dict.fromkeys(said)),
+        description="; ".join(dict.fromkeys(words)),
         manufacturer=bought.manufacturer,
         part_number=bought.part_number,
         footprint=first.footprint,
@@ -115,3 +121,21 @@ def _line(here: Sequence[Component]) -> Line:
 def bill_csv(lines: Iterable[Line]) -> str:
     """The bill as CSV."""
     return csv_text(COLUMNS, (line.cells() for line in lines))
+
+
+def bill_of_materials(made: Designed) -> pd.DataFrame:
+    """What is to be bought for one board: the rows of ``bom.csv``, with numbers as numbers.
+
+    made : what ``synthesise`` or ``run`` gives. Designators stand in one text, and so does the
+    grade, which a part may lack.
+
+    Raises
+    ------
+    InputError : a case or a part that the catalogue does not have.
+    Unreachable : a value that cannot be bought.
+    """
+    circuit, choice = board_circuit(made)
+    lines = bill(to_buy(components(circuit, made.catalog, choice), choice))
+    numbers = ("quantity", "price_class")
+    rows = [{**line.cells(), **{n: getattr(line, n) for n in numbers}} for line in lines]
+    return frame(rows, COLUMNS)

@@ -11,7 +11,7 @@ from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import Package, Pin, packages, pins
 from designer.catalog.catalog import Catalog
-from designer.catalog.entries import Kind, OpAmp, Rating, Use
+from designer.catalog.entries import Kind, PartChoice, Rating, Use
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
 from designer.circuit.netlist import (
     Capacitor,
@@ -23,7 +23,7 @@ from designer.circuit.netlist import (
     Section,
 )
 from designer.circuit.stage_title import SUPPLY, stage_names
-from designer.model.board_table import BoardChoice
+from designer.model.board_table import BoardChoice, PartArray
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ class Component:
         return {pin.number: pin.net for pin in self.pins}
 
 
+UNITS: Mapping[Kind, str] = {"resistor": "Ω", "capacitor": "F"}
 Numbers = Mapping[str, Mapping[str, str]]
 """Pad numbers by name of the pin, by name of the section; ``U1P`` has the supply pins of U1."""
 
@@ -129,59 +130,49 @@ def designator(name: str) -> str:
     return name if name[-1:].isdigit() else f"{name}1"
 
 
-def pin_numbers(found: Iterable[Component]) -> Numbers:
+def pin_numbers(listed: Iterable[Component]) -> Numbers:
     """Those of the op-amps among a board's components."""
     out: dict[str, dict[str, str]] = {}
-    for component in found:
+    for component in listed:
         if component.kind == "op-amp":
             for pin in component.pins:
                 out.setdefault(f"{component.reference}{pin.unit}", {})[pin.name] = pin.number
     return out
 
 
-def to_buy(found: Iterable[Component], choice: BoardChoice) -> tuple[Component, ...]:
+def to_buy(listed: Iterable[Component], choice: BoardChoice) -> tuple[Component, ...]:
     """These components with the arrays that take the places of some of them: what a bill is of.
 
     An array stands on the bill alone: the board keeps the single parts' pads.
     """
-    out = list(found)
-    for array in choice.arrays:
-        family, sold = array.bought.family, array.bought
-        unit = "Ω" if family.kind == "resistor" else "F"
-        said = f"{family.elements} {family.dielectric} {family.kind}s, "
-        said += f"{100 * family.grade:g} %, matched to {100 * (family.matching or 0.0):g} %"
-        part = Bought(
-            manufacturer=sold.manufacturer,
-            part_number=sold.part_number,
-            rating=rated(sold.rating),
-            price_class=sold.price,
-            grade=family.grade,
-            dielectric=family.dielectric,
-        )
-        out.append(
-            Component(
-                reference=array.name,
-                kind="array",
-                value=format_quantity(sold.value, unit),
-                quantity=sold.value,
-                footprint=sold.footprint,
-                pins=(),
-                role=f"in the places of {' '.join(array.parts)}",
-                stage=SUPPLY,
-                views=View.BOM,
-                description=said,
-                bought=part,
-                parts=array.parts,
-            )
-        )
-    return tuple(out)
+    return (*listed, *map(_array, choice.arrays))
 
 
-def joined(found: Iterable[Component]) -> dict[str, tuple[tuple[str, str], ...]]:
+def _array(array: PartArray) -> Component:
+    family, sold = array.bought.family, array.bought
+    description = f"{family.elements} {family.dielectric} {family.kind}s, "
+    description += f"{100 * family.grade:g} %, matched to {100 * (family.matching or 0.0):g} %"
+    return Component(
+        reference=array.name,
+        kind="array",
+        value=format_quantity(sold.value, UNITS[family.kind]),
+        quantity=sold.value,
+        footprint=sold.footprint,
+        pins=(),
+        role=f"in the places of {' '.join(array.parts)}",
+        stage=SUPPLY,
+        views=View.BOM,
+        description=description,
+        bought=_ordered(sold),
+        parts=array.parts,
+    )
+
+
+def joined(listed: Iterable[Component]) -> dict[str, tuple[tuple[str, str], ...]]:
     """What each net joins: (reference, pad) in natural order, nets sorted. Pads without a net are
     left out."""
     out: dict[str, list[tuple[str, str]]] = {}
-    for component in found:
+    for component in listed:
         for pin in component.pins:
             if pin.net:
                 out.setdefault(pin.net, []).append((component.reference, pin.number))
@@ -200,102 +191,69 @@ class _Lister:
         self.inside = {name for array in choice.arrays for name in array.parts}
 
     def one(self, part: Fitting) -> Component:
+        choice = self.choice
         if isinstance(part, Resistor | Capacitor) and part.name in self.inside:
             part = replace(part, views=part.views & ~View.BOM)
         if isinstance(part, Resistor):
-            grade = self.choice.grades.get(part.name, self.choice.resistor_grade)
-            return self.passive(part, "resistor", "Ω", grade, "signal")
+            grade = choice.grades.get(part.name, choice.resistor_grade)
+            return self.passive(part, "resistor", grade, "signal")
         if isinstance(part, Capacitor):
-            grade = self.choice.grades.get(part.name, self.choice.capacitor_grade)
-            return self.passive(part, "capacitor", "F", grade, "signal")
+            grade = choice.grades.get(part.name, choice.capacitor_grade)
+            return self.passive(part, "capacitor", grade, "signal")
         if isinstance(part, SupplyCapacitor):
-            return self.passive(part, "capacitor", "F", 1.0, "supply", near=part.package)
-        if isinstance(part, Diode):
-            return self.diode(part)
-        if isinstance(part, Reference):
-            return self.reference(part)
-        if isinstance(part, Trimmer):
-            return self.trimmer(part)
+            return self.passive(part, "capacitor", 1.0, "supply")
         if isinstance(part, Connector):
             return self.connector(part)
-        assert isinstance(part, TestPoint)
-        return self.component(part, "test point", part.net, None, TEST_POINT, "", None)
+        if isinstance(part, TestPoint):
+            return self.component(part, "test point", part.net, TEST_POINT, None)
+        return self.entry(part)
 
     def passive(
-        self,
-        part: Resistor | Capacitor | SupplyCapacitor,
-        kind: Kind,
-        unit: str,
-        grade: float,
-        use: Use,
-        near: str = "",
+        self, part: Resistor | Capacitor | SupplyCapacitor, kind: Kind, grade: float, use: Use
     ) -> Component:
-        found = self.catalog.part(kind, part.value, grade, use)
-        other = self.catalog.substitute(found, grade)
-        bought = Bought(
-            manufacturer=found.manufacturer,
-            part_number=found.part_number,
-            rating=rated(found.rating),
-            price_class=found.price,
-            grade=found.family.grade,
+        sold = self.catalog.part(kind, part.value, grade, use)
+        other = self.catalog.substitute(sold, grade)
+        bought = replace(
+            _ordered(sold),
             substitute="" if other is None else f"{other.manufacturer} {other.part_number}",
-            dielectric=found.family.dielectric,
-            note=_better(found.family.grade, grade) if use == "signal" else "",
+            note=_better(sold.family.grade, grade) if use == "signal" else "",
         )
-        value = format_quantity(found.value, unit)
-        made = f"{found.family.dielectric} {kind}, {100 * found.family.grade:g} %"
-        return self.component(
-            part, kind, value, found.value, found.footprint, made, bought, near=near
-        )
+        value = format_quantity(sold.value, UNITS[kind])
+        description = f"{sold.family.dielectric} {kind}, {100 * sold.family.grade:g} %"
+        return self.component(part, kind, value, sold.footprint, bought, sold.value, description)
 
-    def diode(self, part: Diode) -> Component:
-        found = self.catalog.diode(part.model.name)
-        rating = f"{format_quantity(found.reverse_voltage.nominal, 'V')} reverse"
-        bought = Bought(found.manufacturer, found.part_number, rating, found.price)
-        return self.component(part, "diode", found.name, None, found.footprint, "diode", bought)
-
-    def reference(self, part: Reference) -> Component:
-        found = self.catalog.reference(part.model)
-        rating = format_quantity(found.voltage, "V")
-        bought = Bought(found.manufacturer, found.part_number, rating, found.price, found.grade)
-        return self.component(
-            part,
-            "reference",
-            found.name,
-            found.voltage,
-            found.footprint,
-            "shunt reference",
-            bought,
-        )
-
-    def trimmer(self, part: Trimmer) -> Component:
-        found = self.catalog.trimmer(part.value)
-        bought = Bought(
-            found.manufacturer, found.part_number, rated(found.rating), found.price, found.grade
-        )
-        value = format_quantity(found.value, "Ω")
-        return self.component(
-            part, "trimmer", value, found.value, found.footprint, "trimmer", bought
-        )
+    def entry(self, part: Fitting) -> Component:
+        """A part that has an entry of its own in the catalogue."""
+        if isinstance(part, Diode):
+            diode = self.catalog.diode(part.model.name)
+            rating = f"{format_quantity(diode.reverse_voltage.nominal, 'V')} reverse"
+            bought = Bought(diode.manufacturer, diode.part_number, rating, diode.price)
+            return self.component(part, "diode", diode.name, diode.footprint, bought)
+        if isinstance(part, Reference):
+            one = self.catalog.reference(part.model)
+            rating = format_quantity(one.voltage, "V")
+            bought = Bought(one.manufacturer, one.part_number, rating, one.price, one.grade)
+            kind, words = "reference", "shunt reference"
+            return self.component(part, kind, one.name, one.footprint, bought, one.voltage, words)
+        assert isinstance(part, Trimmer)
+        sold = self.catalog.trimmer(part.value)
+        rating, value = rated(sold.rating), format_quantity(sold.value, "Ω")
+        bought = Bought(sold.manufacturer, sold.part_number, rating, sold.price, sold.grade)
+        return self.component(part, "trimmer", value, sold.footprint, bought, sold.value)
 
     def connector(self, part: Connector) -> Component:
         ways = len(part.ways)
-        found = self.catalog.header(ways)
-        bought = Bought(found.manufacturer, found.number(ways), rated(found.rating), found.price)
-        return self.component(
-            part,
-            "connector",
-            f"{ways} ways",
-            None,
-            found.place(ways),
-            f"pin header, {ways} ways",
-            bought,
-        )
+        sold = self.catalog.header(ways)
+        bought = Bought(sold.manufacturer, sold.number(ways), rated(sold.rating), sold.price)
+        value, words = f"{ways} ways", f"pin header, {ways} ways"
+        return self.component(part, "connector", value, sold.place(ways), bought, description=words)
 
     def package(self, package: Package) -> Component:
         opamp, sections = package.opamp, package.sections
         used = [s for s in sections if View.SIMULATION in s.views]
         stages = dict.fromkeys(self.stages[s.name] for s in used)
+        count = f"{opamp.sections} section" + ("s" if opamp.sections > 1 else "")
+        free = opamp.sections - len(used)
         return Component(
             reference=package.name,
             kind="op-amp",
@@ -306,7 +264,7 @@ class _Lister:
             role="; ".join(dict.fromkeys(s.role for s in used)),
             stage=next(iter(stages), SUPPLY),
             views=View.EVERYWHERE,
-            description=f"op-amp, {_sections(opamp)}, {_spare(opamp.sections - len(used))}",
+            description=f"op-amp, {count}, {f'{free} spare' if free else 'all used'}",
             bought=Bought(
                 opamp.manufacturer,
                 opamp.part_number,
@@ -321,11 +279,10 @@ class _Lister:
         part: Fitting,
         kind: str,
         value: str,
-        quantity: float | None,
         footprint: str,
-        description: str,
         bought: Bought | None,
-        near: str = "",
+        quantity: float | None = None,
+        description: str = "",
     ) -> Component:
         return Component(
             reference=designator(part.name),
@@ -339,9 +296,21 @@ class _Lister:
             views=part.views,
             description=description or kind,
             bought=bought,
-            near=near,
+            near=part.package if isinstance(part, SupplyCapacitor) else "",
             parts=(part.name,),
         )
+
+
+def _ordered(sold: PartChoice) -> Bought:
+    """A resistor, a capacitor or an array as it is ordered."""
+    return Bought(
+        manufacturer=sold.manufacturer,
+        part_number=sold.part_number,
+        rating=rated(sold.rating),
+        price_class=sold.price,
+        grade=sold.family.grade,
+        dielectric=sold.family.dielectric,
+    )
 
 
 def _better(grade: float, asked: float) -> str:
@@ -349,14 +318,6 @@ def _better(grade: float, asked: float) -> str:
     if math.isclose(grade, asked, rel_tol=1e-9):
         return ""
     return f"asked for at {100 * asked:g} %, at which nobody sells this value"
-
-
-def _sections(opamp: OpAmp) -> str:
-    return "1 section" if opamp.sections == 1 else f"{opamp.sections} sections"
-
-
-def _spare(count: int) -> str:
-    return f"{count} spare" if count else "all used"
 
 
 TEST_POINT = "TestPoint:TestPoint_Pad_D1.5mm"

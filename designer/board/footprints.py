@@ -1,98 +1,256 @@
-"""Footprints by KiCad's names: which case a name means.
+"""Footprints by KiCad's names: pads and outline of the case that a name means.
 
-The geometry is our own (``board.footprint_shapes``); the names are KiCad's, so that a user may
-take KiCad's own instead.
+The names are KiCad's, so that a user may take KiCad's own footprints instead; the geometry is our
+own, by rule from the dimensions that most names state. Millimetres, y downwards, the origin in the
+middle. Chip parts follow IPC-7351B's nominal density: a toe of 0.35 mm (0.2 below 0603), pads that
+go 0.05 mm further in than the terminals.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from designer.base.errors import InputError
-from designer.board import footprint_shapes as shapes
-from designer.board.footprint_shapes import FootprintShape
 from designer.board.kicad_names import footprint_name
 
-_Rule = Callable[[str, re.Match[str]], FootprintShape | None]
-_NUMBER = r"(\d+(?:\.\d+)?)"
+
+@dataclass(frozen=True)
+class PadShape:
+    """A pad of a footprint."""
+
+    number: str
+    """Number of the pad."""
+    x: float
+    """Place of its middle to the right [mm]."""
+    y: float
+    """Place of its middle downwards [mm]."""
+    width: float
+    """Width [mm]."""
+    height: float
+    """Height [mm]."""
+    drill: float = 0.0
+    """Diameter of its hole [mm], 0 on the surface."""
+    first: bool = False
+    """Whether it is drawn square, as pin 1 of a row of holes is."""
 
 
-def _two_holes(name: str, found: re.Match[str]) -> FootprintShape:
-    """Length and height of the body and the pitch; a disc or a can may have one diameter."""
-    length, height, pitch = (float(x) for x in found.groups())
-    return shapes.two_holes(name, pitch, (length, height))
+@dataclass(frozen=True)
+class FootprintShape:
+    """A footprint, with the part that stands on it."""
+
+    name: str
+    """Name of the footprint."""
+    pads: tuple[PadShape, ...]
+    """Pads of the footprint."""
+    body: tuple[float, float]
+    """Width and height of the part seen from above [mm]."""
+    mark: bool = False
+    """Whether pin 1 is marked."""
+    soldered: bool = True
+    """Whether it is soldered; False for a bare pad, which nothing is soldered to."""
+
+    @property
+    def through_hole(self) -> bool:
+        return any(pad.drill for pad in self.pads)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, top, right, bottom of body and pads together."""
+        wide, high = self.body[0] / 2.0, self.body[1] / 2.0
+        return (
+            min([-wide, *(p.x - p.width / 2.0 for p in self.pads)]),
+            min([-high, *(p.y - p.height / 2.0 for p in self.pads)]),
+            max([wide, *(p.x + p.width / 2.0 for p in self.pads)]),
+            max([high, *(p.y + p.height / 2.0 for p in self.pads)]),
+        )
+
+    @property
+    def courtyard(self) -> tuple[float, float, float, float]:
+        """What nothing else may stand in: 0.25 mm round it, 0.5 mm round holes and marks."""
+        room = 0.5 if self.through_hole or self.mark else 0.25
+        left, top, right, bottom = self.extent
+        return left - room, top - room, right + room, bottom + room
 
 
-def _can(name: str, found: re.Match[str]) -> FootprintShape:
-    diameter, pitch = (float(x) for x in found.groups())
-    mark = name.startswith("CP")
-    return shapes.two_holes(name, pitch, (diameter, diameter), mark=mark)
+TERMINALS = {
+    (1.0, 0.5): 0.25,
+    (1.6, 0.8): 0.35,
+    (2.0, 1.25): 0.45,
+    (3.2, 1.6): 0.5,
+    (3.2, 2.5): 0.5,
+    (5.0, 2.5): 0.6,
+    (6.3, 3.2): 0.6,
+}
+"""Length of a chip's terminals by the length and width of its body, as chip makers state them."""
+SMALL_DIODES = {"123": (3.7, 0.45, 0.6, (2.7, 1.6)), "323": (2.5, 0.3, 0.35, (1.7, 1.25))}
+"""SOD-123 and SOD-323: span over the leads, length of a foot, width of a lead, body."""
 
 
-_RULES: tuple[tuple[str, str, _Rule], ...] = (
-    (
-        "R_0603_1608Metric",
-        r"[RC]_\d{4}_(\d{4})Metric(?:_Pad.*HandSolder)?",
-        lambda name, m: shapes.chip(name, m[1]),
+def _chip(name: str, code: str) -> FootprintShape | None:
+    """A chip of metric code "1608": 1.6 mm by 0.8 mm."""
+    sizes = {f"{round(10 * a):02d}{int(10 * b):02d}": (a, b) for a, b in TERMINALS}
+    if code not in sizes:
+        return None
+    length, width = sizes[code]
+    toe = 0.35 if length >= 1.6 else 0.2
+    outer = length + 2.0 * toe
+    inner = length - 2.0 * TERMINALS[length, width] - 0.1
+    return FootprintShape(name, _pair(outer, inner, width + 0.1), (length, width))
+
+
+def _small_diode(name: str, case: str) -> FootprintShape | None:
+    if case not in SMALL_DIODES:
+        return None
+    span, foot, lead, body = SMALL_DIODES[case]
+    pads = _pair(span + 0.7, span - 2.0 * foot - 0.5, lead + 0.3)
+    return FootprintShape(name, pads, body, mark=True)
+
+
+def _sot23(name: str) -> FootprintShape:
+    """Pads 1.3 mm by 0.6 mm, rows 2.1 mm apart, pitch 0.95 mm (Texas Instruments, DBZ0003A)."""
+    at = {"1": (-1.05, -0.95), "2": (-1.05, 0.95), "3": (1.05, 0.0)}
+    pads = tuple(PadShape(n, x, y, 1.3, 0.6) for n, (x, y) in at.items())
+    return FootprintShape(name, pads, (1.3, 2.92), mark=True)
+
+
+def _small_outline(name: str, count: str, *sizes: str) -> FootprintShape:
+    """Gull wings: a foot reaches 1.05 mm beyond the body (JEDEC MS-012); toe 0.45 mm."""
+    width, length, pitch = map(float, sizes)
+    outer, inner = width + 2.1 + 0.9, width - 0.9
+    across, x = (outer - inner) / 2.0, (outer + inner) / 4.0
+    pads = _two_rows(int(count), x, pitch, (across, 0.6))
+    return FootprintShape(name, pads, (width, length), mark=True)
+
+
+def _dual_in_line(name: str, count: str, row: str) -> FootprintShape:
+    """Holes at 2.54 mm in two rows."""
+    pads = _two_rows(int(count), float(row) / 2.0, 2.54, (1.6, 1.6), drill=0.8)
+    return FootprintShape(name, pads, (6.35, 2.54 * int(count) / 2.0), mark=True)
+
+
+def _lying(name: str, length: str, width: str, pitch: str) -> FootprintShape:
+    """Two holes; the body, with its length and width or diameter, lies between and beyond them."""
+    return _two_holes(name, float(pitch), (float(length), float(width)))
+
+
+def _lying_diode(name: str, pitch: str) -> FootprintShape:
+    return _two_holes(name, float(pitch), (4.0, 2.0), mark=True)
+
+
+def _can(name: str, diameter: str, pitch: str) -> FootprintShape:
+    size = float(diameter)
+    return _two_holes(name, float(pitch), (size, size), mark=name.startswith("CP"))
+
+
+def _two_holes(
+    name: str, pitch: float, body: tuple[float, float], mark: bool = False
+) -> FootprintShape:
+    return FootprintShape(name, _row(2, (pitch, 0.0), (1.6, 1.6), 0.8, square=mark), body, mark)
+
+
+def _transistor_outline(name: str) -> FootprintShape:
+    """TO-92 with its legs in a row at 1.27 mm; body 5.2 mm by 4.0 mm (JEDEC TO-226)."""
+    return FootprintShape(name, _row(3, (1.27, 0.0), (0.95, 1.5), 0.6), (5.2, 4.0), mark=True)
+
+
+def _header(name: str, count: str, pitch: str) -> FootprintShape:
+    """A column of holes for square pins of 0.64 mm."""
+    pins, step = int(count), float(pitch)
+    return FootprintShape(name, _row(pins, (0.0, step), (1.7, 1.7), 1.0), (step, pins * step), True)
+
+
+def _bare_pad(name: str, diameter: str) -> FootprintShape:
+    size = float(diameter)
+    return FootprintShape(name, (PadShape("1", 0, 0, size, size),), (0.0, 0.0), soldered=False)
+
+
+def _bourns_3296w(name: str) -> FootprintShape:
+    """Three pins in a row at 2.54 mm below a body of 9.53 mm by 4.83 mm (Bourns 3296)."""
+    return FootprintShape(name, _row(3, (-2.54, 0.0), (1.44, 1.44), 0.8), (9.53, 4.83), mark=True)
+
+
+def _bourns_3224w(name: str) -> FootprintShape:
+    """Two pads of 1.3 mm by 1.6 mm facing one of 2.0 mm by 1.6 mm, body 4.8 mm by 3.5 mm
+    (Bourns 3224W; not compared with the sheet)."""
+    pads = (
+        PadShape("1", 1.25, -1.45, 1.3, 1.6),
+        PadShape("2", 0.0, 1.45, 2.0, 1.6),
+        PadShape("3", -1.25, -1.45, 1.3, 1.6),
+    )
+    return FootprintShape(name, pads, (4.8, 3.5), mark=True)
+
+
+def _pair(outer: float, inner: float, height: float) -> tuple[PadShape, PadShape]:
+    """Pads 1 and 2 from ``inner`` to ``outer``, both over all, in steps of 0.01 mm."""
+    width, x = round((outer - inner) / 2.0, 2), round((outer + inner) / 4.0, 2)
+    size = width, round(height, 2)
+    return PadShape("1", -x, 0.0, *size), PadShape("2", x, 0.0, *size)
+
+
+def _row(
+    count: int,
+    step: tuple[float, float],
+    size: tuple[float, float],
+    drill: float,
+    square: bool = True,
+) -> tuple[PadShape, ...]:
+    """Holes in a row about the middle. square : whether pin 1 is drawn so."""
+    middle = (count - 1) / 2.0
+    return tuple(
+        PadShape(
+            str(i + 1),
+            (i - middle) * step[0],
+            (i - middle) * step[1],
+            *size,
+            drill,
+            first=square and i == 0,
+        )
+        for i in range(count)
+    )
+
+
+def _two_rows(
+    count: int, x: float, pitch: float, size: tuple[float, float], drill: float = 0.0
+) -> tuple[PadShape, ...]:
+    """Down on the left, up on the right, as packages are counted."""
+    half = count // 2
+    top = -(half - 1) * pitch / 2.0
+    out = []
+    for i in range(count):
+        left = i < half
+        y = top + (i if left else count - 1 - i) * pitch
+        first = drill > 0.0 and i == 0
+        out.append(PadShape(str(i + 1), -x if left else x, y, *size, drill=drill, first=first))
+    return tuple(out)
+
+
+_N = r"(\d+(?:\.\d+)?)"
+_RULES: dict[str, tuple[str, Callable[..., FootprintShape | None]]] = {
+    "R_0603_1608Metric": (r"[RC]_\d{4}_(\d{4})Metric(?:_Pad.*HandSolder)?", _chip),
+    "SOT-23": ("SOT-23", _sot23),
+    "D_SOD-123": (r"D_SOD-(\d+)", _small_diode),
+    "SOIC-14_3.9x8.7mm_P1.27mm": (rf"SOIC-(\d+)_{_N}x{_N}mm_P{_N}mm", _small_outline),
+    "DIP-14_W7.62mm": (rf"DIP-(\d+)_W{_N}mm", _dual_in_line),
+    "R_Axial_DIN0207_L6.3mm_D2.5mm_P10.16mm_Horizontal": (
+        rf"[RC]_Axial_(?:DIN\d+_)?L{_N}mm_D{_N}mm_P{_N}mm_Horizontal",
+        _lying,
     ),
-    ("SOT-23", r"SOT-23", lambda name, m: shapes.sot23(name)),
-    ("D_SOD-123", r"D_SOD-(123|323)", lambda name, m: shapes.small_diode(name, m[1])),
-    (
-        "SOIC-14_3.9x8.7mm_P1.27mm",
-        rf"SOIC-(\d+)_{_NUMBER}x{_NUMBER}mm_P{_NUMBER}mm",
-        lambda name, m: shapes.small_outline(
-            name, int(m[1]), float(m[2]), float(m[3]), float(m[4])
-        ),
+    "D_DO-35_SOD27_P7.62mm_Horizontal": (rf"D_DO-35_SOD27_P{_N}mm_Horizontal", _lying_diode),
+    "C_Rect_L7.2mm_W5.5mm_P5.00mm": (
+        rf"C_(?:Rect|Disc)_[LD]{_N}mm_W{_N}mm_P{_N}mm(?:_.*)?",
+        _lying,
     ),
-    (
-        "DIP-14_W7.62mm",
-        rf"DIP-(\d+)_W{_NUMBER}mm",
-        lambda name, m: shapes.dual_in_line(name, int(m[1]), float(m[2])),
-    ),
-    (
-        "R_Axial_DIN0207_L6.3mm_D2.5mm_P10.16mm_Horizontal",
-        rf"[RC]_Axial_(?:DIN\d+_)?L{_NUMBER}mm_D{_NUMBER}mm_P{_NUMBER}mm_Horizontal",
-        _two_holes,
-    ),
-    (
-        "D_DO-35_SOD27_P7.62mm_Horizontal",
-        rf"D_DO-35_SOD27_P{_NUMBER}mm_Horizontal",
-        lambda name, m: shapes.two_holes(name, float(m[1]), (4.0, 2.0), mark=True),
-    ),
-    (
-        "C_Rect_L7.2mm_W5.5mm_P5.00mm",
-        rf"C_(?:Rect|Disc)_[LD]{_NUMBER}mm_W{_NUMBER}mm_P{_NUMBER}mm(?:_.*)?",
-        _two_holes,
-    ),
-    ("CP_Radial_D5.0mm_P2.00mm", rf"CP?_Radial_D{_NUMBER}mm_P{_NUMBER}mm", _can),
-    (
-        "TO-92_Inline",
-        r"TO-92_Inline",
-        lambda name, m: shapes.transistor_outline(name),
-    ),
-    (
-        "PinHeader_1x03_P2.54mm_Vertical",
-        rf"PinHeader_1x(\d+)_P{_NUMBER}mm_Vertical",
-        lambda name, m: shapes.header(name, int(m[1]), float(m[2])),
-    ),
-    (
-        "TestPoint_Pad_D1.5mm",
-        rf"TestPoint_Pad_D{_NUMBER}mm",
-        lambda name, m: shapes.bare_pad(name, float(m[1])),
-    ),
-    (
-        "Potentiometer_Bourns_3296W_Vertical",
-        r"Potentiometer_Bourns_3296W_Vertical",
-        lambda name, m: shapes.bourns_3296w(name),
-    ),
-    (
-        "Potentiometer_Bourns_3224W_Vertical",
-        r"Potentiometer_Bourns_3224W_Vertical",
-        lambda name, m: shapes.bourns_3224w(name),
-    ),
-)
-EXAMPLES = tuple(example for example, _, _ in _RULES)
+    "CP_Radial_D5.0mm_P2.00mm": (rf"CP?_Radial_D{_N}mm_P{_N}mm", _can),
+    "TO-92_Inline": ("TO-92_Inline", _transistor_outline),
+    "PinHeader_1x03_P2.54mm_Vertical": (rf"PinHeader_1x(\d+)_P{_N}mm_Vertical", _header),
+    "TestPoint_Pad_D1.5mm": (rf"TestPoint_Pad_D{_N}mm", _bare_pad),
+    "Potentiometer_Bourns_3296W_Vertical": ("Potentiometer_Bourns_3296W_Vertical", _bourns_3296w),
+    "Potentiometer_Bourns_3224W_Vertical": ("Potentiometer_Bourns_3224W_Vertical", _bourns_3224w),
+}
+"""By an example: the names of a kind as a pattern, and what makes the footprint of its groups."""
+EXAMPLES = tuple(_RULES)
 """A name of each kind that is understood."""
 
 
@@ -104,11 +262,11 @@ def footprint(full_name: str) -> FootprintShape:
     InputError : no case that is known here.
     """
     name = footprint_name(full_name)
-    for _, pattern, make in _RULES:
-        found = re.fullmatch(pattern, name)
-        made = make(name, found) if found is not None else None
-        if made is not None:
-            return made
+    for pattern, make in _RULES.values():
+        match = re.fullmatch(pattern, name)
+        shape = make(name, *match.groups()) if match is not None else None
+        if shape is not None:
+            return shape
     raise InputError(
         None, "footprint", full_name, "a name such as " + ", ".join(EXAMPLES) + " (docs/kicad.md)"
     )

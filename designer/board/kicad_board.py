@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from designer.base.sexpr import Expression, expression, word
-from designer.board.kicad_footprint import FILE_VERSION, on_board
+from designer.base.sexpr import Expression, expression, lists, word
+from designer.board.kicad_footprint import on_board
 from designer.board.kicad_items import Entry
 from designer.board.kicad_layout import PAPERS
-from designer.board.kicad_names import LIBRARY, identifier, kicad_net, safe_text
+from designer.board.kicad_names import BOARD_VERSION, HEAD, identifier, kicad_net, safe_text
 from designer.board.kicad_placement import Placement
 from designer.board.kicad_sheet import symbol_id
 
@@ -48,24 +48,17 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
     }
     names = sorted({net for found in pads.values() for net in found.values() if net})
     nets = {"": 0} | {name: i for i, name in enumerate(names, start=1)}
+    box = placement.outline
     return expression(
         "kicad_pcb",
-        expression("version", FILE_VERSION),
-        expression("generator", LIBRARY),
-        expression("generator_version", "9.0"),
-        expression(
-            "general", expression("thickness", THICKNESS), expression("legacy_teardrops", False)
-        ),
-        expression("paper", _paper(placement)),
-        expression("title_block", expression("title", safe_text(title))),
-        expression(
-            "layers",
-            *(_layer(number, name, kind) for number, name, kind in LAYERS),
-        ),
-        expression(
-            "setup",
-            expression("pad_to_mask_clearance", 0),
-            expression("allow_soldermask_bridges_in_footprints", False),
+        *lists(
+            version=BOARD_VERSION,
+            **HEAD,
+            general={"thickness": THICKNESS, "legacy_teardrops": False},
+            paper=_paper(placement),
+            title_block={"title": safe_text(title)},
+            layers=layers(LAYERS),
+            setup={"pad_to_mask_clearance": 0, "allow_soldermask_bridges_in_footprints": False},
         ),
         *(expression("net", number, name) for name, number in nets.items()),
         *(
@@ -80,13 +73,22 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
             )
             for spot in placement.spots
         ),
-        _outline(project, placement),
-        expression("embedded_fonts", False),
+        expression(
+            "gr_rect",
+            start=(box.left, box.top),
+            end=(box.right, box.bottom),
+            stroke={"width": 0.05, "type": word("default")},
+            fill=False,
+            layer="Edge.Cuts",
+            uuid=identifier(project, "outline"),
+        ),
+        *lists(embedded_fonts=False),
     )
 
 
-def _layer(number: int, name: str, kind: str) -> Expression:
-    return expression(str(number), name, word(kind))
+def layers(listed: Iterable[tuple[int, str, str]]) -> tuple[Expression, ...]:
+    """The layers of a board: number, name and kind of each."""
+    return tuple(expression(str(number), name, word(kind)) for number, name, kind in listed)
 
 
 def _paper(placement: Placement) -> str:
@@ -120,16 +122,3 @@ def _fields(entry: Entry) -> list[tuple[str, str]]:
     """Fields of the symbol that the board repeats."""
     held = {"Datasheet": "", "Description": "", **dict(entry.fields)}
     return [(key, text) for key, text in held.items() if key != "Footprint"]
-
-
-def _outline(project: str, placement: Placement) -> Expression:
-    box = placement.outline
-    return expression(
-        "gr_rect",
-        expression("start", box.left, box.top),
-        expression("end", box.right, box.bottom),
-        expression("stroke", expression("width", 0.05), expression("type", word("default"))),
-        expression("fill", False),
-        expression("layer", "Edge.Cuts"),
-        expression("uuid", identifier(project, "outline")),
-    )

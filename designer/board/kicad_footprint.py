@@ -4,32 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from designer.base.sexpr import Expression, expression, word
-from designer.board.footprint_shapes import FootprintShape, PadShape
-from designer.board.kicad_names import LIBRARY, identifier
+from designer.base.sexpr import Expression, expression, lists, word
+from designer.board.footprints import FootprintShape, PadShape
+from designer.board.kicad_names import BOARD_VERSION, HEAD, LIBRARY, identifier
 from designer.board.kicad_placement import TEXT, PlacedComponent
 from designer.board.pins import Pin
 
-FILE_VERSION = 20241229
-"""Of footprints and boards, as KiCad 9 writes them."""
 ROUND = 0.25
 """Radius of a pad's corners, of its shorter side."""
 
 
 def module(shape: FootprintShape) -> Expression:
     """The file ``.kicad_mod`` of the project's library."""
+    ids = (shape.name,)
     return expression(
         "footprint",
         shape.name,
-        expression("version", FILE_VERSION),
-        expression("generator", LIBRARY),
-        expression("generator_version", "9.0"),
-        expression("layer", "F.Cu"),
-        *_texts(shape, "REF**", shape.name, 0, (shape.name,)),
+        *lists(version=BOARD_VERSION, **HEAD, layer="F.Cu"),
+        *_texts(shape, "REF**", shape.name, 0, ids),
         _attributes(shape),
-        *_drawing(shape, (shape.name,)),
-        *(_pad(pad, 0, (shape.name,)) for pad in shape.pads),
-        expression("embedded_fonts", False),
+        *_drawing(shape, ids),
+        *(_pad(pad, 0, ids) for pad in shape.pads),
+        *lists(embedded_fonts=False),
     )
 
 
@@ -55,21 +51,17 @@ def on_board(
     return expression(
         "footprint",
         f"{LIBRARY}:{shape.name}",
-        expression("layer", "F.Cu"),
-        _id(*ids),
-        _at(spot.x, spot.y, spot.angle),
+        *lists(layer="F.Cu", uuid=identifier(*ids), at=_at(spot.x, spot.y, spot.angle)),
         *_texts(shape, component.reference, component.value, spot.angle, ids),
-        *_fields(fields, spot.angle, ids),
-        expression("path", f"/{path}"),
-        expression("sheetname", "/"),
-        expression("sheetfile", sheet),
+        *(_property(key, text, 0.0, spot.angle, "F.Fab", ids, hide=True) for key, text in fields),
+        *lists(path=f"/{path}", sheetname="/", sheetfile=sheet),
         _attributes(shape, bought=component.bought is not None, fitted=component.fitted),
         *_drawing(shape, ids),
         *(
             _pad(pad, spot.angle, ids, pins.get(pad.number), names.get(pad.number, ""), nets)
             for pad in shape.pads
         ),
-        expression("embedded_fonts", False),
+        *lists(embedded_fonts=False),
     )
 
 
@@ -85,26 +77,18 @@ def _texts(
     yield _property("Value", value, below, angle, "F.Fab", ids)
 
 
-def _fields(
-    fields: Iterable[tuple[str, str]], angle: int, ids: tuple[str, ...]
-) -> Iterator[Expression]:
-    for key, text in fields:
-        yield _property(key, text, 0.0, angle, "F.Fab", ids, hide=True)
-
-
 def _property(
     key: str, text: str, y: float, angle: int, layer: str, ids: tuple[str, ...], hide: bool = False
 ) -> Expression:
-    font = expression("font", expression("size", TEXT, TEXT), expression("thickness", 0.12))
     return expression(
         "property",
         key,
         text,
-        _at(0.0, y, angle),
-        expression("layer", layer),
-        *([expression("hide", True)] if hide else []),
-        _id(*ids, "field", key),
-        expression("effects", font),
+        at=_at(0.0, y, angle),
+        layer=layer,
+        hide=True if hide else None,
+        uuid=identifier(*ids, "field", key),
+        effects={"font": {"size": (TEXT, TEXT), "thickness": 0.12}},
     )
 
 
@@ -135,12 +119,12 @@ def _drawing(shape: FootprintShape, ids: tuple[str, ...]) -> Iterator[Expression
             centre = (right + 0.34, first.y)
         yield expression(
             "fp_circle",
-            expression("center", *centre),
-            expression("end", centre[0] + 0.08, centre[1]),
-            _stroke(0.16),
-            expression("fill", True),
-            expression("layer", "F.SilkS"),
-            _id(*ids, "first"),
+            center=centre,
+            end=(centre[0] + 0.08, centre[1]),
+            stroke={"width": 0.16, "type": word("solid")},
+            fill=True,
+            layer="F.SilkS",
+            uuid=identifier(*ids, "first"),
         )
 
 
@@ -149,12 +133,12 @@ def _box(
 ) -> Expression:
     return expression(
         "fp_rect",
-        expression("start", box[0], box[1]),
-        expression("end", box[2], box[3]),
-        _stroke(width),
-        expression("fill", False),
-        expression("layer", layer),
-        _id(*ids, "box", layer),
+        start=box[:2],
+        end=box[2:],
+        stroke={"width": width, "type": word("solid")},
+        fill=False,
+        layer=layer,
+        uuid=identifier(*ids, "box", layer),
     )
 
 
@@ -174,31 +158,24 @@ def _pad(
     layers = ["*.Cu", "*.Mask"] if hole else ["F.Cu", "F.Mask"]
     if not hole and not bare:
         layers.append("F.Paste")
+    placed = nets is not None
     return expression(
         "pad",
         pad.number,
         word("thru_hole" if hole else "smd"),
         word(form),
-        _at(pad.x, pad.y, angle),
-        expression("size", pad.width, pad.height),
-        *([expression("drill", pad.drill)] if hole else []),
-        expression("layers", *layers),
-        *([expression("remove_unused_layers", False)] if hole else []),
-        *([expression("roundrect_rratio", ROUND)] if form == "roundrect" else []),
-        *([expression("net", nets[net], net)] if nets is not None and net else []),
-        *([expression("pinfunction", pin.name)] if pin is not None and nets is not None else []),
-        *([expression("pintype", pin.electrical)] if pin is not None and nets is not None else []),
-        _id(*ids, "pad", pad.number),
+        at=_at(pad.x, pad.y, angle),
+        size=(pad.width, pad.height),
+        drill=pad.drill if hole else None,
+        layers=tuple(layers),
+        remove_unused_layers=False if hole else None,
+        roundrect_rratio=ROUND if form == "roundrect" else None,
+        net=(nets[net], net) if nets is not None and net else None,
+        pinfunction=pin.name if pin is not None and placed else None,
+        pintype=pin.electrical if pin is not None and placed else None,
+        uuid=identifier(*ids, "pad", pad.number),
     )
 
 
-def _at(x: float, y: float, angle: int) -> Expression:
-    return expression("at", x, y, angle) if angle else expression("at", x, y)
-
-
-def _stroke(width: float) -> Expression:
-    return expression("stroke", expression("width", width), expression("type", word("solid")))
-
-
-def _id(*what: str) -> Expression:
-    return expression("uuid", identifier(*what))
+def _at(x: float, y: float, angle: int) -> tuple[float, ...]:
+    return (x, y, angle) if angle else (x, y)

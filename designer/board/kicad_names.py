@@ -15,6 +15,10 @@ LIBRARY = "designer"
 """Nickname of the project's own symbol and footprint libraries."""
 POWER = {GROUND: "GND", POSITIVE: "VCC", NEGATIVE: "VEE"}
 """KiCad's names of the nets that are power symbols on the sheet."""
+HEAD = {"generator": LIBRARY, "generator_version": "9.0"}
+"""What stands after the version in every file, as KiCad 9 writes it."""
+BOARD_VERSION, SHEET_VERSION, SYMBOLS_VERSION = 20241229, 20250114, 20241209
+"""KiCad 9's versions of boards and footprints, of schematics, of symbol libraries."""
 LONGEST = 40
 """Characters of a project's name."""
 

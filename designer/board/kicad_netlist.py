@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from designer.base.sexpr import Expression, expression
+from designer.base.sexpr import Expression, expression, lists
 from designer.base.views import View
 from designer.board.component import Component, joined
 from designer.board.kicad_board import open_net
@@ -19,15 +19,13 @@ def netlist(project: str, entries: Sequence[Entry]) -> Expression:
     """The file ``.net``: components of the board with their fields, and what each net joins."""
     held = [e for e in entries if e.component is not None and e.placed]
     found = [e.component for e in held if e.component is not None]
+    nodes = enumerate(nets(found).items(), 1)
     return expression(
         "export",
-        expression("version", "E"),
-        expression("design", expression("source", f"{project}.kicad_sch")),
-        expression("components", *(_component(project, entry) for entry in held)),
-        expression(
-            "nets",
-            *(_net(code, name, pads) for code, (name, pads) in enumerate(nets(found).items(), 1)),
-        ),
+        version="E",
+        design={"source": f"{project}.kicad_sch"},
+        components=tuple(_component(project, entry) for entry in held),
+        nets=tuple(_net(code, name, pads) for code, (name, pads) in nodes),
     )
 
 
@@ -45,26 +43,21 @@ def nets(components: Sequence[Component]) -> Pads:
 
 def _component(project: str, entry: Entry) -> Expression:
     fields = dict(entry.fields)
-    reference = entry.item.reference
+    reference, footprint = entry.item.reference, fields.pop("Footprint")
     shown = {key: text for key, text in fields.items() if not key.startswith("Sim.")}
     return expression(
         "comp",
-        expression("ref", reference),
-        expression("value", entry.item.value),
-        expression("footprint", fields["Footprint"]),
-        expression(
-            "fields",
-            *(
-                expression("field", expression("name", key), text)
-                for key, text in shown.items()
-                if key != "Footprint"
-            ),
+        ref=reference,
+        value=entry.item.value,
+        footprint=footprint,
+        fields=tuple(
+            expression("field", expression("name", key), text) for key, text in shown.items()
         ),
-        expression("sheetpath", expression("names", "/"), expression("tstamps", "/")),
-        expression("tstamps", symbol_id(project, reference)),
+        sheetpath={"names": "/", "tstamps": "/"},
+        tstamps=symbol_id(project, reference),
     )
 
 
 def _net(code: int, name: str, pads: Sequence[tuple[str, str]]) -> Expression:
-    nodes = (expression("node", expression("ref", r), expression("pin", p)) for r, p in pads)
-    return expression("net", expression("code", str(code)), expression("name", name), *nodes)
+    nodes = (expression("node", ref=reference, pin=pin) for reference, pin in pads)
+    return expression("net", *lists(code=str(code), name=name), *nodes)

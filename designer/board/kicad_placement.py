@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 from designer.board.board_parts import outputs
 from designer.board.component import Component
-from designer.board.footprint_shapes import FootprintShape
-from designer.board.footprints import footprint
+from designer.board.footprints import FootprintShape, footprint
 from designer.circuit.netlist import GROUND, Circuit, Section
 from designer.circuit.stage_title import INTERFACE, SUPPLY, stage_names
 

@@ -88,12 +88,11 @@ def settings(name: str, circuit: Circuit) -> str:
 
 
 def _table(kind: str, file: str) -> str:
-    row = expression(
-        "lib",
-        expression("name", LIBRARY),
-        expression("type", "KiCad"),
-        expression("uri", f"${{KIPRJMOD}}/{file}"),
-        expression("options", ""),
-        expression("descr", "of this project alone"),
-    )
-    return expression_text(expression(kind, expression("version", 7), row))
+    row = {
+        "name": LIBRARY,
+        "type": "KiCad",
+        "uri": f"${{KIPRJMOD}}/{file}",
+        "options": "",
+        "descr": "of this project alone",
+    }
+    return expression_text(expression(kind, version=7, lib=row))

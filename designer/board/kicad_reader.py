@@ -16,18 +16,18 @@ from designer.base.natural_sort import natural_key
 from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
-from designer.board.kicad_footprint import FILE_VERSION
-from designer.board.kicad_names import circuit_net
+from designer.board.kicad_names import BOARD_VERSION, circuit_net
 from designer.board.outline import Outline, read_outline
 from designer.board.pad_shape import corners, turned
 
-OLDEST, NEWEST = 20221018, FILE_VERSION
+OLDEST, NEWEST = 20221018, BOARD_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""
 LARGEST = 50_000_000
 """Bytes of a board file."""
 SHOWN = 5
 """Differences that a message lists."""
 COURTYARDS = ("F.CrtYd", "B.CrtYd")
+TRACKS = ("segment", "arc")
 PART_NUMBER = "MPN"
 """The field that has a part's number, on the sheet and on the board."""
 EXPECTED = "a board of KiCad 7 to 9 (.kicad_pcb)"
@@ -77,18 +77,6 @@ class PlacedFootprint:
 
 
 @dataclass(frozen=True)
-class Track:
-    """A straight piece of track."""
-
-    net: str
-    """The circuit's name of its net."""
-    width: float
-    """Width [mm]."""
-    length: float
-    """Length [mm]."""
-
-
-@dataclass(frozen=True)
 class BoardFile:
     """A board file, as it was read."""
 
@@ -98,8 +86,8 @@ class BoardFile:
     """The file's text."""
     footprints: tuple[PlacedFootprint, ...]
     """The footprints."""
-    tracks: tuple[Track, ...]
-    """The pieces of track."""
+    tracks: tuple[str, ...]
+    """Net of each piece of track."""
     vias: tuple[str, ...]
     """Net of each via."""
     zones: tuple[str, ...]
@@ -124,7 +112,7 @@ class BoardFile:
     @property
     def routed(self) -> frozenset[str]:
         """Nets that have a track, a via or a zone."""
-        return frozenset([*(t.net for t in self.tracks), *self.vias, *self.zones])
+        return frozenset([*self.tracks, *self.vias, *self.zones])
 
 
 def read_board(path: Path) -> BoardFile:
@@ -150,10 +138,7 @@ def _board(board: Expression, text: str, path: Path) -> BoardFile:
         path=path,
         text=text,
         footprints=tuple(_footprint(each) for each in board.all("footprint")),
-        tracks=(
-            *(_segment(each, names) for each in board.all("segment")),
-            *(_arc(each, names) for each in board.all("arc")),
-        ),
+        tracks=tuple(_net(each, names) for kind in TRACKS for each in board.all(kind)),
         vias=tuple(_net(each, names) for each in board.all("via")),
         zones=tuple(_net(each, names) for each in board.all("zone")),
         outline=read_outline(board),
@@ -264,28 +249,3 @@ def _unconnected(net: str) -> bool:
 def _net(found: Expression, names: dict[str, str]) -> str:
     net = found.find("net")
     return "" if net is None else circuit_net(names.get(net.text(), ""))
-
-
-def _segment(found: Expression, names: dict[str, str]) -> Track:
-    start, end = (_point(found.get(name)) for name in ("start", "end"))
-    return Track(_net(found, names), found.get("width").number(), math.dist(start, end))
-
-
-def _arc(found: Expression, names: dict[str, str]) -> Track:
-    start, mid, end = (_point(found.get(name)) for name in ("start", "mid", "end"))
-    return Track(_net(found, names), found.get("width").number(), arc_length(start, mid, end))
-
-
-def _point(found: Expression) -> Point:
-    return found.number(0), found.number(1)
-
-
-def arc_length(start: Point, mid: Point, end: Point) -> float:
-    """Length of the arc through three points [mm]; of the way along them where they are in line."""
-    a, b, c = math.dist(start, mid), math.dist(mid, end), math.dist(start, end)
-    cross = (mid[0] - start[0]) * (end[1] - start[1]) - (mid[1] - start[1]) * (end[0] - start[0])
-    if abs(cross) < 1e-9:
-        return a + b
-    radius = a * b * c / (2.0 * abs(cross))
-    # Each half is seen from the centre under twice the angle that it has at the circle.
-    return sum(2.0 * radius * math.asin(min(half / (2.0 * radius), 1.0)) for half in (a, b))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from designer.base.sexpr import Expression, expression
+from designer.base.sexpr import Expression, expression, lists, word
 from designer.board import kicad_symbols as symbols
 from designer.board.kicad_items import SIMULATION, Entry
-from designer.board.kicad_layout import Item, NetLabel, Note, Placed, Sheet, arrange, flow
-from designer.board.kicad_names import LIBRARY, identifier, safe_text
-from designer.board.kicad_symbols import GRID, SymbolShape, effects, position, stroke
-
-FILE_VERSION = 20250114
-"""Of schematics, as KiCad 9 writes them."""
+from designer.board.kicad_layout import NetLabel, Note, Placed, Sheet, arrange, flow
+from designer.board.kicad_names import HEAD, LIBRARY, SHEET_VERSION, identifier, safe_text
+from designer.board.kicad_symbols import GRID, SymbolShape, effects, position
 
 
 def layout(entries: Sequence[Entry], directives: Sequence[str]) -> Sheet:
@@ -42,44 +39,38 @@ def schematic(project: str, title: str, entries: Sequence[Entry], sheet: Sheet) 
     by_reference = {e.item.reference: e for e in entries}
     return expression(
         "kicad_sch",
-        expression("version", FILE_VERSION),
-        expression("generator", LIBRARY),
-        expression("generator_version", "9.0"),
-        expression("uuid", sheet_id(project)),
-        expression("paper", sheet.paper),
-        expression(
-            "title_block",
-            expression("title", safe_text(title)),
-            expression("comment", 1, "Parts, nets and values follow from the design"),
+        *lists(
+            version=SHEET_VERSION,
+            **HEAD,
+            uuid=sheet_id(project),
+            paper=sheet.paper,
+            title_block={
+                "title": safe_text(title),
+                "comment": (1, "Parts, nets and values follow from the design"),
+            },
+            lib_symbols=tuple(
+                symbols.symbol(shape, f"{LIBRARY}:{shape.name}") for shape in shapes(sheet)
+            ),
         ),
-        expression(
-            "lib_symbols",
-            *(symbols.symbol(shape, f"{LIBRARY}:{shape.name}") for shape in shapes(sheet)),
-        ),
-        *_texts(project, sheet),
+        *(_note(project, cell.title, note) for cell in sheet.cells for note in cell.notes),
         *_wiring(project, sheet),
-        *(_label(project, label) for label in _distinct(sheet.labels)),
+        *(_label(project, label) for label in dict.fromkeys(sheet.labels)),
         *(_symbol(project, placed, by_reference) for placed in sheet.symbols),
-        expression("sheet_instances", expression("path", "/", expression("page", "1"))),
-        expression("embedded_fonts", False),
+        *lists(
+            sheet_instances={"path": ("/", expression("page", "1"))},
+            embedded_fonts=False,
+        ),
     )
 
 
-def _texts(project: str, sheet: Sheet) -> Iterator[Expression]:
-    for cell in sheet.cells:
-        for note in cell.notes:
-            yield _note(project, cell.title, note)
-
-
 def _note(project: str, cell: str, note: Note) -> Expression:
-    directive = note.text.startswith(".")
     return expression(
         "text",
         note.text,
-        expression("exclude_from_sim", not directive),
-        position(*note.at, 0),
-        effects("left", "bottom", size=2.0 if note.heading else symbols.TEXT),
-        _id(project, "text", cell, note.text),
+        exclude_from_sim=not note.text.startswith("."),  # a directive
+        at=position(*note.at),
+        effects=effects("left", "bottom", size=2.0 if note.heading else symbols.TEXT),
+        uuid=identifier(project, "text", cell, note.text),
     )
 
 
@@ -87,16 +78,20 @@ def _wiring(project: str, sheet: Sheet) -> Iterator[Expression]:
     for at in sheet.junctions:
         yield expression(
             "junction",
-            _at(at),
-            expression("diameter", 0),
-            expression("color", 0, 0, 0, 0),
-            _id(project, "junction", *map(str, at)),
+            at=_at(at),
+            diameter=0,
+            color=(0, 0, 0, 0),
+            uuid=identifier(project, "junction", *map(str, at)),
         )
     for at in (p for cell in sheet.cells for p in cell.open_pins):
-        yield expression("no_connect", _at(at), _id(project, "open", *map(str, at)))
+        uuid = identifier(project, "open", *map(str, at))
+        yield expression("no_connect", at=_at(at), uuid=uuid)
     for a, b in sheet.segments:
         yield expression(
-            "wire", symbols.points((a, b)), stroke(), _id(project, "wire", *map(str, (*a, *b)))
+            "wire",
+            pts=symbols.points((a, b)),
+            stroke={"width": 0, "type": word("default")},
+            uuid=identifier(project, "wire", *map(str, (*a, *b))),
         )
 
 
@@ -104,48 +99,35 @@ def _label(project: str, label: NetLabel) -> Expression:
     return expression(
         "label",
         label.net,
-        position(*label.at, 180 if label.left else 0),
-        effects("right" if label.left else "left", "bottom"),
-        _id(project, "label", label.net, *map(str, label.at)),
+        at=position(*label.at, 180 if label.left else 0),
+        effects=effects("right" if label.left else "left", "bottom"),
+        uuid=identifier(project, "label", label.net, *map(str, label.at)),
     )
 
 
 def _symbol(project: str, placed: Placed, entries: Mapping[str, Entry]) -> Expression:
     item = placed.item
-    entry = entries.get(item.reference)
-    one = len(item.shape.units) == 1
-    own = identifier(project, "symbol", item.reference, str(placed.unit))
-    name = item.reference
+    entry, name = entries.get(item.reference), item.reference
+    unit = 1 if len(item.shape.units) == 1 else placed.unit
+    path = expression("path", f"/{sheet_id(project)}", reference=name, unit=unit)
     return expression(
         "symbol",
-        expression("lib_id", f"{LIBRARY}:{item.shape.name}"),
-        position(placed.x, placed.y, placed.angle),
-        expression("unit", placed.unit),
-        expression(
-            "exclude_from_sim", entry is not None and not entry.simulated and not _power(item)
+        *lists(
+            lib_id=f"{LIBRARY}:{item.shape.name}",
+            at=position(placed.x, placed.y, placed.angle),
+            unit=placed.unit,
+            exclude_from_sim=entry is not None and not entry.simulated and not item.shape.power,
+            in_bom=entry is not None and entry.bought,
+            on_board=entry is not None and entry.placed,
+            dnp=entry is not None and not entry.fitted,
+            uuid=symbol_id(project, name, placed.unit),
         ),
-        expression("in_bom", entry is not None and entry.bought),
-        expression("on_board", entry is not None and entry.placed),
-        expression("dnp", entry is not None and not entry.fitted),
-        expression("uuid", own),
         *_properties(placed, entry),
         *(
-            expression("pin", pin.number, _id(project, "pin", name, pin.number))
+            expression("pin", pin.number, uuid=identifier(project, "pin", name, pin.number))
             for pin in item.shape.units[placed.unit - 1].pins
         ),
-        expression(
-            "instances",
-            expression(
-                "project",
-                project,
-                expression(
-                    "path",
-                    f"/{sheet_id(project)}",
-                    expression("reference", name),
-                    expression("unit", 1 if one else placed.unit),
-                ),
-            ),
-        ),
+        *lists(instances={"project": (project, path)}),
     )
 
 
@@ -165,20 +147,8 @@ def _properties(placed: Placed, entry: Entry | None) -> Iterator[Expression]:
 
 
 def _property(key: str, text: str, x: float, y: float, hide: bool) -> Expression:
-    return expression("property", key, text, position(x, y, 0), effects(hide=hide))
+    return expression("property", key, text, at=position(x, y), effects=effects(hide=hide))
 
 
-def _power(item: Item) -> bool:
-    return item.shape.power
-
-
-def _distinct(labels: Iterable[NetLabel]) -> tuple[NetLabel, ...]:
-    return tuple(dict.fromkeys(labels))
-
-
-def _at(point: tuple[int, int]) -> Expression:
-    return expression("at", point[0] * GRID, point[1] * GRID)
-
-
-def _id(*what: str) -> Expression:
-    return expression("uuid", identifier(*what))
+def _at(point: tuple[int, int]) -> tuple[float, float]:
+    return point[0] * GRID, point[1] * GRID

@@ -8,13 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from designer.base.sexpr import Expression, expression, word
-from designer.board.kicad_names import LIBRARY
+from designer.base.sexpr import Contents, Expression, expression, lists, word
+from designer.board.kicad_names import HEAD, SYMBOLS_VERSION
 
 GRID = 1.27
 """Millimetres a unit: KiCad's usual grid is two of it."""
-FILE_VERSION = 20241209
-"""Of symbol libraries, as KiCad 9 writes them."""
 TEXT = 1.27
 """Height of texts [mm]."""
 REACH = 3
@@ -248,37 +246,36 @@ def library(shapes: Iterable[SymbolShape]) -> Expression:
     """The project's symbol library."""
     return expression(
         "kicad_symbol_lib",
-        expression("version", FILE_VERSION),
-        expression("generator", LIBRARY),
-        expression("generator_version", "9.0"),
+        *lists(version=SYMBOLS_VERSION, **HEAD),
         *(symbol(shape, shape.name) for shape in shapes),
     )
 
 
 def symbol(shape: SymbolShape, name: str) -> Expression:
     """The definition of a symbol; its name has the library's before it inside a sheet."""
-    units = [
-        expression(
-            "symbol",
-            f"{shape.name}_{number}_1",
-            *(_line(line, unit.filled) for line in unit.lines),
-            *(_pin(pin) for pin in unit.pins),
-        )
-        for number, unit in enumerate(shape.units, start=1)
-    ]
-    hidden = expression("hide", True)
+    hidden = {"hide": True}
     return expression(
         "symbol",
         name,
-        *([expression("power")] if shape.power else []),
-        *([] if shape.numbers else [expression("pin_numbers", hidden)]),
-        expression("pin_names", expression("offset", 0.5), *([] if shape.names else [hidden])),
-        expression("exclude_from_sim", False),
-        expression("in_bom", not shape.power),
-        expression("on_board", not shape.power),
+        *lists(
+            power=() if shape.power else None,
+            pin_numbers=None if shape.numbers else hidden,
+            pin_names={"offset": 0.5, **({} if shape.names else hidden)},
+            exclude_from_sim=False,
+            in_bom=not shape.power,
+            on_board=not shape.power,
+        ),
         *_properties(shape),
-        *units,
-        expression("embedded_fonts", False),
+        *(
+            expression(
+                "symbol",
+                f"{shape.name}_{number}_1",
+                *(_line(line, unit.filled) for line in unit.lines),
+                *(_pin(pin) for pin in unit.pins),
+            )
+            for number, unit in enumerate(shape.units, start=1)
+        ),
+        *lists(embedded_fonts=False),
     )
 
 
@@ -292,36 +289,35 @@ def _properties(shape: SymbolShape) -> Iterator[Expression]:
         "Description": ("", 0.0, 0.0, True),
     }
     for key, (text, x, y, hide) in texts.items():
-        yield expression("property", key, text, position(x, y, 0), effects(hide=hide))
+        yield expression("property", key, text, at=position(x, y), effects=effects(hide=hide))
 
 
-def position(x: float, y: float, angle: int) -> Expression:
-    """``(at x y angle)`` from units, as they stand: no axis is turned round."""
-    return expression("at", x * GRID, y * GRID, angle)
+def position(x: float, y: float, angle: int = 0) -> tuple[float, ...]:
+    """The list ``at`` from units, as they stand: no axis is turned round."""
+    return x * GRID, y * GRID, angle
 
 
-def effects(*justify: str, hide: bool = False, size: float = TEXT) -> Expression:
+def effects(*justify: str, hide: bool = False, size: float = TEXT) -> dict[str, Contents]:
     """How a text looks."""
-    return expression(
-        "effects",
-        expression("font", expression("size", size, size)),
-        *([expression("justify", *map(word, justify))] if justify else []),
-        *([expression("hide", True)] if hide else []),
-    )
+    return {
+        "font": {"size": (size, size)},
+        "justify": tuple(map(word, justify)) or None,
+        "hide": True if hide else None,
+    }
 
 
-def stroke(width: float = 0.0) -> Expression:
-    return expression("stroke", expression("width", width), expression("type", word("default")))
-
-
-def points(line: Iterable[tuple[float, float]]) -> Expression:
-    return expression("pts", *(expression("xy", x * GRID, y * GRID) for x, y in line))
+def points(line: Iterable[tuple[float, float]]) -> tuple[Expression, ...]:
+    return tuple(expression("xy", x * GRID, y * GRID) for x, y in line)
 
 
 def _line(line: Sequence[tuple[float, float]], filled: bool) -> Expression:
     closed = filled and len(line) > 3 and line[0] == line[-1]
-    fill = expression("fill", expression("type", word("background" if closed else "none")))
-    return expression("polyline", points(line), stroke(0.2), fill)
+    return expression(
+        "polyline",
+        pts=points(line),
+        stroke={"width": 0.2, "type": word("default")},
+        fill={"type": word("background" if closed else "none")},
+    )
 
 
 def _pin(pin: ShapePin) -> Expression:
@@ -329,8 +325,8 @@ def _pin(pin: ShapePin) -> Expression:
         "pin",
         word(pin.electrical),
         word("line"),
-        position(pin.x, pin.y, pin.angle),
-        expression("length", pin.length * GRID),
-        expression("name", pin.name, effects()),
-        expression("number", pin.number, effects()),
+        at=position(pin.x, pin.y, pin.angle),
+        length=pin.length * GRID,
+        name=(pin.name, expression("effects", **effects())),
+        number=(pin.number, expression("effects", **effects())),
     )

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from designer.base.sexpr import Atom, Expression, expression, expression_text, word
-from designer.board.kicad_footprint import FILE_VERSION
-from designer.board.kicad_names import identifier
+from designer.base.sexpr import Expression, expression, expression_text, lists, word
+from designer.board.kicad_board import layers
+from designer.board.kicad_names import BOARD_VERSION, HEAD, identifier
 from designer.board.kicad_rules import CANARY_WIDTH, CustomRule
 
 APART = 40.0
@@ -43,16 +43,20 @@ def specimen(rules: Sequence[CustomRule], *, breaking: bool) -> str:
         items += _example(rule, _size(rule, breaking), at, nets)
     if breaking:
         items += _short((20.0 + APART, 20.0), nets)
-    head = [
-        expression("version", FILE_VERSION),
-        expression("generator", "designer"),
-        expression("generator_version", "9.0"),
-        expression("general", expression("thickness", 1.6)),
-        expression("paper", "A4"),
-        Expression((word("layers"), *(_layer(*each) for each in LAYERS))),
-        *(expression("net", number, name) for number, name in enumerate(nets)),
-    ]
-    return expression_text(expression("kicad_pcb", *head, *items))
+    return expression_text(
+        expression(
+            "kicad_pcb",
+            *lists(
+                version=BOARD_VERSION,
+                **HEAD,
+                general={"thickness": 1.6},
+                paper="A4",
+                layers=layers(LAYERS),
+            ),
+            *(expression("net", number, name) for number, name in enumerate(nets)),
+            *items,
+        )
+    )
 
 
 def canary_track(x: float, y: float) -> Expression:
@@ -104,31 +108,27 @@ def _short(at: Point, nets: list[str]) -> Iterator[Expression]:
     yield _segment((x, y), (x + 5.0 * PAD, y), TRACK, nets.index(_B))
 
 
-def _layer(number: int, name: str, kind: str) -> Expression:
-    return Expression((word(str(number)), Atom(name, quoted=True), word(kind)))
-
-
 def _segment(start: Point, end: Point, width: float, net: int) -> Expression:
     return expression(
         "segment",
-        expression("start", *start),
-        expression("end", *end),
-        expression("width", width),
-        expression("layer", "F.Cu"),
-        expression("net", net),
-        expression("uuid", identifier("segment", str(start), str(end))),
+        start=start,
+        end=end,
+        width=width,
+        layer="F.Cu",
+        net=net,
+        uuid=identifier("segment", str(start), str(end)),
     )
 
 
 def _via(at: Point, net: int) -> Expression:
     return expression(
         "via",
-        expression("at", *at),
-        expression("size", VIA),
-        expression("drill", DRILL),
-        expression("layers", "F.Cu", "B.Cu"),
-        expression("net", net),
-        expression("uuid", identifier("via", str(at))),
+        at=at,
+        size=VIA,
+        drill=DRILL,
+        layers=("F.Cu", "B.Cu"),
+        net=net,
+        uuid=identifier("via", str(at)),
     )
 
 
@@ -136,30 +136,23 @@ def _footprint(name: str, at: Point, net: int, net_name: str, yard: float) -> Ex
     """One square pad; yard : half the width of its courtyard."""
     courtyard = expression(
         "fp_rect",
-        expression("start", -yard, -yard),
-        expression("end", yard, yard),
-        expression("stroke", expression("width", 0.05), expression("type", word("solid"))),
-        expression("fill", word("no")),
-        expression("layer", "F.CrtYd"),
-        expression("uuid", identifier("yard", name)),
+        start=(-yard, -yard),
+        end=(yard, yard),
+        stroke={"width": 0.05, "type": word("solid")},
+        fill=False,
+        layer="F.CrtYd",
+        uuid=identifier("yard", name),
     )
     pad = expression(
         "pad",
         "1",
         word("smd"),
         word("rect"),
-        expression("at", 0.0, 0.0),
-        expression("size", PAD, PAD),
-        expression("layers", "F.Cu", "F.Mask"),
-        expression("net", net, net_name),
-        expression("uuid", identifier("pad", name)),
+        at=(0.0, 0.0),
+        size=(PAD, PAD),
+        layers=("F.Cu", "F.Mask"),
+        net=(net, net_name),
+        uuid=identifier("pad", name),
     )
-    return expression(
-        "footprint",
-        f"specimen:{name}",
-        expression("layer", "F.Cu"),
-        expression("uuid", identifier("footprint", name)),
-        expression("at", *at),
-        courtyard,
-        pad,
-    )
+    head = lists(layer="F.Cu", uuid=identifier("footprint", name), at=at)
+    return expression("footprint", f"specimen:{name}", *head, courtyard, pad)

@@ -12,6 +12,7 @@ from designer.base.sexpr import (
     Expression,
     expression,
     expression_text,
+    lists,
     number_text,
     read,
     read_all,
@@ -59,6 +60,14 @@ def test_numbers_are_plain_decimals_within_half_a_millionth(value: float) -> Non
 def test_a_list_of_atoms_stands_on_one_line_and_lists_in_it_are_indented() -> None:
     made = expression("a", 1.5, "two words", True, expression("b", word("c")), None)
     assert expression_text(made) == '(a 1.5 "two words" yes\n\t(b c)\n)\n'
+
+
+def test_lists_by_name_are_those_written_out() -> None:
+    """A value, a tuple of values, lists in a list, a list of its name alone, and one left out."""
+    short = expression("a", "b", at=(1, 2), font={"size": (1.5, 2), "bold": True}, c=(), d=None)
+    font = expression("font", expression("size", 1.5, 2), expression("bold", True))
+    assert short == expression("a", "b", expression("at", 1, 2), font, expression("c"))
+    assert lists(name="x") == (expression("name", "x"),)
 
 
 def test_kicads_escapes_are_understood() -> None:

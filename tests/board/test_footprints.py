@@ -7,8 +7,7 @@ import itertools
 import pytest
 
 from designer.base.errors import InputError
-from designer.board.footprint_shapes import FootprintShape
-from designer.board.footprints import EXAMPLES, footprint
+from designer.board.footprints import EXAMPLES, FootprintShape, footprint
 from designer.catalog.catalog import load_catalog
 
 CATALOG = load_catalog()
