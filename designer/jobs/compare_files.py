@@ -13,8 +13,7 @@ from designer.base.progress import Progress
 from designer.check.synthesis_result import Synthesis
 from designer.jobs.design_files import design_provenance
 from designer.jobs.json_answers import cost_of
-from designer.report.compare_json import comparison_json, file_json, in_answer
-from designer.report.comparison import compare
+from designer.report.comparison import compare, comparison_json, file_json, in_answer
 
 NAMES = (COMPARISON, *COMPARISON_PICTURES)
 

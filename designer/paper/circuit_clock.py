@@ -72,13 +72,13 @@ def measure(
     pool: SpicePool,
     one: Built,
     response: ModelResponse,
-    followed: SettledResponse,
+    settled: SettledResponse,
     *,
     rounds_: int = ROUNDS,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[Method, ...]:
     """Every method on one response; pool : of one worker."""
-    entries = [*_models(response), *_circuits(pool, one, followed)]
+    entries = [*_models(response), *_circuits(pool, one, settled)]
     taken = rounds([e.entrant for e in entries], rounds_, progress)
     base = next(i for i, e in enumerate(entries) if e.entrant.name == BASE)
     ratios = np.median(taken / taken[:, base : base + 1], axis=0)
@@ -93,7 +93,7 @@ def _models(response: ModelResponse) -> list[_Entry]:
     flow = model_flow(omega)
     steps = round(flow.drive.period / PAPERS_STEP)
     wanted = displacement(flow, response.orbit)[None, :]
-    said = f"Δt = {PAPERS_STEP:g}"
+    setting = f"Δt = {PAPERS_STEP:g}"
     # To the nearest multiple of the points of a period: its error is that of the step.
     fine = max(1, round(steps / POINTS)) * POINTS
     after = runge_kutta.run(MODEL, omega, start, PERIODS, fine)
@@ -107,7 +107,7 @@ def _models(response: ModelResponse) -> list[_Entry]:
         ),
         ("Runge-Kutta, numba", lambda n: runge_kutta.run(MODEL, omega, start, n, steps)),
     ]
-    entries = [_Entry(said, here(name, run, 1), error) for name, run in methods]
+    entries = [_Entry(setting, here(name, run, 1), error) for name, run in methods]
     span = flow.drive.period
     last = _scipy(omega, start, PERIODS * span, np.zeros(0))
     times = span * np.arange(POINTS) / POINTS
@@ -138,9 +138,9 @@ def _scipy(omega: float, start: Array, end: float, times: Array) -> Array:
     return np.asarray(solve_ivp(rhs, (0.0, end), start, rtol=RTOL, atol=RTOL, t_eval=wanted).y)
 
 
-def _circuits(pool: SpicePool, one: Built, followed: SettledResponse) -> list[_Entry]:
-    reduction, orbit = one.reduction(), followed.orbit
-    excitation = one.excitation(followed.omega)
+def _circuits(pool: SpicePool, one: Built, settled: SettledResponse) -> list[_Entry]:
+    reduction, orbit = one.reduction(), settled.orbit
+    excitation = one.excitation(settled.omega)
     subject = GateSubject(reduction, excitation, orbit)
     flow = Flow(subject.system, excitation.drive)
     wanted = displacement(flow, orbit)[None, :]

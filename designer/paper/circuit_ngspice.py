@@ -83,24 +83,24 @@ def stage_curve(pool: SpicePool, circuit: Circuit, reach: float, points: int) ->
     raise SimulationFailed("ngspice gave no answer")
 
 
-def listen(
-    pool: SpicePool, one: Built, followed: Sequence[SettledResponse]
+def ngspice_responses(
+    pool: SpicePool, one: Built, settled: Sequence[SettledResponse]
 ) -> tuple[NgspiceResponse, ...]:
     """Every response that the exact circuit shows periodically, behind the numerics gate."""
     reduction = one.reduction()
     subjects = [
-        GateSubject(reduction, one.excitation(f.omega), f.orbit) for f in followed if f.orbit.n
+        GateSubject(reduction, one.excitation(f.omega), f.orbit) for f in settled if f.orbit.n
     ]
     results = iter(numerics_gate.check(pool, subjects))
     return tuple(
-        _heard(next(results), one, f)
+        _response(next(results), one, f)
         if f.orbit.n
         else NgspiceResponse("", False, "", 0, np.zeros((0, 4)))
-        for f in followed
+        for f in settled
     )
 
 
-def _heard(result: GateResult, one: Built, followed: SettledResponse) -> NgspiceResponse:
+def _response(result: GateResult, one: Built, settled: SettledResponse) -> NgspiceResponse:
     steps = result.tried[-1]
     if isinstance(result.read, SimulationFailed):
         return NgspiceResponse("failed", False, result.read.reason, steps, np.zeros((0, 4)))
@@ -115,22 +115,22 @@ def _heard(result: GateResult, one: Built, followed: SettledResponse) -> Ngspice
 
 
 def _stage(circuit: Circuit) -> set[str]:
-    """Names of the parts that make the stage's output of v1: what is met going back from the
-    output, but for integrators and what feeds them. A section is met at its output alone."""
+    """Names of the parts that make the stage's output of v1: what is more going back from the
+    output, but for integrators and what feeds them. A section is more at its output alone."""
     summing = {c.minus for c in circuit.capacitors}
     ends = {GROUND, DISPLACEMENT} | {rail.net for rail in circuit.rails}
     left = [p for p in circuit.parts if not summing & set(p.nets)]
-    nets, kept = {OUTPUT}, set[str]()
+    nets, names = {OUTPUT}, set[str]()
     while True:
-        met = [
+        more = [
             p
             for p in left
-            if p.name not in kept and nets & {*([p.output] if isinstance(p, Section) else p.nets)}
+            if p.name not in names and nets & {*([p.output] if isinstance(p, Section) else p.nets)}
         ]
-        if not met:
-            return kept
-        kept |= {p.name for p in met}
-        nets |= {net for p in met for net in p.nets} - ends
+        if not more:
+            return names
+        names |= {p.name for p in more}
+        nets |= {net for p in more for net in p.nets} - ends
 
 
 def _whole(sweep: Waveforms) -> Waveforms:

@@ -27,10 +27,11 @@ from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import DeadZone
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile
-from designer.paper.tolerance_cases import model_file
+from designer.model.model_file import ModelFile, parse_model_file
 from designer.yields.exact_rung import images, waveform_error
 
+OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.215}
+"""Drive frequency at which 1-p-p is asked for, by p."""
 PRINTED, CORRECTED, OURS, RECTIFIER = "printed", "corrected", "match", "rectifier"
 CIRCUITS = (PRINTED, CORRECTED, OURS, RECTIFIER)
 TITLES = {
@@ -39,6 +40,31 @@ TITLES = {
     OURS: "this tool, same stage",
     RECTIFIER: "this tool, rectifier stage",
 }
+
+
+_MODEL = """format = 1
+title = "The paper's 1-p-p responses, rectifying dead zone"
+[model]
+m = 0.5
+k = 0.5
+k0 = 0.95
+c = 0.5
+zeta = 0.1
+f20 = 0.0
+b = 0.25
+sides = "both"
+{responses}
+[circuit]
+opamp = "TL074C"
+saturation = 13.0
+resistors = "E96"
+capacitors = "E12"
+resistor_grade = 0.01
+capacitor_grade = 0.01
+dead_zone = "rectifier"
+diode = "1N4148"
+reference = "LM4040C50"
+"""
 
 
 @dataclass(frozen=True)
@@ -84,11 +110,19 @@ class SettledResponse:
     """RMS difference of x1 from the model's, over its peak, nan where the periods differ."""
 
 
-def model_with(zone: DeadZone) -> ModelFile:
-    """The paper's model and its eight responses, with this dead zone for the tool's own design."""
-    made = model_file()
-    text = made.text.replace('dead_zone = "rectifier"', f'dead_zone = "{zone}"')
-    return replace(made, circuit=replace(made.circuit, dead_zone=zone), text=text)
+def model_file() -> ModelFile:
+    """The paper's model with the eight 1-p-p responses, and the rectifying dead zone."""
+    responses = "\n".join(
+        f'[[response]]\nomega = {omega}\nexpect = "1-{p}-{p}"' for p, omega in OMEGA.items()
+    )
+    return parse_model_file(_MODEL.format(responses=responses))
+
+
+def model_with(dead_zone: DeadZone) -> ModelFile:
+    """The paper's model and its eight responses, with this dead zone for the tool's design."""
+    modelfile = model_file()
+    text = modelfile.text.replace('dead_zone = "rectifier"', f'dead_zone = "{dead_zone}"')
+    return replace(modelfile, circuit=replace(modelfile.circuit, dead_zone=dead_zone), text=text)
 
 
 def build(name: str, catalog: Catalog) -> Built:
@@ -103,8 +137,8 @@ def build(name: str, catalog: Catalog) -> Built:
         setting = paper_values.generator(model, values)
         circuit = paper_values.circuit(model, values, opamp)
     else:
-        zone: DeadZone = "rectifier" if name == RECTIFIER else "saturation"
-        _, design = checked_design.design_for(model_with(zone), catalog)
+        dead_zone: DeadZone = "rectifier" if name == RECTIFIER else "saturation"
+        _, design = checked_design.design_for(model_with(dead_zone), catalog)
         circuit = design.circuit
         setting = design.errors.scales.frequency(1.0), design.amplitude()
     return built(ComparedCircuit(TITLES[name], "", circuit, *setting))
@@ -131,11 +165,11 @@ def model_flow(omega: float) -> Flow:
     return Flow(paper_values.MODEL.second_order().piecewise_linear(), Drive(omega))
 
 
-def follow(one: Built, found: Sequence[ModelResponse]) -> tuple[SettledResponse, ...]:
+def follow(one: Built, wanted: Sequence[ModelResponse]) -> tuple[SettledResponse, ...]:
     """Every response on the exact circuit."""
     system = one.reduction().system()
     out = []
-    for r in found:
+    for r in wanted:
         flow = Flow(system, one.excitation(r.omega).drive)
         try:
             orbit = settle(flow, r.orbit.start * one.volts)

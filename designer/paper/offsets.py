@@ -62,7 +62,7 @@ def signs(sections: int, most: int = PATTERNS) -> Array:
 
 def shifts(
     one: Built,
-    found: Sequence[ModelResponse],
+    wanted: Sequence[ModelResponse],
     size: float,
     *,
     jobs: int = 1,
@@ -77,23 +77,23 @@ def shifts(
     ensemble = Ensemble(replace(many, offset=offset), jobs=jobs)
     system = one.reduction().system()
     out = []
-    for r in found:
+    for r in wanted:
         assert r.expected is not None
         drive = one.excitation(r.omega).drive
         own = settle(Flow(system, drive), r.orbit.start * one.volts)
         if judge(own, r.spec, own)[0] is not Verdict.OK:
             out.append(Shift(r.omega, r.expected, size, False, Yield(0, 0, 0, 0), ()))
             continue
-        met = ensemble.settle(
+        orbits = ensemble.settle(
             range(len(patterns)),
             [drive] * len(patterns),
             np.tile(own.start, (len(patterns), 1)),
             jobs=jobs,
         )
-        judged = [judge(orbit, r.spec, own)[0] for orbit in met]
+        judged = [judge(orbit, r.spec, own)[0] for orbit in orbits]
         tally = Counter(judged)
         lost = Counter(
-            orbit.response for orbit, v in zip(met, judged, strict=True) if v is not Verdict.OK
+            orbit.response for orbit, v in zip(orbits, judged, strict=True) if v is not Verdict.OK
         )
         counted = Yield(
             tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]

@@ -35,6 +35,7 @@ from designer.paper.circuit_page import circuit_page
 from designer.paper.circuits import (
     CIRCUITS,
     CORRECTED,
+    OMEGA,
     TITLES,
     Built,
     SettledResponse,
@@ -46,7 +47,6 @@ from designer.paper.circuits import (
     model_with,
 )
 from designer.paper.report_files import README, write_files
-from designer.paper.tolerance_cases import OMEGA
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields.verdict import kept
 
@@ -199,18 +199,18 @@ def _circuit(bench: _Bench, name: str) -> dict[str, Any]:
     bench.progress.stage(f"{TITLES[name]}: parts, exact circuit")
     one = build(name, bench.catalog)
     assert one.errors is not None
-    followed = follow(one, bench.wanted)
+    settled = follow(one, bench.wanted)
     threshold = one.errors.scales.threshold
     bench.progress.stage(f"{TITLES[name]}: ngspice")
     with SpicePool(bench.jobs, timeout=900.0) as pool:
         spice = circuit_ngspice.stage_curve(pool, one.circuit, DC_REACH * threshold, DC_POINTS)
-        heard = circuit_ngspice.listen(pool, one, followed)
+        ngspice = circuit_ngspice.ngspice_responses(pool, one, settled)
     exact = dc_curve(one, spice[:, 0])
     rows = []
-    for r, f, h in zip(bench.wanted, followed, heard, strict=True):
+    for r, f, h in zip(bench.wanted, settled, ngspice, strict=True):
         rows.append(
             {
-                **_said(f),
+                **_settled_row(f),
                 "ngspice": h.response,
                 "ngspice_passed": h.passed,
                 "ngspice_reason": h.reason,
@@ -269,7 +269,7 @@ def _misprints(bench: _Bench) -> dict[str, Any]:
             if one.errors is not None:
                 errors = one.errors.errors
                 row["worst"] = max(errors, key=lambda name: abs(errors[name]))
-            row["responses"] = [_said(f) for f in follow(one, bench.wanted)] if m.run else []
+            row["responses"] = [_settled_row(f) for f in follow(one, bench.wanted)] if m.run else []
         rows.append(row)
         step()
     return {"misprints": rows}
@@ -303,7 +303,7 @@ def _clock(bench: _Bench) -> dict[str, Any]:
     return {"rounds": bench.extent.rounds, "responses": rows}
 
 
-def _said(f: SettledResponse) -> dict[str, Any]:
+def _settled_row(f: SettledResponse) -> dict[str, Any]:
     return {
         "omega": f.omega,
         "expected": f.expected,
@@ -313,12 +313,12 @@ def _said(f: SettledResponse) -> dict[str, Any]:
     }
 
 
-def _trace(one: Built, followed: SettledResponse) -> Array:
+def _trace(one: Built, settled: SettledResponse) -> Array:
     """(k, 4) the orbit in model units; empty where there is none."""
-    orbit = followed.orbit
+    orbit = settled.orbit
     if not orbit.n:
         return np.zeros((0, 4))
-    flow = Flow(one.reduction().system(), one.excitation(followed.omega).drive)
+    flow = Flow(one.reduction().system(), one.excitation(settled.omega).drive)
     run = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=FINE)
     return run.strobes / one.volts
 

@@ -96,7 +96,7 @@ def reproduce(
     progress: Progress | None = None,
     extent: DynamicsExtent | None = None,
 ) -> Dynamics:
-    """Write the report into a folder, which is made; an earlier report in it is replaced.
+    """Write the report into a folder, which is result; an earlier report in it is replaced.
 
     jobs : threads of the sweeps. progress : is told the stages. extent : the report's by default.
 
@@ -121,8 +121,8 @@ def reproduce(
     page = dynamics_page(dynamics, figures, COMMAND, first=FIRST, starts=STARTS)
     write_files(out, (DATA, _document(dynamics, extent, source)), page, figures, ("png", "svg"))
     _parquet(out / "branches.parquet", dynamics.survey, source)
-    for name, made in sweeps.items():
-        write_sweep(out / f"{name}.parquet", made, source)
+    for name, result in sweeps.items():
+        write_sweep(out / f"{name}.parquet", result, source)
     return dynamics
 
 
@@ -198,10 +198,10 @@ def _figures(
         "branches": dynamics_pictures.branches(dynamics.survey, extent.low, extent.high),
         "fig3": dynamics_pictures.portraits(_portraits(dynamics)),
     }
-    for name, made in sweeps.items():
+    for name, result in sweeps.items():
         marks = bifurcation_plots.marks(dynamics.survey.points, *FIGURES[name][:2])
         shown = marks if name != "fig2a" else ()
-        figures[name] = bifurcation_plots.diagram(made, shown, TITLE)
+        figures[name] = bifurcation_plots.diagram(result, shown, TITLE)
     return figures
 
 

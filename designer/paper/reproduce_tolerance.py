@@ -27,8 +27,9 @@ from designer.base.report_pieces import CaseStore
 from designer.catalog.catalog import load_catalog
 from designer.jobs.origin import provenance
 from designer.model.tuning_bands import Bands
+from designer.paper.circuits import OMEGA, model_file
 from designer.paper.report_files import README, write_files
-from designer.paper.tolerance_cases import OMEGA, TITLES, SpreadCase, YieldRow, cases, model_file
+from designer.paper.tolerance_cases import TITLES, SpreadCase, YieldRow, cases
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
 from designer.yields import exact_rung
 from designer.yields.blame_analysis import blame

@@ -71,39 +71,39 @@ def gaps(
 def out_of_turn(windows: Sequence[BranchWindow], gap: Gap) -> list[tuple[float, int]]:
     """(ω, q) of each 1-q-q in a gap that is not in turn, falling.
 
-    In turn are 1-p-p, twins too, and below it 1-(p+1)-(p+1); once that was met, 1-p-p no more.
+    In turn are 1-p-p, twins too, and below it 1-(p+1)-(p+1); once that was seen, 1-p-p no more.
     Windows stand with their middle, beside the motions from rest.
     """
-    met = [(w, name) for w, name in gap.seen]
+    seen = [(w, name) for w, name in gap.seen]
     for each in windows:
         middle = 0.5 * (each.low.value + each.high.value)
         if gap.low < middle < gap.high:
-            met.append((middle, each.response))
-    out, reached = [], gap.p
-    for value, name in sorted(met, reverse=True):
+            seen.append((middle, each.response))
+    out, last = [], gap.p
+    for value, name in sorted(seen, reverse=True):
         q = equal(name)
         if q is None:
             continue
-        if q < reached or q > gap.after:
+        if q < last or q > gap.after:
             out.append((value, q))
         else:
-            reached = q
+            last = q
     return out
 
 
 def faults(windows: Sequence[BranchWindow], gap: Gap) -> str:
     """What in a gap is not as the paper has it; empty where all is."""
-    said = []
+    parts = []
     if not gap.chaotic:
-        said.append("no aperiodic motion")
+        parts.append("no aperiodic motion")
     strays: dict[int, list[float]] = {}
     for value, q in out_of_turn(windows, gap):
         strays.setdefault(q, []).append(value)
     for q, values in strays.items():
         low, high = f"{min(values):.5f}", f"{max(values):.5f}"
         where = low if low == high else f"{low} to {high}"
-        said.append(f"1-{q}-{q} out of turn at ω = {where}")
-    return f"between p = {gap.p} and {gap.after} {' and '.join(said)}" if said else ""
+        parts.append(f"1-{q}-{q} out of turn at ω = {where}")
+    return f"between p = {gap.p} and {gap.after} {' and '.join(parts)}" if parts else ""
 
 
 def strays(windows: Sequence[BranchWindow], mains: Sequence[tuple[int, BranchWindow]]) -> list[str]:

@@ -39,9 +39,10 @@ from designer.jobs.search_job import search_into
 from designer.jobs.study_folder import FolderStores
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
+from designer.paper.circuits import model_file
 from designer.paper.report_files import README, write_files
 from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
-from designer.paper.tolerance_cases import TITLES, cases, model_file
+from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
 from designer.yields import exact_rung, study_identity, study_plan
 from designer.yields.blame_analysis import blame
@@ -75,19 +76,19 @@ def report(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Make the report in the folder ``out``; finished cases that are there are not made again.
+    """Make the report in the folder ``out``; finished cases that are there are not synthesis again.
 
     Raises
     ------
     InputError, Unreachable, EnvironmentMissing : as of a search.
     """
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     catalog, file = load_catalog(), read_model_file(model)
     options = Options(seed, jobs, samples, resume=True)
     rules = [__version__, search_job.RULES, study_identity.RULES]
     settings = plain([FORMAT, rules, file.sha256, catalog.hash, samples, short, seed])
-    store = CaseStore(out, FILES, resume=True, place="out", note=said.note)
+    store = CaseStore(out, FILES, resume=True, place="out", note=progress.note)
     store.expect(dumps(settings, indent=None))
 
     def case(name: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -97,33 +98,33 @@ def report(
     def searched(name: str, asked: ModelFile, *, tuned: bool) -> dict[str, Any]:
         place = out / name
         outcome = search_into(
-            asked, place, options, said, lambda o: o.command("search", model, place)
+            asked, place, options, progress, lambda o: o.command("search", model, place)
         )
-        row = _searched(_made(place, catalog), place, options, short, said, tuned=tuned)
+        row = _searched(_load(place, catalog), place, options, short, progress, tuned=tuned)
         return {**row, "confirmation": outcome.answer["confirmation"]}
 
     def nominal() -> dict[str, Any]:
         fixed = parse_model_file(at_model_clearance(file), out / "nominal.toml")
         return searched("nominal", fixed, tuned=True)
 
-    found = []
+    pieces = []
     for other in cases(catalog, samples=min(samples, OTHERS), seed=seed):
         if other.reference:
             spec = model_file().circuit
             title = TITLES[other.circuit]
-            make = partial(_as_built, other.plan, spec, catalog, jobs, said)
-            found.append(case(title, make))
+            make = partial(_as_built, other.plan, spec, catalog, jobs, progress)
+            pieces.append(case(title, make))
     free = partial(searched, "free", file, tuned=False)
-    found += [case(FREE, free), case(NOMINAL, nominal)]
+    pieces += [case(FREE, free), case(NOMINAL, nominal)]
     numbers = {"samples": samples, "short": short}
     source = provenance(file, catalog.hash, seed=seed, settings=numbers)
-    document = {"format": FORMAT, "cases": found, "provenance": source}
+    document = {"format": FORMAT, "cases": pieces, "provenance": source}
     command = (
         "python -m designer.paper.robust_design reports/robust-design "
         f"--samples {samples} --short {short} --seed {seed}"
     )
-    page = robust_design_page(found, command, model.name)
-    figures = {"yields": yield_chart(found), "levers": lever_chart(found)}
+    page = robust_design_page(pieces, command, model.name)
+    figures = {"yields": yield_chart(pieces), "levers": lever_chart(pieces)}
     write_files(out, (DATA, document), page, figures, ("png", "svg"))
     return document
 
@@ -137,26 +138,37 @@ def at_model_clearance(file: ModelFile) -> str:
     return toml_text(data)
 
 
-def _made(folder: Path, catalog: Catalog) -> Synthesis:
+def _load(folder: Path, catalog: Catalog) -> Synthesis:
     return load(Folder(folder), read_model_file(folder / "model.toml"), catalog)
 
 
 def _searched(
-    made: Synthesis, place: Path, options: Options, short: int, said: Progress, *, tuned: bool
+    synthesis: Synthesis,
+    place: Path,
+    options: Options,
+    short: int,
+    progress: Progress,
+    *,
+    tuned: bool,
 ) -> dict[str, Any]:
     """A searched design: as built on all boards, reached (and tuned) on some."""
-    checked = checked_design.check(made.design, made.found, None)
+    checked = checked_design.check(synthesis.design, synthesis.found, None)
     jobs = cores() if options.jobs is None else options.jobs
     asked = [c for c in checked if c.model.found]
     plan = study_plan.plan_study(
-        made.modelfile, made.design, asked, made.catalog, samples=options.samples, seed=options.seed
+        synthesis.modelfile,
+        synthesis.design,
+        asked,
+        synthesis.catalog,
+        samples=options.samples,
+        seed=options.seed,
     )
-    row = _as_built(plan, made.modelfile.circuit, made.catalog, jobs, said)
+    row = _as_built(plan, synthesis.modelfile.circuit, synthesis.catalog, jobs, progress)
     powered = place / "powered-up"
     powered.mkdir(exist_ok=True)
     for boards in (short, MORE * short):
         study = tolerance(
-            made,
+            synthesis,
             samples=boards,
             rung="exact",
             tuned=tuned,
@@ -165,22 +177,22 @@ def _searched(
             seed=options.seed,
             jobs=jobs,
             checked=checked,
-            stores=FolderStores(powered, lambda: None, said.note),
-            progress=said,
+            stores=FolderStores(powered, lambda: None, progress.note),
+            progress=progress,
         )
         if _decided(study, len(checked), tuned=tuned):
             break
     for i in range(len(checked)):
         layers = {"reached": study.reached_of(i)} | ({"tuned": study.tuned_of(i)} if tuned else {})
         row["responses"][i] |= {name: _counted(count(rows)) for name, rows in layers.items()}
-        row["responses"][i]["b"] = made.found[i].b
+        row["responses"][i]["b"] = synthesis.found[i].b
     row["all_on_one"] |= {
         name: None if one is None else _counted(one)
         for name, one in (("tuned", study.all_tuned), ("reached", study.all_reached))
     }
     search = read_json(place / "search.json")
-    kept = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
-    return {**row, "search": {key: search[key] for key in kept}}
+    keys = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
+    return {**row, "search": {key: search[key] for key in keys}}
 
 
 def _decided(study: Study, responses: int, *, tuned: bool) -> bool:
@@ -194,15 +206,15 @@ def _decided(study: Study, responses: int, *, tuned: bool) -> bool:
 
 
 def _as_built(
-    plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int, said: Progress
+    plan: StudyPlan, spec: CircuitSpec, catalog: Catalog, jobs: int, progress: Progress
 ) -> dict[str, Any]:
     """Yields, blame, limits, price and parts of a circuit."""
-    step = said.stage("boards as built", plan.samples * len(plan.questions))
+    step = progress.stage("boards as built", plan.samples * len(plan.questions))
     answers = exact_rung.block(plan, range(plan.samples), jobs, step)
     some = replace(plan, samples=min(plan.samples, BLAMED))
     first = answers[: some.samples * len(plan.questions)]
-    blamed = blame(some, first, jobs=jobs, progress=said.stage("blame")).responses
-    limits = limitings(some, first, jobs=jobs, progress=said.stage("limits"))
+    blamed = blame(some, first, jobs=jobs, progress=progress.stage("blame")).responses
+    limits = limitings(some, first, jobs=jobs, progress=progress.stage("limits"))
     rows = []
     for k, question in enumerate(plan.questions):
         counted = count([a for a in answers if a.question == k])

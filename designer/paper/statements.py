@@ -59,7 +59,7 @@ def symmetric_mains(windows: Sequence[BranchWindow]) -> list[tuple[int, BranchWi
 
 
 def statements(
-    found: Survey,
+    survey: Survey,
     windows: Sequence[BranchWindow],
     gaps: Sequence[Gap],
     chatter: Sequence[tuple[float, Orbit]],
@@ -72,10 +72,10 @@ def statements(
     symmetric, twins = main_windows(windows, 1)
     assert symmetric is not None
     assert twins is not None
-    out = [_pitchfork(symmetric), _first_end(found, windows, twins)]
+    out = [_pitchfork(symmetric), _first_end(survey, windows, twins)]
     out += [_doublings(windows), _second(windows), _twins(windows), _order(windows, gaps)]
-    out.append(_chattering(found, windows, chatter))
-    return [*out, _each(windows), _touches(found)]
+    out.append(_chattering(survey, windows, chatter))
+    return [*out, _each(windows), _touches(survey)]
 
 
 def _pitchfork(symmetric: BranchWindow) -> Statement:
@@ -92,9 +92,9 @@ def _pitchfork(symmetric: BranchWindow) -> Statement:
     )
 
 
-def _first_end(found: Survey, windows: Sequence[BranchWindow], twins: BranchWindow) -> Statement:
+def _first_end(survey: Survey, windows: Sequence[BranchWindow], twins: BranchWindow) -> Statement:
     way = cascade(windows, twins)
-    touch = _grazing(found, twins)
+    touch = _grazing(survey, twins)
     grazed = ""
     if touch is not None:
         state = "stable" if touch.stable[0] and touch.stable[1] else "unstable"
@@ -111,17 +111,17 @@ def _first_end(found: Survey, windows: Sequence[BranchWindow], twins: BranchWind
     )
 
 
-def _grazing(found: Survey, twins: BranchWindow) -> Bifurcation | None:
+def _grazing(survey: Survey, twins: BranchWindow) -> Bifurcation | None:
     """Where the orbits beyond a window's lower end first touch a stop once more."""
     end = twins.low.point
     if end is None:
         return None
     before, after = end.stable
     if before == after:  # the counts change there: the window lies at the higher values
-        before = found.branches[twins.branch].points[int(end.position)].value > end.value
+        before = survey.branches[twins.branch].points[int(end.position)].value > end.value
     touches = [
         p
-        for p in found.on(twins.branch)
+        for p in survey.on(twins.branch)
         if p.kind is PointKind.GRAZING
         and (p.position > end.position if before else p.position < end.position)
     ]
@@ -185,7 +185,7 @@ def _order(windows: Sequence[BranchWindow], gaps: Sequence[Gap]) -> Statement:
     falling = all(a[1].high.value > b[1].high.value for a, b in itertools.pairwise(there))
     apart = all(a[1].low.value > b[1].high.value for a, b in itertools.pairwise(there))
     looked = [(g.p, g.after) for g in gaps] == [(a[0], b[0]) for a, b in itertools.pairwise(there)]
-    wrong = [said for said in (faults(windows, gap) for gap in gaps) if said]
+    wrong = [text for text in (faults(windows, gap) for gap in gaps) if text]
     wrong += strays(windows, there)
     chaos = ", ".join(f"{g.p}–{g.after}: {g.chaotic} of {len(g.seen)}" for g in gaps)
     complete = [p for p, _ in there] == list(range(1, 9))
@@ -204,11 +204,11 @@ def _order(windows: Sequence[BranchWindow], gaps: Sequence[Gap]) -> Statement:
 
 
 def _chattering(
-    found: Survey, windows: Sequence[BranchWindow], chatter: Sequence[tuple[float, Orbit]]
+    survey: Survey, windows: Sequence[BranchWindow], chatter: Sequence[tuple[float, Orbit]]
 ) -> Statement:
     shown = ", ".join(f"{orbit.response} at {w:g}" for w, orbit in chatter)
     most = max((w for w in windows if w.symmetric), key=lambda w: int(w.response.split("-")[1]))
-    down_to = min(p.value for branch in found.branches for p in branch.points)
+    down_to = min(p.value for branch in survey.branches for p in branch.points)
     lowest, orbit = chatter[-1]
     speeds = np.abs(orbit.impact_velocities[orbit.impact_sides > 0.0])
     dying = _dying(speeds)
@@ -250,10 +250,10 @@ def _each(windows: Sequence[BranchWindow]) -> Statement:
     )
 
 
-def _touches(found: Survey) -> Statement:
+def _touches(survey: Survey) -> Statement:
     """Where 1-p-p becomes 1-(p+1)-p, by grazing, as an attractor."""
     seen = []
-    for point in found.points:
+    for point in survey.points:
         if point.kind is not PointKind.GRAZING or point.stable != (True, True):
             continue
         ends = [point.before, point.after]

@@ -9,54 +9,26 @@ from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.check import checked_design
 from designer.circuit import paper_values
-from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
-from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse, find
-from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.model_file import ModelFile
+from designer.paper.circuits import CORRECTED, OMEGA, PRINTED, RECTIFIER, build, model_file
 from designer.spread.spread import Spread
 from designer.yields.verdict import Question, StudyPlan, Verdict, Yield, judge
 
-OMEGA = {1: 1.55, 2: 0.85, 3: 0.54, 4: 0.41, 5: 0.337, 6: 0.284, 7: 0.24, 8: 0.215}
-"""Drive frequency at which 1-p-p is asked for, by p."""
 RESISTORS = (0.05, 0.01, 0.001)
 CAPACITORS = (0.05, 0.01)
 REFERENCE = (0.01, 0.01, True)
 """Grades and offsets of the case whose blame is worked out."""
-PRINTED, CORRECTED, RECTIFIER = "printed", "corrected", "rectifier"
 TITLES = {
     PRINTED: "paper, as printed",
     CORRECTED: "paper, corrected",
     RECTIFIER: "rectifier stage",
 }
-
-_MODEL = """format = 1
-title = "The paper's 1-p-p responses, rectifying dead zone"
-[model]
-m = 0.5
-k = 0.5
-k0 = 0.95
-c = 0.5
-zeta = 0.1
-f20 = 0.0
-b = 0.25
-sides = "both"
-{responses}
-[circuit]
-opamp = "TL074C"
-saturation = 13.0
-resistors = "E96"
-capacitors = "E12"
-resistor_grade = 0.01
-capacitor_grade = 0.01
-dead_zone = "rectifier"
-diode = "1N4148"
-reference = "LM4040C50"
-"""
 
 
 @dataclass(frozen=True)
@@ -81,8 +53,8 @@ class SpreadCase:
     @property
     def name(self) -> str:
         """ "printed-r1-c5-offsets": grades in per cent."""
-        said = "offsets" if self.offsets else "level"
-        return f"{self.circuit}-r{100 * self.resistor:g}-c{100 * self.capacitor:g}-{said}"
+        ending = "offsets" if self.offsets else "level"
+        return f"{self.circuit}-r{100 * self.resistor:g}-c{100 * self.capacitor:g}-{ending}"
 
     @property
     def reference(self) -> bool:
@@ -129,22 +101,14 @@ class YieldRow:
         return (self.resistor, self.capacitor, self.offsets)
 
 
-def model_file() -> ModelFile:
-    """The paper's model with the eight 1-p-p responses, and the rectifying dead zone."""
-    responses = "\n".join(
-        f'[[response]]\nomega = {omega}\nexpect = "1-{p}-{p}"' for p, omega in OMEGA.items()
-    )
-    return parse_model_file(_MODEL.format(responses=responses))
-
-
 def cases(catalog: Catalog, *, samples: int, seed: int) -> Iterator[SpreadCase]:
     """Every case, the reference case of each circuit first."""
     modelfile = model_file()
-    found = find(modelfile.model, modelfile.responses)
+    wanted = find(modelfile.model, modelfile.responses)
     opamp = catalog.opamp(paper_values.OPAMP)
     grades = [(r, c, o) for o in (True, False) for r in RESISTORS for c in CAPACITORS]
     grades.sort(key=lambda g: g != REFERENCE)
-    circuits = list(_circuits(modelfile, found, catalog))
+    circuits = list(_circuits(modelfile, wanted, catalog))
     for resistor, capacitor, offsets in grades:
         spread = Spread.bench_1(opamp, resistor, capacitor)
         if not offsets:
@@ -155,55 +119,30 @@ def cases(catalog: Catalog, *, samples: int, seed: int) -> Iterator[SpreadCase]:
 
 
 def _circuits(
-    modelfile: ModelFile, found: tuple[ModelResponse, ...], catalog: Catalog
+    modelfile: ModelFile, wanted: tuple[ModelResponse, ...], catalog: Catalog
 ) -> Iterator[tuple[str, Circuit, dict[int, Question], dict[int, str]]]:
-    model, opamp = modelfile.model, catalog.opamp(paper_values.OPAMP)
-    exact = paper_values.corrected()
-    papers = {
-        PRINTED: ComparedCircuit(
-            TITLES[PRINTED],
-            "",
-            paper_values.circuit(model, paper_values.PRINTED, opamp),
-            paper_values.PRINTED_FREQUENCY,
-            paper_values.PRINTED_AMPLITUDE,
-        ),
-        CORRECTED: ComparedCircuit(
-            TITLES[CORRECTED],
-            "",
-            paper_values.circuit(model, exact, opamp),
-            *paper_values.generator(model, exact),
-        ),
-    }
-    for name, candidate in papers.items():
-        errors = coefficient_errors(candidate.circuit, model.second_order())
-        settings = [Excitation(candidate.frequency * r.omega, candidate.amplitude) for r in found]
-        yield (
-            name,
-            candidate.circuit,
-            *_questions(candidate.circuit, errors.scales.volts, settings, found),
-        )
+    for name in (PRINTED, CORRECTED):
+        one = build(name, catalog)
+        settings = [one.excitation(r.omega) for r in wanted]
+        yield name, one.circuit, *_questions(one.circuit, one.volts, settings, wanted)
     _, design = checked_design.design_for(modelfile, catalog)
     settings = [
-        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in found
+        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in wanted
     ]
-    yield (
-        RECTIFIER,
-        design.circuit,
-        *_questions(design.circuit, design.volts(), settings, found),
-    )
+    yield RECTIFIER, design.circuit, *_questions(design.circuit, design.volts(), settings, wanted)
 
 
 def _questions(
     circuit: Circuit,
     volts: Array,
     settings: list[Excitation],
-    found: tuple[ModelResponse, ...],
+    wanted: tuple[ModelResponse, ...],
 ) -> tuple[dict[int, Question], dict[int, str]]:
     """The questions that can be asked, by p, and what stands in the place of the others."""
     system = Reduction(circuit, nominal_board(circuit)).system()
     questions: dict[int, Question] = {}
     missing: dict[int, str] = {}
-    for p, response, excitation in zip(OMEGA, found, settings, strict=True):
+    for p, response, excitation in zip(OMEGA, wanted, settings, strict=True):
         orbit: Orbit = settle(Flow(system, excitation.drive), response.orbit.start * volts)
         if judge(orbit, response.spec, orbit)[0] is Verdict.OK:
             questions[p] = Question(response.spec, excitation, orbit, None)

@@ -14,7 +14,8 @@ from matplotlib.image import AxesImage
 from designer.base.figure_style import INK, MUTED, new_figure, number_cells, styled
 from designer.base.page import Block, Page, PageSection, Picture, bullets, table
 from designer.base.proportion import wilson
-from designer.paper.tolerance_cases import OMEGA, REFERENCE, TITLES, YieldRow
+from designer.paper.circuits import OMEGA
+from designer.paper.tolerance_cases import REFERENCE, TITLES, YieldRow
 from designer.yields.setting_search import MOST_TRIES
 
 SHOWN = ("as built", "tuned", "reached")

@@ -11,13 +11,11 @@ from .bifurcation_plots import (
     MARKS as MARKS,
     RED as RED,
 )
-from .compare_json import (
+from .comparison import (
+    compare as compare,
     comparison_json as comparison_json,
     file_json as file_json,
     in_answer as in_answer,
-)
-from .comparison import (
-    compare as compare,
 )
 from .data import (
     ReportData as ReportData,

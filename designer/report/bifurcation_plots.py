@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from designer.base.arrays import Array
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, style
-from designer.bifurcations.basins import SAME, Basins
-from designer.bifurcations.parameter_map import MapCell, ParameterMap
+from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.bifurcations.basins import SAME, BasinPlan, Basins
+from designer.bifurcations.parameter_map import MapCell, MapPlan, ParameterMap
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
@@ -47,144 +46,160 @@ MARKS = {
     "grazing": ("x", "#cc79a7"),
     "torus": ("D", "#7f3fbf"),
 }
+Coloured = tuple[str, Array, list[Steady]]
+"""Colour, values of the parameter, and the motions there."""
+SHADES = {True: "#b9cfe4", False: "#ecd9b4"}
+"""Of windows of symmetric responses and of others."""
+STRIPS = {DOWN: "↓", UP: "↑"}
 
 
-@dataclass(frozen=True)
-class Mark:
-    """A bifurcation point to be marked."""
-
-    kind: str
-    """"pitchfork", "period-doubling", "fold" or "grazing"."""
-    value: float
-    """Value of the parameter."""
+def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Bifurcation]:
+    """Those of stable orbits between two values."""
+    return [p for p in points if (p.stable[0] or p.stable[1]) and low <= p.value <= high]
 
 
-def marks(points: Sequence[Bifurcation], low: float, high: float) -> list[Mark]:
-    """Those of stable orbits, from low to high."""
-    return [
-        Mark(str(p.kind), p.value)
-        for p in points
-        if (p.stable[0] or p.stable[1]) and low <= p.value <= high
-    ]
-
-
-def diagram(sweep: Sweep, points: Sequence[Mark] = (), name: str = "") -> Figure:
+@styled
+def diagram(sweep: Sweep, points: Sequence[Bifurcation] = (), name: str = "") -> Figure:
     """The paper's Fig. 2: least displacement of each period, impact velocity on the upper stop,
-    largest Lyapunov exponent, over the swept parameter; windows named above. name : the model's
-    title."""
-    plan, units = sweep.plan, sweep.plan.subject.units
+    largest Lyapunov exponent, over the swept parameter; windows named above.
+
+    points : to be marked. name : the model's title.
+    """
+    plan = sweep.plan
     strips = list(plan.tracks) if plan.followed else ["starts"]
-    with style():
-        figure = new_figure(9.6, 7.6 + 0.24 * len(strips))
-        heights = [0.24] * len(strips) + [2.4, 2.4, 1.6]
-        _head(figure, title(name, plan, 120))
-        rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
-        for axes, track in zip(rows, strips, strict=False):
-            shown = [w for w in sweep.windows if w.track == track or not plan.followed]
-            _strip(axes, shown, plan.values, track if len(strips) > 1 else "")
-        least, speed, growth = rows[len(strips) :]
-        symbol = plan.subject.states[0][0]
-        size = min(3.2, max(1.5, 1000.0 / len(plan.values)))
-        coloured = _coloured(sweep)
-        for colour, values, steps in coloured:
-            ink: dict[str, Any] = {"color": colour, "ls": "", "rasterized": True, "ms": size}
-            _cloud(least, values, [s.minima for s in steps], ink)
-            _cloud(speed, values, [s.velocities for s in steps], ink)
-            growth.plot(values, [s.lyapunov for s in steps], marker=".", mew=0, **ink)
-        growth.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
-        least.set_ylabel(_label(f"least {symbol}₁ in each period", units.get("x", "")))
-        rate = f"{symbol}₁′" if symbol == "x" else f"{symbol}₂"
-        said = f"impact velocity {rate}\non the upper stop (A1)"
-        speed.set_ylabel(_label(said, units.get("v", "")))
-        growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
-        finite = np.array([s.lyapunov for steps in sweep.steps.values() for s in steps])
-        finite = finite[np.isfinite(finite)]
-        if len(finite):
-            low, high = float(np.quantile(finite, 0.05)), float(finite.max())
-            margin = 0.08 * max(high - low, 1e-12)
-            growth.set_ylim(min(low, 0.0) - margin, max(high, 0.0) + margin)
-        for axes in (least, speed, growth):
-            axes.grid(True, color=GRID, lw=0.5)
-        span = float(plan.values[-1] - plan.values[0])
-        growth.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
-        growth.set_xlabel(_axis(plan.subject, plan.parameter))
-        si = plan.subject.si
-        si_x(growth, si.get(plan.parameter), below=SECOND_AXIS)
-        si_y(least, si.get("x1"))
-        si_y(speed, si.get("x1'"))
-        handles = _key(sweep, coloured)
-        for kind in dict.fromkeys(p.kind for p in points):
-            marker, colour = MARKS.get(kind, ("|", INK))
-            at = [p.value for p in points if p.kind == kind]
-            for axes in (least, speed, growth):
-                for value in at:
-                    axes.axvline(value, color=colour, lw=0.7, ls=(0, (4, 3)), zorder=0.5)
-            look: dict[str, Any] = {"ls": "", "marker": marker, "color": colour, "ms": 5}
-            top = growth.get_xaxis_transform()
-            growth.plot(at, [1.0] * len(at), transform=top, clip_on=False, zorder=6, **look)
-            handles.append(Line2D([], [], label=kind, **look))
-        if handles:
-            figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
+    figure = new_figure(9.6, 7.6 + 0.24 * len(strips))
+    heights = [0.24] * len(strips) + [2.4, 2.4, 1.6]
+    _head(figure, title(name, plan, 120))
+    rows = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    for axes, track in zip(rows, strips, strict=False):
+        shown = [w for w in sweep.windows if w.track == track or not plan.followed]
+        _strip(axes, shown, plan.values, track if len(strips) > 1 else "")
+    coloured = _coloured(sweep)
+    panels = rows[len(strips) :]
+    _clouds(panels, sweep, coloured)
+    _diagram_axes(panels, plan)
+    handles = _key(sweep, coloured) + _marked(panels, points)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
     return figure
 
 
-def parameter_map(made: ParameterMap, name: str = "") -> Figure:
+def _clouds(panels: Sequence[Axes], sweep: Sweep, coloured: Sequence[Coloured]) -> None:
+    """Every step of the sweep in the three panels, and limits for the exponent."""
+    least, speed, growth = panels
+    size = min(3.2, max(1.5, 1000.0 / len(sweep.plan.values)))
+    for colour, values, steps in coloured:
+        ink: dict[str, Any] = {"color": colour, "ls": "", "rasterized": True, "ms": size}
+        _cloud(least, values, [s.minima for s in steps], ink)
+        _cloud(speed, values, [s.velocities for s in steps], ink)
+        growth.plot(values, [s.lyapunov for s in steps], marker=".", mew=0, **ink)
+    growth.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
+    finite = np.array([s.lyapunov for steps in sweep.steps.values() for s in steps])
+    finite = finite[np.isfinite(finite)]
+    if len(finite):
+        low, high = float(np.quantile(finite, 0.05)), float(finite.max())
+        margin = 0.08 * max(high - low, 1e-12)
+        growth.set_ylim(min(low, 0.0) - margin, max(high, 0.0) + margin)
+
+
+def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
+    least, speed, growth = panels
+    units, si = plan.subject.units, plan.subject.si
+    symbol = plan.subject.states[0][0]
+    rate = f"{symbol}₁′" if symbol == "x" else f"{symbol}₂"
+    least.set_ylabel(_label(f"least {symbol}₁ in each period", units.get("x", "")))
+    text = f"impact velocity {rate}\non the upper stop (A1)"
+    speed.set_ylabel(_label(text, units.get("v", "")))
+    growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
+    for axes in panels:
+        axes.grid(True, color=GRID, lw=0.5)
+    span = float(plan.values[-1] - plan.values[0])
+    growth.set_xlim(plan.values[0] - 0.004 * span, plan.values[-1] + 0.004 * span)
+    growth.set_xlabel(_axis(plan.subject, plan.parameter))
+    si_x(growth, si.get(plan.parameter), below=SECOND_AXIS)
+    si_y(least, si.get("x1"))
+    si_y(speed, si.get("x1'"))
+
+
+def _marked(panels: Sequence[Axes], points: Sequence[Bifurcation]) -> list[Any]:
+    """Bifurcation points as lines through the panels; their legend."""
+    handles = []
+    top = panels[-1].get_xaxis_transform()
+    for kind in dict.fromkeys(str(p.kind) for p in points):
+        marker, colour = MARKS.get(kind, ("|", INK))
+        at = [p.value for p in points if p.kind == kind]
+        for axes in panels:
+            for value in at:
+                axes.axvline(value, color=colour, lw=0.7, ls=(0, (4, 3)), zorder=0.5)
+        look: dict[str, Any] = {"ls": "", "marker": marker, "color": colour, "ms": 5}
+        panels[-1].plot(at, [1.0] * len(at), transform=top, clip_on=False, zorder=6, **look)
+        handles.append(Line2D([], [], label=kind, **look))
+    return handles
+
+
+@styled
+def parameter_map(result: ParameterMap, name: str = "") -> Figure:
     """Colours name the response at every point. name : the model's title."""
-    plan = made.plan
-    with style():
-        figure = new_figure(7.6, 5.4)
-        axes = figure.subplots()
-        _head(figure, title(name, plan, 92))
-        looks = _palette(made.cells, made.counts)
-        _grid(axes, made.cells, plan.xs, plan.ys, looks)
-        axes.set_xlabel(_axis(plan.subject, plan.x))
-        axes.set_ylabel(_axis(plan.subject, plan.y))
-        si_x(axes, plan.subject.si.get(plan.x))
-        si_y(axes, plan.subject.si.get(plan.y))
-        _legend(axes, looks, made.counts, len(made.cells))
+    plan = result.plan
+    figure, axes = _plane(7.6, 5.4, title(name, plan, 92))
+    looks = _palette(result.cells, result.counts)
+    colours = list(dict.fromkeys(looks.values()))
+    _cells(axes, plan, [colours.index(looks[c.response]) for c in result.cells], colours)
+    _plane_axes(axes, plan)
+    named = {colour: response for response, colour in looks.items() if colour not in (REST, OPEN)}
+    handles = []
+    for colour, text in {**named, REST: "other periodic", OPEN: "not settled"}.items():
+        count = sum(result.counts[r] for r, c in looks.items() if c == colour)
+        if colour in named or count:
+            handles.append(_patch(colour, text, count / len(result.cells)))
+    _legend_beside(axes, handles)
     return figure
 
 
-def basins(made: Basins, name: str = "") -> Figure:
+@styled
+def basins(result: Basins, name: str = "") -> Figure:
     """Colours name the attractor that each start goes to; dots are the attractors' strobes.
     name : the model's title."""
-    plan = made.plan
-    with style():
-        figure = new_figure(7.2, 5.2)
-        axes = figure.subplots()
-        _head(figure, title(name, plan, 86))
-        colours = _attractor_colours(made)
-        grid = np.array([c.attractor for c in made.cells]).reshape(len(plan.ys), len(plan.xs))
-        _cells(axes, plan.xs, plan.ys, grid, colours)
-        handles: list[Any] = []
-        column = (plan.subject.states.index(plan.x), plan.subject.states.index(plan.y))
-        flow = plan.subject.settings([plan.changes])[0].flow()
-        for a, colour in zip(made.attractors, colours, strict=True):
-            said = a.response + {True: " symmetric", False: "", None: ""}[a.symmetric]
-            if a.twin is not None and a.twin < a.number:
-                said += f", twin of {made.attractors[a.twin].response}"
-            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{said}: {a.share:.1%}"))
-            if a.response.count("-") != 2:
-                continue
-            laps = int(a.response.split("-")[0])
-            strobes = flow.run(np.array(a.strobe), laps).strobes[:-1]
-            axes.plot(
-                *strobes[:, column].T, ls="", marker="o", ms=6, mfc=colour, mec="white", mew=1.2
-            )
-        axes.set_xlim(plan.xs[0], plan.xs[-1])
-        axes.set_ylim(plan.ys[0], plan.ys[-1])
-        axes.set_xlabel(_axis(plan.subject, plan.x) + " at the start")
-        axes.set_ylabel(_axis(plan.subject, plan.y) + " at the start")
-        si_x(axes, plan.subject.si.get(plan.x))
-        si_y(axes, plan.subject.si.get(plan.y))
-        handles.append(
-            Line2D([], [], ls="", marker="o", ms=6, mfc=MUTED, mec="white", label="its strobes")
-        )
-        _legend_beside(axes, handles)
+    plan = result.plan
+    figure, axes = _plane(7.2, 5.2, title(name, plan, 86))
+    colours = _attractor_colours(result)
+    _cells(axes, plan, [c.attractor for c in result.cells], colours)
+    handles: list[Any] = []
+    column = (plan.subject.states.index(plan.x), plan.subject.states.index(plan.y))
+    flow = plan.subject.settings([plan.changes])[0].flow()
+    for a, colour in zip(result.attractors, colours, strict=True):
+        text = a.response + (" symmetric" if a.symmetric else "")
+        if a.twin is not None and a.twin < a.number:
+            text += f", twin of {result.attractors[a.twin].response}"
+        handles.append(_patch(colour, text, a.share))
+        if a.response.count("-") != 2:
+            continue
+        strobes = flow.run(np.array(a.strobe), int(a.response.split("-")[0])).strobes[:-1]
+        axes.plot(*strobes[:, column].T, ls="", marker="o", ms=6, mfc=colour, mec="white", mew=1.2)
+    axes.set_xlim(plan.xs[0], plan.xs[-1])
+    axes.set_ylim(plan.ys[0], plan.ys[-1])
+    _plane_axes(axes, plan, " at the start")
+    dot: dict[str, Any] = {"marker": "o", "ms": 6, "mfc": MUTED, "mec": "white"}
+    handles.append(Line2D([], [], ls="", label="its strobes", **dot))
+    _legend_beside(axes, handles)
     return figure
 
 
-# ---------------------------------------------------------------------------------------------
+def _plane(width: float, height: float, text: str) -> tuple[Figure, Axes]:
+    figure = new_figure(width, height)
+    axes = figure.subplots()
+    _head(figure, text)
+    return figure, axes
+
+
+def _plane_axes(axes: Axes, plan: MapPlan | BasinPlan, ending: str = "") -> None:
+    axes.set_xlabel(_axis(plan.subject, plan.x) + ending)
+    axes.set_ylabel(_axis(plan.subject, plan.y) + ending)
+    si_x(axes, plan.subject.si.get(plan.x))
+    si_y(axes, plan.subject.si.get(plan.y))
+
+
+def _patch(colour: str, text: str, share: float) -> Patch:
+    return Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{text}: {share:.1%}")
 
 
 def _head(figure: Figure, text: str) -> None:
@@ -194,9 +209,6 @@ def _head(figure: Figure, text: str) -> None:
 def _legend_beside(axes: Axes, handles: Sequence[Any]) -> None:
     """A legend at the right of the axes, below the heading, which takes the whole width."""
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
-
-
-Coloured = tuple[str, Array, list[Steady]]
 
 
 def _coloured(sweep: Sweep) -> list[Coloured]:
@@ -209,15 +221,15 @@ def _coloured(sweep: Sweep) -> list[Coloured]:
     names: dict[str, str] = {}
     out: dict[str, tuple[list[float], list[Steady]]] = {}
     for i, value in enumerate(plan.values):
-        met: list[Steady] = []
+        distinct: list[Steady] = []
         for track in plan.tracks:
             step = sweep.steps[track][i]
-            if any(_same(step, other) for other in met):
+            if any(_same(step, other) for other in distinct):
                 continue
-            met.append(step)
-            if len(met) == 1:
+            distinct.append(step)
+            if len(distinct) == 1:
                 colour = BLACK
-            elif _twins(plan, float(value), met[0], step):
+            elif _twins(plan, float(value), distinct[0], step):
                 colour = RED
             else:
                 colour = names.setdefault(_family(step), DOTS[len(names) % len(DOTS)])
@@ -256,16 +268,16 @@ def _same(a: Steady, b: Steady) -> bool:
 
 
 def _cloud(axes: Axes, values: Array, clouds: Sequence[Array], ink: Mapping[str, Any]) -> None:
-    """One dot for each place at a value: many periods that show the same are one dot."""
+    """Different dots at each value alone: many periods that show the same are one dot."""
     every = np.concatenate(clouds) if clouds else np.zeros(0)
     if not len(every):
         return
     fine = max(float(np.ptp(every)), 1e-12) * 2e-4
     x, y = [], []
     for value, cloud in zip(values, clouds, strict=True):
-        places = np.unique(np.round(cloud / fine)) * fine
-        x.append(np.full(len(places), value))
-        y.append(places)
+        dots = np.unique(np.round(cloud / fine)) * fine
+        x.append(np.full(len(dots), value))
+        y.append(dots)
     axes.plot(np.concatenate(x), np.concatenate(y), marker=".", mew=0, **ink)
 
 
@@ -279,7 +291,7 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
     for side in axes.spines.values():
         side.set_visible(False)
     if name:
-        axes.set_ylabel({DOWN: "↓", UP: "↑"}.get(name, name), rotation=0, ha="right", va="center")
+        axes.set_ylabel(STRIPS.get(name, name), rotation=0, ha="right", va="center")
     for window in windows:
         if window.response == OrbitStatus.APERIODIC:
             # Beside what coexists with it, where several starts share the strip.
@@ -290,8 +302,7 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
     last = -np.inf
     for window in sorted(named, key=lambda w: w.low):
         low, high = window.low - half, window.high + half
-        shade = "#b9cfe4" if window.symmetric else "#ecd9b4"
-        axes.axvspan(low, high, color=shade, lw=0)
+        axes.axvspan(low, high, color=SHADES[bool(window.symmetric)], lw=0)
         centre = 0.5 * (low + high)
         text = window.response
         wide = len(text) * 0.0068 * span
@@ -320,8 +331,8 @@ def _key(sweep: Sweep, coloured: Sequence[Coloured]) -> list[Any]:
                 families = list(dict.fromkeys(_family(s) for s in steps))
                 some = ", ".join(families[:3]) + (" …" if len(families) > 3 else "")
                 handles.append(Line2D([], [], color=colour, label=f"also {some}", **dot))
-    handles.append(Patch(fc="#b9cfe4", label="symmetric"))
-    handles.append(Patch(fc="#ecd9b4", label="not symmetric"))
+    handles.append(Patch(fc=SHADES[True], label="symmetric"))
+    handles.append(Patch(fc=SHADES[False], label="not symmetric"))
     if any(w.response == OrbitStatus.APERIODIC for w in sweep.windows):
         handles.append(Patch(fc=CHAOS, label="aperiodic"))
     return handles
@@ -341,19 +352,13 @@ def _palette(cells: Sequence[MapCell], counts: Mapping[str, int]) -> dict[str, s
     return looks
 
 
-def _grid(
-    axes: Axes, cells: Sequence[MapCell], xs: Array, ys: Array, looks: Mapping[str, str]
+def _cells(
+    axes: Axes, plan: MapPlan | BasinPlan, numbers: Sequence[int], colours: Sequence[str]
 ) -> None:
-    colours = list(dict.fromkeys(looks.values()))
-    numbers = np.array([colours.index(looks[c.response]) for c in cells])
-    _cells(axes, xs, ys, numbers.reshape(len(ys), len(xs)), colours)
-
-
-def _cells(axes: Axes, xs: Array, ys: Array, numbers: Array, colours: Sequence[str]) -> None:
     axes.pcolormesh(
-        xs,
-        ys,
-        numbers,
+        plan.xs,
+        plan.ys,
+        np.array(numbers).reshape(len(plan.ys), len(plan.xs)),
         cmap=ListedColormap(list(colours)),
         vmin=-0.5,
         vmax=len(colours) - 0.5,
@@ -362,24 +367,11 @@ def _cells(axes: Axes, xs: Array, ys: Array, numbers: Array, colours: Sequence[s
     )
 
 
-def _legend(axes: Axes, looks: Mapping[str, str], counts: Mapping[str, int], total: int) -> None:
-    handles = []
-    for response, colour in looks.items():
-        if colour not in (REST, OPEN):
-            share = counts[response] / total
-            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{response}: {share:.1%}"))
-    for colour, said in ((REST, "other periodic"), (OPEN, "not settled")):
-        share = sum(counts[r] for r, c in looks.items() if c == colour) / total
-        if share:
-            handles.append(Patch(fc=colour, ec=MUTED, lw=0.4, label=f"{said}: {share:.1%}"))
-    _legend_beside(axes, handles)
-
-
-def _attractor_colours(made: Basins) -> list[str]:
+def _attractor_colours(result: Basins) -> list[str]:
     """The most frequent one black, its twin red; twins of others in the next colour."""
     out: list[str] = []
-    free = iter(OTHERS * (1 + len(made.attractors) // len(OTHERS)))
-    for a in made.attractors:
+    free = iter(OTHERS * (1 + len(result.attractors) // len(OTHERS)))
+    for a in result.attractors:
         if a.number == 0:
             out.append(BLACK)
         elif a.twin == 0:

@@ -115,8 +115,8 @@ def _offsets(
     axes.axvline(1.0, color=INK, lw=0.9, ls=(0, (4, 2)))
     values = []
     for i, (c, mark) in enumerate(zip(columns, marks, strict=True)):
-        said = c["offset"] or {}
-        row = [np.nan if said.get(k) is None else float(said[k]) for k in OFFSETS]
+        shifts = c["offset"] or {}
+        row = [np.nan if shifts.get(k) is None else float(shifts[k]) for k in OFFSETS]
         values += [v for v in row if v > 0.0]
         _dots(axes, row, i, len(columns), mark)
     axes.set_xscale("log")

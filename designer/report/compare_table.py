@@ -94,8 +94,8 @@ def _peak(load: Mapping[str, Any] | None) -> str:
     return NONE if load is None else f"{max(abs(load['low']), abs(load['high'])):.3g} V"
 
 
-def _current(said: Mapping[str, Any] | None) -> str:
-    return NONE if said is None else f"{1e3 * said['ampere']:.3g} mA, {said['section']}"
+def _current(load: Mapping[str, Any] | None) -> str:
+    return NONE if load is None else f"{1e3 * load['ampere']:.3g} mA, {load['section']}"
 
 
 def _kept(responses: Sequence[Mapping[str, Any]]) -> str:

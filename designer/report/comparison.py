@@ -1,4 +1,5 @@
-"""Designs of one model side by side: errors, peaks, offsets, parts, price, and what they show.
+"""Designs of one model side by side: errors, peaks, offsets, parts, price, and what they show;
+as one JSON object by the keys of docs/contract.md.
 
 Each column is a circuit with its generator's settings. Everything is computed from the reduction
 of that circuit, with the finite gain and the bias current of its op-amp where it moves, with ideal
@@ -8,12 +9,15 @@ why and does not keep the rest from being shown.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from designer.base.errors import Unreachable
+from designer.base.plain_json import FORMAT, plain
 from designer.board.bom import bill
 from designer.board.component import components
 from designer.catalog.catalog import Catalog
@@ -23,6 +27,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit import paper_values
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.netlist import Board, Capacitor, Circuit, Resistor, Section, nominal_board
+from designer.circuit.packing import QUAD
 from designer.circuit.paper_values import ComparedCircuit
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.attractors import settle
@@ -64,11 +69,9 @@ class OffsetShare:
     """Shift of v1's operating point against the middle of the clearance, over the threshold."""
 
     typical: float
-    """Root of the sum of squares over all sections, each with the catalogue's typical offset; nan
-    where it has none."""
+    """Root of the sum of squares over all sections, of typical offsets; nan where unknown."""
     maximum: float
-    """Root of the sum of squares over all sections, each with the catalogue's largest offset; nan
-    where it has none."""
+    """The same of the largest offsets."""
     largest: str
     """Name of the section with the largest part in it."""
 
@@ -126,29 +129,29 @@ class DesignColumn:
 
 
 def compare(
-    made: Synthesis, progress: Callable[[str], None] = lambda _: None
+    result: Synthesis, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[DesignColumn, ...]:
     """The paper's circuits for this model, as far as they can follow it, and the design."""
-    model, spec = made.design.model, made.modelfile.circuit
+    model, spec = result.design.model, result.modelfile.circuit
     ours = ComparedCircuit(
         OURS,
         f"chosen for the model file: {spec.opamp}, resistors {' and '.join(spec.resistors)}, "
         f"capacitors {' and '.join(spec.capacitors)}",
-        made.design.circuit,
-        made.design.errors.scales.frequency(1.0),
-        made.design.amplitude(),
+        result.design.circuit,
+        result.design.errors.scales.frequency(1.0),
+        result.design.amplitude(),
     )
     out = []
-    for candidate in (*paper_values.candidates(model, spec, made.catalog), ours):
+    for candidate in (*paper_values.candidates(model, spec, result.catalog), ours):
         progress(candidate.name)
-        out.append(column(candidate, model, made.found, spec, made.catalog))
+        out.append(column(candidate, model, result.found, spec, result.catalog))
     return tuple(out)
 
 
 def column(
     candidate: ComparedCircuit,
     model: Dimensionless,
-    found: Sequence[ModelResponse],
+    wanted: Sequence[ModelResponse],
     spec: CircuitSpec,
     catalog: Catalog,
 ) -> DesignColumn:
@@ -167,8 +170,10 @@ def column(
     except (ArithmeticError, FloatingCircuit) as error:
         reason = str(error)
     reduction = Reduction(circuit, nominal_board(circuit))
-    drives = [_drive(candidate, model, r) for r in found]
-    shown = tuple(_show(reduction, model, errors, r, d) for r, d in zip(found, drives, strict=True))
+    drives = [_drive(candidate, model, r) for r in wanted]
+    shown = tuple(
+        _show(reduction, model, errors, r, d) for r, d in zip(wanted, drives, strict=True)
+    )
     opamp = catalog.opamp(circuit.opamp)
     return DesignColumn(
         candidate=candidate,
@@ -182,7 +187,7 @@ def column(
         frequency_error=_frequency_error(candidate, errors),
         offset=offset_share(circuit, opamp),
         loads=loads.over(
-            reduction, *loads.runs([r.omega for r in found], drives, [s.orbit for s in shown])
+            reduction, *loads.runs([r.omega for r in wanted], drives, [s.orbit for s in shown])
         ),
         shown=shown,
         bill=bill_of(circuit, spec, catalog),
@@ -215,11 +220,8 @@ def _show(
     kept = matches(orbit, response.spec)
     if response.expected is None:
         own = response.orbit
-        kept = (orbit.status, orbit.n, {orbit.p, orbit.q}) == (
-            own.status,
-            own.n,
-            {own.p, own.q},
-        )
+        counts = (orbit.status, orbit.n, {orbit.p, orbit.q})
+        kept = counts == (own.status, own.n, {own.p, own.q})
     return Shown(response.omega, response.expected, orbit, kept)
 
 
@@ -330,3 +332,91 @@ def bill_of(circuit: Circuit, spec: CircuitSpec, catalog: Catalog) -> Bill:
         price=float(sum(x.quantity * PRICE_CLASSES[x.price_class - 1] for x in lines)),
         unsold=tuple(unsold),
     )
+
+
+def comparison_json(columns: Sequence[DesignColumn]) -> dict[str, Any]:
+    """``columns`` in order, and the sources of the printed values where they are one of them."""
+    known = {s.output: s.name for s in columns[0].candidate.circuit.sections} if columns else {}
+    answer: dict[str, Any] = {
+        "columns": [_column_json(c) | _paper_names(c, known) for c in columns]
+    }
+    printed = [c for c in columns if c.candidate.name == paper_values.AS_PRINTED]
+    if printed:
+        names = printed[0].candidate.circuit.values
+        answer["printed_in"] = {name: paper_values.SOURCE[name] for name in names}
+    return dict(plain(answer))
+
+
+def file_json(
+    answer: Mapping[str, Any], title: str, provenance: Mapping[str, Any], seconds: float
+) -> dict[str, Any]:
+    """What ``compare.json`` holds."""
+    head = {"format": FORMAT, "title": title}
+    return {**head, **answer, "provenance": provenance, "cost": {"seconds": seconds}}
+
+
+def in_answer(file: Mapping[str, Any]) -> dict[str, Any]:
+    """The key ``comparison`` of what ``synthesise`` prints, from the object of the file."""
+    return {k: v for k, v in file.items() if k in ("columns", "printed_in")}
+
+
+def _paper_names(column: DesignColumn, known: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """``paper_names``: what the paper calls each section, where its op-amps are no quads.
+
+    known : names by the net of the output, of a circuit with the paper's op-amps.
+    """
+    circuit = column.candidate.circuit
+    if circuit.figures is None or circuit.figures.sections == len(QUAD):
+        return {}
+    names = {s.name: known.get(s.output, s.name) for s in circuit.sections}
+    return {"paper_names": names} if any(new != old for old, new in names.items()) else {}
+
+
+def _column_json(column: DesignColumn) -> dict[str, Any]:
+    candidate, errors, bill = column.candidate, column.errors, column.bill
+    circuit, current, offset = candidate.circuit, column.current, column.offset
+    return {
+        "name": candidate.name,
+        "what": candidate.what,
+        "opamp": circuit.opamp,
+        "supply": circuit.supply,
+        "saturation": circuit.saturation,
+        "parts": circuit.values,
+        "errors": None if errors is None else errors.errors,
+        "max_error": None if errors is None else errors.max_error,
+        "reason": column.reason,
+        "k0": column.k0,
+        "f20": column.f20,
+        "b": column.b,
+        "threshold": None if errors is None else errors.scales.threshold,
+        "frequency_hz": candidate.frequency,
+        "frequency_error": column.frequency_error,
+        "amplitude_v_peak": candidate.amplitude,
+        "responses": [
+            {
+                "omega": s.omega,
+                "expected": s.expected,
+                "circuit": s.orbit.response,
+                "kept": s.kept,
+                "reason": s.orbit.reason,
+            }
+            for s in column.shown
+        ],
+        "peaks": {
+            load.section: {k: v for k, v in load.__dict__.items() if k != "section"}
+            for load in column.loads.sections
+        },
+        "not_run": column.loads.left_out,
+        "largest_current": current
+        and {
+            "ampere": current.current,
+            "section": current.section,
+            "response": current.current_in,
+        },
+        "offset": offset and dict(offset.__dict__),
+        "part_count": bill.parts,
+        "packages": bill.packages,
+        "distinct_values": bill.distinct,
+        "unsold": bill.unsold,
+        "price_at_most_eur": bill.price if math.isfinite(bill.price) else None,
+    }

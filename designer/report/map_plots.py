@@ -122,9 +122,9 @@ def _heat(label: str, one: YieldMap) -> Figure:
     axes.axvline(one.used, color=ON_DARK, lw=1.0, ls="--")
     best = one.recommended
     where = ([], []) if best is None else ([best[0]], [one.axes[1].values.index(best[1])])
-    said = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
+    text = "nowhere" if best is None else f"ω = {best[0]:.4g} at {100 * best[1]:g} %"
     axes.plot(
-        *where, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {said}"
+        *where, "o", ms=8, mfc="none", mec=_BEST, mew=2.0, label=f"recommended: {text}"
     )  # fmt: skip
     axes.plot([], [], color=MUTED, lw=1.0, ls="--", label=f"in use: ω = {one.used:.4g}")
     axes.set_facecolor("#d9d9d9")

@@ -31,16 +31,16 @@ def table(plan: StudyPlan, answers: Sequence[Sequence[Answer]]) -> list[dict[str
     by_sample = [{a.sample: a for a in row} for row in answers]
     out = []
     for sample, label in enumerate(plan.labels):
-        met = [row.get(sample) for row in by_sample]
+        one = [row.get(sample) for row in by_sample]
         out.append(
             {
                 "board": label,
                 "sample": sample,
-                "verdicts": [None if a is None else str(a.verdict) for a in met],
-                "shown": [None if a is None else a.response for a in met],
-                "reasons": [None if a is None else a.reason for a in met],
-                "cells": [None if a is None else cell(a) for a in met],
-                "all": _all(met),
+                "verdicts": [None if a is None else str(a.verdict) for a in one],
+                "shown": [None if a is None else a.response for a in one],
+                "reasons": [None if a is None else a.reason for a in one],
+                "cells": [None if a is None else cell(a) for a in one],
+                "all": _all(one),
             }
         )
     return out
@@ -59,7 +59,7 @@ def boards_csv(labels: Sequence[str], boards: Sequence[Mapping[str, Any]]) -> st
     cells = [
         {
             "board": row["board"],
-            **{name: said or "" for name, said in zip(labels, row["cells"], strict=True)},
+            **{name: text or "" for name, text in zip(labels, row["cells"], strict=True)},
             "all": row["all"] or "",
         }
         for row in boards
@@ -75,6 +75,6 @@ def response_labels(omegas: Sequence[tuple[float, str | None]]) -> list[str]:
     ]
 
 
-def _all(met: Sequence[Answer | None]) -> str | None:
-    verdicts = {a.verdict for a in met if a is not None}
-    return None if None in met or not verdicts else str(worst(verdicts))
+def _all(answers: Sequence[Answer | None]) -> str | None:
+    verdicts = {a.verdict for a in answers if a is not None}
+    return None if None in answers or not verdicts else str(worst(verdicts))

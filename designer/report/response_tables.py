@@ -197,8 +197,8 @@ def _ngspice_cells(answers: Sequence[Answer], asked: Sequence[Hearing]) -> tuple
         notes[outcome][note] += 1
     counts = [str(notes[one].total()) for one in NgspiceVerdict]
     del notes[NgspiceVerdict.AGREED]
-    told = sorted((t, n) for counted in notes.values() for t, n in counted.items())
-    shown = ", ".join(f"{t} ({n})" for t, n in told[:REASONS_SHOWN])
+    ranked = sorted((t, n) for counted in notes.values() for t, n in counted.items())
+    shown = ", ".join(f"{t} ({n})" for t, n in ranked[:REASONS_SHOWN])
     return (str(len(asked)), *counts, shown)
 
 

@@ -129,8 +129,8 @@ def portrait(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figur
     for orbit, curve, look in zip(_drawn(response), curves, _LOOKS, strict=False):
         axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
         for side in response.sides:
-            met = orbit.impact_velocities[orbit.impact_sides == side]
-            _impacts(axes, np.full(len(met), side * response.b), met, side, look)
+            speeds = orbit.impact_velocities[orbit.impact_sides == side]
+            _impacts(axes, np.full(len(speeds), side * response.b), speeds, side, look)
     axes.set_xlim(*xlim)
     axes.set_ylim(*ylim)
     axes.set_xlabel("x₁")
@@ -164,8 +164,8 @@ def time_trace(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Fig
         axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
         shown.append(x[keep])
         for side in response.sides:
-            met = times[(sides == side) & (times <= span)]
-            _impacts(axes, met, np.full(len(met), side * response.b), side, look)
+            own = times[(sides == side) & (times <= span)]
+            _impacts(axes, own, np.full(len(own), side * response.b), side, look)
     limits = axis_limits(np.concatenate(shown), gaps)
     shade_stops(axes, gaps, limits, across=True)
     axes.set_xlim(0.0, span)

@@ -11,7 +11,7 @@ from designer.spread.spread import NO_BANDWIDTH, Spread
 
 def words_of(spread: Spread, circuit: Circuit) -> str:
     """What varies from board to board of a circuit, by how much: part of a sentence."""
-    said = [
+    parts = [
         f"resistors {_grade(spread.resistor_shape, spread.resistor)}",
         f"capacitors {_grade(spread.capacitor_shape, spread.capacitor)}",
         f"op-amp offset normal with σ = {quantity(spread.offset_sigma, 'V')}, cut at "
@@ -22,36 +22,36 @@ def words_of(spread: Spread, circuit: Circuit) -> str:
     ]
     if circuit.references:
         grade = max(spread.grade_of(r) for r in circuit.references)
-        said.append(f"references uniform within ± {_percent(grade)}, diodes exact")
+        parts.append(f"references uniform within ± {_percent(grade)}, diodes exact")
     for what, law, unit in (
         ("bias current", spread.bias, "A"),
         ("gain-bandwidth", spread.gain_bandwidth, "Hz"),
     ):
-        said += [f"{what} {_between(law, unit)}"] if law is not None else []
+        parts += [f"{what} {_between(law, unit)}"] if law is not None else []
     if spread.gain_bandwidth is not None:
-        said[-1] += f" (which {NO_BANDWIDTH})"
+        parts[-1] += f" (which {NO_BANDWIDTH})"
     if spread.supply:
-        said.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")
+        parts.append(f"supply uniform within ± {_percent(spread.supply)}, each rail its own")
     if spread.temperature is not None:
         low, high = spread.temperature
-        said.append(f"temperature uniform from {low:g} to {high:g} °C")
+        parts.append(f"temperature uniform from {low:g} to {high:g} °C")
     if spread.ageing:
-        said.append(f"ageing of {_ageing(spread)}")
+        parts.append(f"ageing of {_ageing(spread)}")
     better = sorted(spread.asked, key=natural_key)
     for grade in sorted({spread.grades[name] for name in better}):
         names = ", ".join(name for name in better if spread.grades[name] == grade)
-        said.append(f"bought, and drawn, at a better grade of {_percent(grade)}: {names}")
+        parts.append(f"bought, and drawn, at a better grade of {_percent(grade)}: {names}")
     own = sorted({*spread.grades, *spread.shapes} - {*better}, key=natural_key)
-    said += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
+    parts += [f"with a grade or distribution of their own: {', '.join(own)}"] if own else []
     networks = [g for g in spread.groups if not g.reel]
-    said += [f"{', '.join(g.parts)} share {_percent(g.share)} of a deviation" for g in networks]
+    parts += [f"{', '.join(g.parts)} share {_percent(g.share)} of a deviation" for g in networks]
     for share in sorted({g.share for g in spread.groups if g.reel}):
-        said.append(f"parts of one value share {_percent(share)} of a deviation")
+        parts.append(f"parts of one value share {_percent(share)} of a deviation")
     if spread.measured is not None:
-        boards, parts = len(spread.measured.boards), len(spread.measured.values)
+        boards, values = len(spread.measured.boards), len(spread.measured.values)
         of = f" of {boards} boards, taken in turn" if boards > 1 else ""
-        said.append(f"{parts} measured value{'s' * (parts != 1)}{of}")
-    return "; ".join(said)
+        parts.append(f"{values} measured value{'s' * (values != 1)}{of}")
+    return "; ".join(parts)
 
 
 def _ageing(spread: Spread) -> str:

@@ -131,8 +131,8 @@ def recipes(data: ReportData) -> Table | None:
 
 def _blamed(data: ReportData) -> list[tuple[str, ResponseBlame]]:
     """Name and blame of each response that has one."""
-    found = ((words.name(c), data.blame_of(i)) for i, c in enumerate(data.checked))
-    return [(name, blame) for name, blame in found if blame is not None]
+    blames = ((words.name(c), data.blame_of(i)) for i, c in enumerate(data.checked))
+    return [(name, blame) for name, blame in blames if blame is not None]
 
 
 def limits(data: ReportData) -> Table | None:

@@ -29,8 +29,8 @@ def label(c: CheckedResponse, join: str = "   ") -> str:
     return f"ω = {number(c.model.omega)}{join}{c.model.expected or c.model.orbit.response}"
 
 
-def orbit(met: Orbit) -> str:
-    return f"{met.response} ({met.reason})" if met.reason else met.response
+def orbit(shown: Orbit) -> str:
+    return f"{shown.response} ({shown.reason})" if shown.reason else shown.response
 
 
 def problem(c: CheckedResponse) -> str:

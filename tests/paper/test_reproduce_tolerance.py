@@ -12,8 +12,9 @@ from designer.base.errors import InputError
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.paper import reproduce_tolerance
+from designer.paper.circuits import OMEGA
 from designer.paper.reproduce_tolerance import KINDS, reproduce
-from designer.paper.tolerance_cases import OMEGA, YieldRow, cases
+from designer.paper.tolerance_cases import YieldRow, cases
 from designer.yields.exact_rung import block
 from designer.yields.verdict import count
 

@@ -28,8 +28,7 @@ from designer.model.find_responses import find
 from designer.model.model_file import parse_model_file
 from designer.model.response_table import Response
 from designer.report import compare_plots, compare_table, comparison
-from designer.report.compare_json import comparison_json
-from designer.report.comparison import OURS, DesignColumn
+from designer.report.comparison import OURS, DesignColumn, comparison_json
 
 CATALOG = load_catalog()
 PAPER, SPEC = paper_values.MODEL, CircuitSpec()

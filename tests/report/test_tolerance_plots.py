@@ -14,8 +14,9 @@ from matplotlib.image import AxesImage
 from designer.base import figure_style
 from designer.base.arrays import Array
 from designer.base.page import markdown
+from designer.paper.circuits import OMEGA
 from designer.paper.reproduce_tolerance import KINDS
-from designer.paper.tolerance_cases import OMEGA, TITLES, YieldRow
+from designer.paper.tolerance_cases import TITLES, YieldRow
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
 from designer.report.blame_plots import avoided_chart, index_chart
 from designer.report.map_plots import map_chart
