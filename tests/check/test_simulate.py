@@ -222,12 +222,16 @@ def test_a_directory_without_the_right_to_write(
 def test_a_full_disk_leaves_no_half_picture(
     tmp_path: Path, capfd: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(self: Path, *_: Any, **__: Any) -> int:
-        self.touch()
-        raise OSError(28, "No space left on device")
+    write = Path.write_bytes
+
+    def full(self: Path, content: bytes) -> int:
+        if "svg" in self.name:
+            self.touch()
+            raise OSError(28, "No space left on device")
+        return write(self, content)
 
     model, out = _model(tmp_path), tmp_path / "p"
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     arguments = ["simulate", model, "--omega", "1.43", "--plots", str(out), "-q"]
     _refused(arguments, capfd, "--plots", "No space left")
     assert {p.name for p in out.iterdir()} == {"omega-1.43-phase.png"}
