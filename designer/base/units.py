@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from functools import lru_cache
 
@@ -110,14 +111,14 @@ def encode_value(code: str, value: float) -> str:
         raise ValueError(f"no such code: {code}")
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError("not a finite number > 0")
-    return VALUE_CODES[code][0](value)
+    return VALUE_CODES[code].encode(value)
 
 
 def decode_value(code: str, text: str) -> float:
     """The value that ``text`` spells in the named code: the inverse of ``encode_value``."""
     if code not in VALUE_CODES:
         raise ValueError(f"no such code: {code}")
-    return VALUE_CODES[code][1](text)
+    return VALUE_CODES[code].decode(text)
 
 
 def _split(text: str, unit: str) -> tuple[Decimal, int]:
@@ -174,129 +175,90 @@ def _plain(number: Decimal) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def _significant(value: float, most: int, what: str) -> tuple[int, int]:
+def _significant(value: float, most: int) -> tuple[int, int]:
     """``value`` as an integer of at most ``most`` digits times a power of ten."""
     digits, exponent = Decimal(repr(float(value))).normalize().as_tuple()[1:]
     if len(digits) > most or not isinstance(exponent, int):
-        raise ValueError(f"{what} spells at most {most} significant digits")
+        raise ValueError(f"this code spells at most {most} significant digits")
     return int("".join(map(str, digits))), exponent
 
 
-def _encode_yageo(value: float) -> str:
-    _significant(value, 3, "this code")
-    for letter, power in (("M", 6), ("K", 3), ("R", 0)):
-        scaled = Decimal(repr(float(value))).scaleb(-power)
-        if 1 <= scaled < 1000:
-            whole, _, rest = _plain(scaled).partition(".")
-            return f"{whole}{letter}{rest}"
-    raise ValueError("this code spells 1 Ω to less than 1 GΩ")
+@dataclass(frozen=True)
+class _PointCode:
+    """Digits with R, K or M as the decimal point."""
+
+    padded: bool = False
+    """Whether there are always three digits."""
+
+    def encode(self, value: float) -> str:
+        _significant(value, 3)
+        for letter, power in (("M", 6), ("K", 3), ("R", 0)):
+            scaled = Decimal(repr(float(value))).scaleb(-power)
+            if 1 <= scaled < 1000:
+                digits, _, rest = _plain(scaled).partition(".")
+                zeros = "0" * (3 - len(digits) - len(rest)) if self.padded else ""
+                return f"{digits}{letter}{rest}{zeros}"
+        raise ValueError("this code spells 1 Ω to less than 1 GΩ")
+
+    def decode(self, text: str) -> float:
+        match = re.fullmatch(r"(\d{1,3})([RKM])(\d{0,2})", text, re.ASCII)
+        if not match or (self.padded and len(text) != 4):
+            digits = "three digits" if self.padded else "digits"
+            raise ValueError(f"expected {digits} with R, K or M as the decimal point")
+        power = {"R": 0, "K": 3, "M": 6}[match[2]]
+        return float(f"{match[1]}.{match[3] or 0}e{power}")
 
 
-def _decode_yageo(text: str) -> float:
-    match = re.fullmatch(r"(\d{1,3})([RKM])(\d{0,2})", text, re.ASCII)
-    if not match:
-        raise ValueError("expected digits with R, K or M as the decimal point")
-    power = {"R": 0, "K": 3, "M": 6}[match[2]]
-    return float(f"{match[1]}.{match[3] or 0}e{power}")
+@dataclass(frozen=True)
+class _PowerCode:
+    """Digits, and one character for the power of ten."""
+
+    digits: int
+    """Number of digits."""
+    powers: str
+    """The character of each power, from ``least`` on."""
+    least: int
+    """The least power of ten, in ohm or farad."""
+    spells: str
+    """The values that it spells, in words."""
+    power_first: bool = False
+    """Whether the power stands in front of the digits."""
+
+    def encode(self, value: float) -> str:
+        number, exponent = _significant(value, self.digits)
+        missing = self.digits - len(str(number))
+        place = exponent - missing - self.least
+        if not 0 <= place < len(self.powers):
+            raise ValueError(f"this code spells {self.spells}")
+        text, power = str(number * 10**missing), self.powers[place]
+        return power + text if self.power_first else text + power
+
+    def decode(self, text: str) -> float:
+        power, number = (text[:1], text[1:]) if self.power_first else (text[-1:], text[:-1])
+        fits = re.fullmatch(rf"[1-9]\d{{{self.digits - 1}}}", number, re.ASCII)
+        if not fits or power not in self.powers:
+            order = "after" if self.power_first else "before"
+            raise ValueError(f"expected {self.digits} digits {order} one for the power of ten")
+        return float(f"{number}e{self.powers.index(power) + self.least}")
 
 
-def _picofarads(value: float) -> tuple[int, int]:
-    """Two digits and the power of ten that give the capacitance in pF."""
-    number, exponent = _significant(value, 2, "a three-digit code")
-    exponent += 12
-    if number < 10:
-        number, exponent = 10 * number, exponent - 1
-    if not 0 <= exponent <= 7:
-        raise ValueError("a three-digit code spells 10 pF to 990 µF")
-    return number, exponent
+class _PlainCode:
+    """A number with its prefix."""
+
+    def encode(self, value: float) -> str:
+        return format_quantity(value, digits=15).replace("µ", "u")
+
+    def decode(self, text: str) -> float:
+        return parse_quantity(text, "")
 
 
-def _encode_eia3(value: float) -> str:
-    number, exponent = _picofarads(value)
-    return f"{number}{exponent}"
-
-
-def _decode_eia3(text: str) -> float:
-    if not re.fullmatch(r"[1-9]\d[0-7]", text, re.ASCII):
-        raise ValueError("expected two digits and the number of zeros, in pF")
-    return float(f"{text[:2]}e{int(text[2]) - 12}")
-
-
-def _encode_multiplier_first(value: float) -> str:
-    number, exponent = _picofarads(value)
-    return f"{exponent}{number}"
-
-
-def _decode_multiplier_first(text: str) -> float:
-    if not re.fullmatch(r"[0-7][1-9]\d", text, re.ASCII):
-        raise ValueError("expected the number of zeros and two digits, in pF")
-    return float(f"{text[1:]}e{int(text[0]) - 12}")
-
-
-def _encode_vishay(value: float) -> str:
-    number, exponent = _significant(value, 3, "this code")
-    digits = f"{number * 10 ** (3 - len(str(number)))}"
-    power = exponent + len(str(number)) - 1  # of the first digit
-    for letter, base in (("M", 6), ("K", 3), ("R", 0)):
-        place = power - base + 1
-        if 1 <= place <= 3:
-            return f"{digits[:place]}{letter}{digits[place:]}"
-    raise ValueError("this code spells 1 Ω to less than 1 GΩ")
-
-
-def _decode_vishay(text: str) -> float:
-    if len(text) != 4:
-        raise ValueError("expected three digits with R, K or M as the decimal point")
-    return _decode_yageo(text)
-
-
-_DECADES = {-3: "7", -2: "8", -1: "9"} | {power: str(power) for power in range(7)}
-
-
-def _encode_decade(value: float) -> str:
-    number, exponent = _significant(value, 3, "this code")
-    missing = 3 - len(str(number))
-    if exponent - missing not in _DECADES:
-        raise ValueError("this code spells 0.1 Ω to 999 MΩ")
-    return f"{number * 10**missing}{_DECADES[exponent - missing]}"
-
-
-def _decode_decade(text: str) -> float:
-    if not re.fullmatch(r"[1-9]\d{3}", text, re.ASCII):
-        raise ValueError("expected three digits and one for the decade")
-    power = next(power for power, digit in _DECADES.items() if digit == text[3])
-    return float(f"{text[:3]}e{power}")
-
-
-def _encode_microfarads(value: float) -> str:
-    number, exponent = _significant(value, 2, "a three-digit code")
-    exponent += 6
-    if number < 10:
-        number, exponent = 10 * number, exponent - 1
-    if not 0 <= exponent <= 7:
-        raise ValueError("a three-digit code spells 10 µF to 990 F")
-    return f"{number}{exponent}"
-
-
-def _decode_microfarads(text: str) -> float:
-    return float(f"{_decode_eia3(text) * 1e6:.2g}")
-
-
-def _encode_plain(value: float) -> str:
-    return format_quantity(value, digits=15).replace("µ", "u")
-
-
-def _decode_plain(text: str) -> float:
-    return parse_quantity(text, "")
-
-
-VALUE_CODES: dict[str, tuple[Callable[[float], str], Callable[[str], float]]] = {
-    "yageo": (_encode_yageo, _decode_yageo),
-    "eia3": (_encode_eia3, _decode_eia3),
-    "multiplier-first": (_encode_multiplier_first, _decode_multiplier_first),
-    "vishay": (_encode_vishay, _decode_vishay),
-    "decade": (_encode_decade, _decode_decade),
-    "microfarads": (_encode_microfarads, _decode_microfarads),
-    "plain": (_encode_plain, _decode_plain),
+VALUE_CODES: dict[str, _PointCode | _PowerCode | _PlainCode] = {
+    "yageo": _PointCode(),
+    "eia3": _PowerCode(2, "01234567", -12, "10 pF to 990 µF"),
+    "multiplier-first": _PowerCode(2, "01234567", -12, "10 pF to 990 µF", power_first=True),
+    "vishay": _PointCode(padded=True),
+    "decade": _PowerCode(3, "7890123456", -3, "0.1 Ω to 999 MΩ"),
+    "microfarads": _PowerCode(2, "01234567", -6, "10 µF to 990 F"),
+    "plain": _PlainCode(),
 }
-"""How part numbers spell values: name of the code, and its encoder and decoder."""
+"""How part numbers spell values, by the name of the code."""
