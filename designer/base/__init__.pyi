@@ -168,6 +168,7 @@ from .schema import (
     FieldProblems as FieldProblems,
     FileTable as FileTable,
     any_table as any_table,
+    check_values as check_values,
     checked as checked,
     choice as choice,
     did_you_mean as did_you_mean,

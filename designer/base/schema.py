@@ -380,6 +380,31 @@ def _quantity(value: object, unit: str) -> float:
     return parse_quantity(value, unit)
 
 
+def check_values(record: FileTable, where: str) -> None:
+    """Hold a record that was made in code to what the keys of its table accept.
+
+    Raises
+    ------
+    InputError : names ``where`` and the first field that is not what its key would be read as.
+    """
+    for name, accepts in _accepted(type(record)).items():
+        value = getattr(record, name)
+        try:
+            same = accepts.check(value) == value
+        except ValueError:
+            same = False
+        if not same:
+            raise InputError(None, f"{where}.{name}", value, accepts.expected)
+
+
+def _accepts_by_key(table: type[FileTable]) -> dict[str, Accepts]:
+    annotations = {key: get_args(annotation)[1:] for key, annotation in keys_of(table).items()}
+    return {k: a for k, metadata in annotations.items() for a in metadata if isinstance(a, Accepts)}
+
+
+_accepted: Callable[[Any], dict[str, Accepts]] = cache(_accepts_by_key)
+
+
 def _dotted(place: tuple[int | str, ...]) -> str:
     """("response", 1, "omega") is response[2].omega: people count from one."""
     text = ""

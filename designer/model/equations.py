@@ -7,7 +7,8 @@ stands in a page, in Markdown and in a picture.
 
 from __future__ import annotations
 
-from designer.model.model import Dimensionless, Mechanical, Sides
+from designer.model.mechanics import Sides
+from designer.model.model import Dimensionless, Mechanical
 
 SYMBOLS = (
     "x₁″ + 2ζ (x₁′ − x₂′) + (x₁ − x₂) + f(x₁) = (1 − f₂₀) sin ωt",

@@ -15,6 +15,7 @@ from designer.dynamics.attractors import coexisting, settle, starts, twin
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import POSITIONS
 from designer.model.model import Dimensionless
 from designer.model.response_table import Response
 
@@ -109,7 +110,7 @@ def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
         system = model.second_order().piecewise_linear()
         rest = np.zeros(system.size)
         runs = [(model, w, settle(Flow(system, Drive(w)), rest)) for w in SCOUT]
-    stopped = {"both": (1, -1), "upper": (1,), "lower": (-1,)}[model.sides]
+    stopped = POSITIONS[model.sides]
     states, depth, excursion, fastest = np.zeros(4), 0.0, 0.0, 0.0
     for variant, omega, orbit in runs:
         doing(f"swing at ω = {omega:.4g}")

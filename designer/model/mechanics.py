@@ -14,6 +14,10 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
 
+Sides = Literal["both", "upper", "lower"]
+POSITIONS: dict[Sides, tuple[int, ...]] = {"both": (1, -1), "upper": (1,), "lower": (-1,)}
+"""Contact positions that exist: 1 for the upper stop, -1 for the lower."""
+
 
 @dataclass(frozen=True)
 class Clearance:
@@ -25,13 +29,13 @@ class Clearance:
     """Stiffness of a stop."""
     gap: float
     """Distance of a stop from the rest position."""
-    sides: Literal["both", "upper", "lower"] = "both"
+    sides: Sides = "both"
     """The stops that exist."""
 
     @property
     def positions(self) -> tuple[int, ...]:
         """Contact positions that exist: 1 for the upper stop, -1 for the lower."""
-        return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[self.sides]
+        return POSITIONS[self.sides]
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,15 @@ M2 to ground; stops of stiffness K0 stand at distance B on one or both sides of 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import Annotated, Literal
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.base.schema import Accepts, FileTable, choice, number, physical
-from designer.model.mechanics import Clearance, SecondOrderSystem
-
-Sides = Literal["both", "upper", "lower"]
+from designer.base.schema import Accepts, FileTable, check_values, choice, number, physical
+from designer.model.mechanics import Clearance, SecondOrderSystem, Sides
 
 TRIED = {
     "m": (1e-9, 1.0 - 1e-9),
@@ -33,9 +32,8 @@ period, comes to no end (docs/stability.md)."""
 _SIDES = choice("both", "upper", "lower")
 
 
-def _plain(domain: str) -> Accepts:
-    """A number; the model holds it to the domain, which is only told here."""
-    return number("", f"a number {domain}")
+def _parameter(domain: str, inside: Callable[[float], bool]) -> Accepts:
+    return number("", f"a number {domain}", inside)
 
 
 @dataclass(frozen=True)
@@ -47,41 +45,31 @@ class Dimensionless(FileTable):
     InputError : a parameter lies outside its domain, or outside what was tried of it.
     """
 
-    m: Annotated[float, _plain("in (0, 1)")]
+    m: Annotated[float, _parameter("in (0, 1)", lambda m: 0.0 < m < 1.0)]
     """Mass ratio M2/(M1 + M2), in (0, 1)."""
-    k: Annotated[float, _plain("in (0, 1)")]
+    k: Annotated[
+        float,
+        _parameter(
+            "in (0, 1); k = 0 leaves a mode of motion without stiffness, which no circuit can hold",
+            lambda k: 0.0 < k < 1.0,
+        ),
+    ]
     """Stiffness ratio K2/(K1 + K2), in (0, 1)."""
-    k0: Annotated[float, _plain("in [0, 1)")]
+    k0: Annotated[float, _parameter("in [0, 1)", lambda k0: 0.0 <= k0 < 1.0)]
     """Stop stiffness ratio K0/(K0 + K1), in [0, 1)."""
-    c: Annotated[float, _plain("in [0, 1)")]
+    c: Annotated[float, _parameter("in [0, 1)", lambda c: 0.0 <= c < 1.0)]
     """Damping ratio C2/(C1 + C2), in [0, 1)."""
-    zeta: Annotated[float, _plain("> 0")]
+    zeta: Annotated[float, _parameter("> 0", lambda zeta: zeta > 0.0)]
     """Damping C1/(2 sqrt(K1 M1)), > 0."""
-    f20: Annotated[float, _plain("in [0, 1]")]
+    f20: Annotated[float, _parameter("in [0, 1]", lambda f20: 0.0 <= f20 <= 1.0)]
     """Share of the force on the second mass P2/(P1 + P2), in [0, 1]."""
-    b: Annotated[float, _plain("> 0")]
+    b: Annotated[float, _parameter("> 0", lambda b: b > 0.0)]
     """Clearance B K1/(P1 + P2), > 0."""
     sides: Annotated[Sides, _SIDES] = "both"
     """The stops that exist."""
 
     def __post_init__(self) -> None:
-        domains = {
-            "m": (0.0 < self.m < 1.0, "a number in (0, 1)"),
-            "k": (
-                0.0 < self.k < 1.0,
-                "a number in (0, 1); k = 0 leaves a mode of motion without stiffness, "
-                "which no circuit can hold",
-            ),
-            "k0": (0.0 <= self.k0 < 1.0, "a number in [0, 1)"),
-            "c": (0.0 <= self.c < 1.0, "a number in [0, 1)"),
-            "zeta": (0.0 < self.zeta < math.inf, "a finite number > 0"),
-            "f20": (0.0 <= self.f20 <= 1.0, "a number in [0, 1]"),
-            "b": (0.0 < self.b < math.inf, "a finite number > 0"),
-            "sides": (self.sides in ("both", "upper", "lower"), '"both", "upper" or "lower"'),
-        }
-        for name, (fine, expected) in domains.items():
-            if not fine:
-                raise InputError(None, f"model.{name}", getattr(self, name), expected)
+        check_values(self, "model")
         for name, (low, high) in TRIED.items():
             value = getattr(self, name)
             if not low <= value <= high:
@@ -134,7 +122,7 @@ class Mechanical(FileTable):
     """Stiffness of the stops [N/m]."""
     K1: Annotated[float, physical("N/m")]
     """Stiffness between the masses [N/m]."""
-    K2: Annotated[float, physical("N/m", zero=True)]
+    K2: Annotated[float, physical("N/m")]
     """Stiffness between the second mass and ground [N/m]."""
     B: Annotated[float, physical("m")]
     """Distance of a stop from the rest position [m]."""
@@ -146,17 +134,7 @@ class Mechanical(FileTable):
     """The stops that exist."""
 
     def __post_init__(self) -> None:
-        strictly = {"M1", "M2", "C1", "K1", "K2", "B"}
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name == "sides":
-                if value not in ("both", "upper", "lower"):
-                    raise InputError(None, "mechanical.sides", value, '"both", "upper" or "lower"')
-                continue
-            fine = math.isfinite(value) and (value > 0.0 if f.name in strictly else value >= 0.0)
-            if not fine:
-                bound = "> 0" if f.name in strictly else ">= 0"
-                raise InputError(None, f"mechanical.{f.name}", value, f"a finite number {bound}")
+        check_values(self, "mechanical")
         if self.P1 + self.P2 <= 0.0:
             raise InputError(
                 None, "mechanical.P1", self.P1, "P1 + P2 > 0: without a force nothing moves"

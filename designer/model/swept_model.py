@@ -22,7 +22,20 @@ from designer.model.model import TRIED, Dimensionless, Mechanical
 from designer.model.si_units import units_of
 from designer.model.swept_tables import ModalBatch
 
-MODEL_PARAMETERS = ("omega", "b", "k0", "zeta", "m", "k", "c", "f20")
+SMALLEST = math.nextafter(0.0, 1.0)
+BELOW_ONE = math.nextafter(1.0, 0.0)
+GREATEST = math.nextafter(math.inf, 0.0)
+DOMAINS = {
+    "omega": (SLOWEST, FASTEST),
+    "b": (SMALLEST, GREATEST),
+    "k0": (0.0, BELOW_ONE),
+    "zeta": (SMALLEST, TRIED["zeta"][1]),
+    "m": TRIED["m"],
+    "k": TRIED["k"],
+    "c": TRIED["c"],
+    "f20": (0.0, 1.0),
+}
+"""Closed intervals in which a model's parameter can be followed (``model.Dimensionless``)."""
 
 
 @dataclass
@@ -34,7 +47,7 @@ class ModelSubject:
     """The model in dimensionless parameters."""
     omega: float | None = None
     """Dimensionless drive frequency; None: it has to be among the changes."""
-    parameters: tuple[str, ...] = MODEL_PARAMETERS
+    parameters: tuple[str, ...] = tuple(DOMAINS)
     """Names of what can be swept."""
     states: tuple[str, ...] = ("x1", "x1'", "x2", "x2'")
     """Names of the states."""
@@ -110,28 +123,6 @@ def _flow(model: Dimensionless, omega: float) -> Flow:
 def _changed(model: Dimensionless, change: Mapping[str, float]) -> Dimensionless:
     others: dict[str, Any] = {k: v for k, v in change.items() if k != "omega"}
     return replace(model, **others) if others else model
-
-
-SMALLEST = math.nextafter(0.0, 1.0)
-
-
-BELOW_ONE = math.nextafter(1.0, 0.0)
-
-
-GREATEST = math.nextafter(math.inf, 0.0)
-
-
-DOMAINS = {
-    "omega": (SLOWEST, FASTEST),
-    "b": (SMALLEST, GREATEST),
-    "k0": (0.0, BELOW_ONE),
-    "zeta": (SMALLEST, TRIED["zeta"][1]),
-    "m": TRIED["m"],
-    "k": TRIED["k"],
-    "c": TRIED["c"],
-    "f20": (0.0, 1.0),
-}
-"""Closed intervals in which a model's parameter can be followed (``model.Dimensionless``)."""
 
 
 def of_model(model: Dimensionless, omega: float, parameter: str) -> Family:

@@ -14,9 +14,8 @@ from designer.base.arrays import Array
 from designer.dynamics import kernel_modal as kernel, modal_tables
 from designer.dynamics.kernel_modal import LAST, NODES, PARTS, TERMS, ModalTables
 from designer.dynamics.modal_tables import STEP, WORST_RESONANCE, Oscillators
+from designer.model.mechanics import POSITIONS
 from designer.model.model import Dimensionless
-
-SIDES = {"both": (1, -1), "upper": (1,), "lower": (-1,)}
 
 
 class ModalBatch:
@@ -60,7 +59,7 @@ class ModalBatch:
         limits[:, 1] = np.stack([b, np.full_like(b, np.inf)], axis=1)
         limits[:, 2] = np.stack([np.full_like(b, -np.inf), -b], axis=1)
         for row, i in enumerate(fit):
-            for side in SIDES[models[i].sides]:
+            for side in POSITIONS[models[i].sides]:
                 limits[row, 0, 1 if side > 0 else 0] = side * b[row]
         good = both[0].fine & both[1].fine
         to_modal, to_state = [], []

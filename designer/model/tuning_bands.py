@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from designer.base.errors import InputError
-from designer.base.schema import FileTable, number
+from designer.base.schema import FileTable, check_values, number
 
 _FRACTION = number("", "a number in [0, 1)", lambda value: 0.0 <= value < 1.0)
 
@@ -28,11 +27,7 @@ class Bands(FileTable):
     """Half-width of the DC offset, over the amplitude in ``setup.csv``."""
 
     def __post_init__(self) -> None:
-        for name, most in (("frequency", 1.0), ("amplitude", 1.0), ("offset", float("inf"))):
-            value = getattr(self, name)
-            if not 0.0 <= value < most:
-                bound = "a finite number >= 0" if name == "offset" else "a number in [0, 1)"
-                raise InputError(None, f"tuning.{name}", value, bound)
+        check_values(self, "tuning")
 
     def as_dict(self) -> dict[str, float]:
         return dict(self.__dict__)

@@ -18,7 +18,8 @@ from designer.model.equations import (
     equations_with_numbers,
     mechanical_equations,
 )
-from designer.model.model import Dimensionless, Mechanical, Sides
+from designer.model.mechanics import Sides
+from designer.model.model import Dimensionless, Mechanical
 from designer.model.template import TEXT
 from designer.report.model_drawing import model_drawing
 from tests.shared.figure_text import clipped, overlapping

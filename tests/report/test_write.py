@@ -18,7 +18,7 @@ from designer.check import checked_design
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
 from designer.model.ascii_sketch import sketch
-from designer.model.model import Sides
+from designer.model.mechanics import Sides
 from designer.model.model_file import parse_model_file
 from designer.model.response_table import Expect
 from designer.report.data import ReportData
