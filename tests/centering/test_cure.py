@@ -54,6 +54,8 @@ from tests.shared import bench_plans, paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 CATALOG = load_catalog()
 WEIGHTS = {"R50": 3.0, "R203": 2.0, "R4": 1.5, "R11": 1.0, "C2": 1.0, "R8": 0.6}
 """Slopes of the limit that is known: per standard deviation of a part as it is."""

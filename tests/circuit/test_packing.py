@@ -28,6 +28,8 @@ from tests.circuit.test_reduction import EXACT
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import CATALOG, bought, one_sided, rectifier, stage
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 QUAD, DUAL, SINGLE = (CATALOG.opamp(name) for name in ("TL074C", "TL072C", "TL071C"))
 TRIPLE = replace(QUAD, name="three", pins=QUAD.pins[:3])
 EIGHT = replace(

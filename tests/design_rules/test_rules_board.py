@@ -31,6 +31,8 @@ from tests.circuit.test_reduction import EXACT
 from tests.shared.rule_cases import base
 from tests.shared.stages import stage
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 BY_KICAD = (
     "clearance",
     "summing-clearance",

@@ -22,6 +22,8 @@ from tests.design_rules.test_rules_board import (
 )
 from tests.shared.rule_cases import base
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 Change = Callable[[str], str]
 
 

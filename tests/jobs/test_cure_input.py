@@ -27,6 +27,8 @@ from tests.shared import paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 CATALOG = load_catalog()
 SMALL = (
     "\nformat = 1\n"

@@ -24,6 +24,8 @@ from designer.jobs.synthesise_job import read_design
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 MODEL = "format = 1\n" + PAPER_TABLE + '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 STUDY = ["--samples", "6", "--jobs", "1"]
 EXACT = [*STUDY, "--rung", "exact"]

@@ -18,6 +18,8 @@ from designer.report.measured_table import boards_csv, response_labels
 from tests.shared.quick_folders import quick_folder
 from tests.yields.test_study import SMALL
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 GOOD = ("B01", "=B02")
 """The second name would start a formula in a spreadsheet."""
 BAD = "B03"

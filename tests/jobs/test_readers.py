@@ -37,6 +37,8 @@ from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.yields.test_study_cache import BLAME, kept
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = settings(max_examples=25, suppress_health_check=list(HealthCheck))
 Reader = Callable[[Path], object]

@@ -33,6 +33,8 @@ from designer.yields.study import Study
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "paper.toml"
 CASES: dict[str, tuple[Kind, Sides, dict[str, float], tuple[float, ...]]] = {
     "rectifier": ("rectifier", "both", SCALED, (1.55,)),

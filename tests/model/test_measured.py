@@ -21,6 +21,8 @@ from designer.spread.spread import BOARD, Spread, draw_many
 from tests.jobs.test_kicad_export import MODEL as LINEAR
 from tests.spread.test_spread_model import CATALOG, CIRCUIT, PAPER, RECTIFIER
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 ROOT = Path(__file__).resolve().parents[2]
 NOMINAL = CIRCUIT.values
 ONE = """\

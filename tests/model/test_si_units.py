@@ -34,6 +34,8 @@ from designer.report import bifurcation_plots, simulate_plots
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 Captured = pytest.CaptureFixture[str]
 DRILL = (Path(__file__).resolve().parents[2] / "examples" / "drill.toml").read_text("utf-8")
 # Of its table [mechanical], by hand: s, m and m/s of one dimensionless unit.

@@ -29,6 +29,8 @@ from tests.shared.house import ORDER
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 HOSTILE = "<script>alert(1)</script> & co"
 TWO = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n[[response]]\nomega = 1.55\nexpect = "1-1-1"\n'
 TEXT = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}{TWO}{COARSE_CIRCUIT}'

@@ -42,6 +42,8 @@ from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import bought as nearest_sold, rectifier, stage
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 CATALOG = load_catalog()
 E24 = nearest_sold(EXACT)
 """The paper's circuit of E24; R203 and R50 of E96, which is sold at 1 % and better alone."""

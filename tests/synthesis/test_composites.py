@@ -32,6 +32,8 @@ from designer.synthesis.composites import Pair, PairProgram, best, pairs_near
 from tests.shared.oracles import Plain, coefficient_error
 from tests.shared.quick_folders import without_starts
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 # What each side condition costs is asked where a test is about it: it doubles the time.
 synthesise = partial(parts_choice.synthesise, binding=False)
 

@@ -43,6 +43,8 @@ from tests.yields.test_blame_analysis import _Memory
 from tests.yields.test_study_cache import MAP
 from tests.yields.test_verdict import plan
 
+pytestmark = pytest.mark.usefixtures("figures_are_blank")
+
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = (
     "format = 1\n"
