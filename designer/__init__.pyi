@@ -7,24 +7,15 @@ from .base.errors import (
 from .base.version import (
     __version__ as __version__,
 )
-from .board.bom import (
-    bill_of_materials as bill_of_materials,
-)
 from .catalog.catalog import (
     Catalog as Catalog,
     load_catalog as load_catalog,
 )
 from .check.simulation import (
     Simulated as Simulated,
-    simulate as simulate,
-)
-from .check.simulation_frame import (
-    simulated_table as simulated_table,
 )
 from .check.synthesis_result import (
     Synthesis as Synthesis,
-    synthesise as synthesise,
-    synthesize as synthesize,
 )
 from .jobs.bifurcation_job import (
     BifurcationResult as BifurcationResult,
@@ -34,9 +25,15 @@ from .jobs.cure_job import (
     CureResult as CureResult,
     cure as cure,
 )
+from .jobs.design_source import (
+    read_design as read_design,
+)
 from .jobs.export_job import (
     ExportResult as ExportResult,
     export as export,
+)
+from .jobs.job_outcome import (
+    JobOutcome as JobOutcome,
 )
 from .jobs.rules_job import (
     RulesResult as RulesResult,
@@ -45,12 +42,17 @@ from .jobs.rules_job import (
 from .jobs.search_job import (
     search as search,
 )
+from .jobs.simulate_job import (
+    SimulationResult as SimulationResult,
+    simulate as simulate,
+)
 from .jobs.study_job import (
     run as run,
+    tolerance as tolerance,
 )
 from .jobs.synthesise_job import (
-    JobOutcome as JobOutcome,
-    read_design as read_design,
+    synthesise as synthesise,
+    synthesize as synthesize,
 )
 from .jobs.trade_job import (
     TradeResult as TradeResult,
@@ -79,7 +81,4 @@ from .yields.run_result import (
 )
 from .yields.study import (
     Study as Study,
-)
-from .yields.tolerance_study import (
-    tolerance as tolerance,
 )

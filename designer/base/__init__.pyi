@@ -113,6 +113,7 @@ from .manifest import (
     MANIFEST as MANIFEST,
     ManifestStage as ManifestStage,
     StageName as StageName,
+    Stages as Stages,
     file_hash as file_hash,
     read_json as read_json,
 )

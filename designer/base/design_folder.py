@@ -25,6 +25,7 @@ from designer.base.manifest import (
     Manifest,
     ManifestStage,
     StageName as StageName,
+    Stages,
     State,
     file_hash as file_hash,
     grown,
@@ -77,12 +78,12 @@ class Folder:
 
     def decide(
         self,
-        wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]],
+        wanted: Stages,
         *,
         overwrite: bool,
         resume: bool,
     ) -> list[StageName]:
-        """Which of the wanted stages (inputs, names of files) are to be done.
+        """Which of the wanted stages are to be done.
 
         Raises
         ------
@@ -146,13 +147,14 @@ class Folder:
 
     def begin(
         self,
-        wanted: Mapping[StageName, tuple[dict[str, Any], Iterable[str]]],
-        provenance: Any,
+        wanted: Stages,
+        provenance: Mapping[str, Any] | None = None,
         kept: Mapping[str, Any] | None = None,
     ) -> None:
         """Create the folder if need be, and mark these stages as unfinished.
 
-        kept : what they are to know again when they go on. A stage that depends on one that begins
+        provenance : None for the folder's own. kept : what they are to know again when they go on.
+        A stage that depends on one that begins
         anew is forgotten; its files stay listed until ``finish`` removes them.
         """
         manifest = self.manifest or Manifest()
@@ -176,9 +178,21 @@ class Folder:
                     left.unlink(missing_ok=True)
             else:
                 partial_of(self / name).unlink(missing_ok=True)
-        manifest.provenance = provenance
+        if provenance is not None:
+            manifest.provenance = dict(provenance)
         self.manifest = manifest
         self._save()
+
+    @contextlib.contextmanager
+    def working(
+        self, wanted: Stages, provenance: Mapping[str, Any] | None = None
+    ) -> Iterator[None]:
+        """A block that writes these stages: begun before it, finished where it ends without an
+        error."""
+        self.begin(wanted, provenance)
+        yield
+        for stage in wanted:
+            self.finish(stage)
 
     def write(self, name: str, content: str | bytes) -> None:
         """Write one listed file, all at once."""

@@ -181,6 +181,8 @@ class Lines:
             if path.exists():
                 note(f"{path}: {DAMAGED}")
             return {}
+        if content == self.text({}).encode("ascii"):
+            return {}
         if intact(content) is None:
             if vouch(path.name, content):
                 return self._plain(content, path)

@@ -33,6 +33,8 @@ StageName = Literal[
     "rules",
 ]
 STAGES: tuple[StageName, ...] = get_args(StageName)
+Stages = dict[StageName, tuple[dict[str, Any], list[str]]]
+"""Stages as a folder is asked for them: inputs, and names of files, by name."""
 OF_DESIGN: tuple[StageName, ...] = (
     "kicad",
     "deck-ltspice",

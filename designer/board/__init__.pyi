@@ -11,6 +11,7 @@ from .board_parts import (
 from .bom import (
     bill as bill,
     bill_csv as bill_csv,
+    bill_of_materials as bill_of_materials,
 )
 from .bom_layouts import (
     file_of as file_of,

@@ -22,6 +22,7 @@ from .first_responses import (
     first_run as first_run,
 )
 from .simulation import (
+    Engine as Engine,
     Simulated as Simulated,
 )
 from .synthesis_result import (

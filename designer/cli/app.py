@@ -1,14 +1,17 @@
-"""The command line's application and the options that its verbs share."""
+"""The application, the options that its verbs share, and the way in which every verb runs."""
 
 from __future__ import annotations
 
+import inspect
+import itertools
 import logging
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from enum import StrEnum
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -20,8 +23,6 @@ VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance search trade export rules reproduce "
     "catalog new".split()
 )
-
-
 app = typer.Typer(
     name="designer",
     help="Op-amp circuits for mechanical models with clearances, and how many boards will work.",
@@ -33,78 +34,131 @@ app = typer.Typer(
 )
 
 
-class EngineName(StrEnum):
-    """Which engine simulates."""
-
-    MODEL = "model"
-    CIRCUIT = "circuit"
-    NGSPICE = "ngspice"
-
-
-class RungName(StrEnum):
-    """How ngspice models the op-amps."""
-
-    IDEAL = "ideal"
-    DYNAMIC = "dynamic"
-    FULL = "full"
+def option(names: str, metavar: str | None = None, text: str = "") -> Any:
+    """An option by its spellings, such as "-q --quiet", with its help."""
+    return typer.Option(*names.split(), metavar=metavar, help=text)
 
 
 Source = Annotated[
     Path, typer.Argument(metavar="MODEL|DIR", help="A model file (TOML) or a design folder.")
 ]
-
-
-Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="The design folder to write.")
-]
-
-
+Out = Annotated[Path | None, option("--out", "DIR", "The design folder to write.")]
 Samples = Annotated[
     int | None,
-    typer.Option(
-        "--samples",
-        metavar="N",
-        help="Boards in the study [200, all of a list, or the folder's own].",
+    option("--samples", "N", "Boards in the study [200, all of a list, or the folder's own]."),
+]
+Seed = Annotated[int, option("--seed", "N", "Of the random numbers.")]
+OwnSeed = Annotated[
+    int | None, option("--seed", "N", "Of the random numbers [1, or the folder's own].")
+]
+_SHARED: dict[str, tuple[Any, Any]] = {
+    "jobs": (int | None, option("--jobs", "N", "Workers at a time [default: all cores].")),
+    "overwrite": (
+        bool,
+        option("--overwrite", None, "Replace files that the folder's manifest.json lists."),
     ),
-]
+    "resume": (bool, option("--resume", None, "Go on with unfinished work.")),
+    "json": (bool, option("--json", None, "Print one JSON object on standard output.")),
+    "verbose": (
+        bool,
+        option("-v --verbose", None, "Say more; show where a defect of the tool is."),
+    ),
+    "quiet": (bool, option("-q --quiet", None, "Say nothing but errors.")),
+    "log": (Path | None, option("--log", "FILE", "Append what happens to a file.")),
+}
+"""Type and declaration of the options that verbs share; off, or None, where nothing is said."""
 
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+Show = Callable[[Mapping[str, Any]], None]
+"""Prints an answer as tables."""
 
 
-Verbose = Annotated[
-    bool, typer.Option("-v", "--verbose", help="Say more; show where a defect of the tool is.")
-]
+@dataclass(frozen=True)
+class Output:
+    """What a verb has to say."""
+
+    json: Mapping[str, Any]
+    """The object for ``--json``."""
+    show: Callable[[], None] = lambda: None
+    """Prints the tables for people."""
+    satisfied: bool = True
+    """Whether the answer is yes."""
 
 
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors.")]
+@dataclass(frozen=True)
+class Session:
+    """One call of the command line."""
+
+    progress: Progress
+    """Told how far the work is."""
+    tables: bool
+    """Whether tables for people are wanted."""
+
+    def early(self, first: Show, later: Show) -> Show:
+        """What shows an answer while the work goes on: in one way, and then in another."""
+        ways = itertools.chain([first], itertools.repeat(later))
+
+        def show(answer: Mapping[str, Any]) -> None:
+            if self.tables:
+                with self.progress.aside():
+                    next(ways)(answer)
+
+        return show
 
 
-Log = Annotated[
-    Path | None, typer.Option("--log", metavar="FILE", help="Append what happens to a file.")
-]
+def verb(
+    *shared: str, json: bool = True, computes: bool = True
+) -> Callable[[Callable[..., Output]], Callable[..., int]]:
+    """Register a function as a verb.
+
+    The function takes a ``Session``, its own options, and the values of ``shared`` as keywords.
+    Its verb has, after its own options, the shared ones and those of every verb.
+
+    json : whether it has a JSON object. computes : whether it may need the exact engine, whose
+    compilation is then announced.
+    """
+    every = ("json", "verbose", "quiet", "log") if json else ("verbose", "quiet", "log")
+
+    def register(function: Callable[..., Output]) -> Callable[..., int]:
+        @wraps(function)
+        def command(
+            *, json: bool = False, verbose: bool, quiet: bool, log: Path | None, **words: Any
+        ) -> int:
+            with (
+                _logged(log),
+                progress_for(quiet) as progress,
+                _announced(progress) if computes else nullcontext(),
+            ):
+                output = function(Session(progress, not (json or quiet)), **words)
+            if json:
+                print_json(output.json)
+            elif not quiet:
+                output.show()
+            return 0 if output.satisfied else 1
+
+        _, *own, _ = inspect.signature(function, eval_str=True).parameters.values()
+        parameters = [*own, *(_parameter(name) for name in (*shared, *every))]
+        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        command.__annotations__ = {p.name: p.annotation for p in parameters}
+        app.command()(command)
+        return command
+
+    return register
 
 
-Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")]
-
-
-Jobs = Annotated[
-    int | None, typer.Option("--jobs", metavar="N", help="Workers at a time [default: all cores].")
-]
-
-
-Overwrite = Annotated[
-    bool,
-    typer.Option("--overwrite", help="Replace files that the folder's manifest.json lists."),
-]
-
-
-Resume = Annotated[bool, typer.Option("--resume", help="Go on with unfinished work.")]
+def _parameter(name: str) -> inspect.Parameter:
+    kind, declaration = _SHARED[name]
+    return inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=False if kind is bool else None,
+        annotation=Annotated[kind, declaration],
+    )
 
 
 @contextmanager
-def session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]:
-    """Logging as asked, progress on standard error."""
+def _logged(log: Path | None) -> Iterator[None]:
+    """The log as asked."""
     logger = logging.getLogger("designer")
     logger.handlers.clear()
     logger.propagate = False
@@ -112,7 +166,7 @@ def session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]:
     logger.addHandler(logging.NullHandler())
     if log is not None:
         try:
-            handler: logging.Handler = logging.FileHandler(log, encoding="utf-8")
+            handler = logging.FileHandler(log, encoding="utf-8")
         except OSError as error:
             raise InputError(
                 log, "--log", error.strerror or str(error), "a file that can be written"
@@ -120,24 +174,23 @@ def session(verbose: bool, quiet: bool, log: Path | None) -> Iterator[Progress]:
         handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
         logger.addHandler(handler)
     logger.info("designer %s %s", __version__, " ".join(sys.argv[1:]))
-    with progress_for(quiet) as progress:
-        try:
-            yield progress
-        except DesignerError as error:
-            logger.error("%s", error)
-            raise
-        except Exception:
-            logger.exception("internal error")
-            raise
-        finally:
-            for each in logger.handlers:
-                each.close()
-            logger.handlers.clear()
-            logger.addHandler(logging.NullHandler())
+    try:
+        yield
+    except DesignerError as error:
+        logger.error("%s", error)
+        raise
+    except Exception:
+        logger.exception("internal error")
+        raise
+    finally:
+        for each in logger.handlers:
+            each.close()
+        logger.handlers.clear()
+        logger.addHandler(logging.NullHandler())
 
 
 @contextmanager
-def compiling(progress: Progress) -> Iterator[None]:
+def _announced(progress: Progress) -> Iterator[None]:
     """Says it when the engine has to be compiled."""
     from designer.base.jit_notice import announced
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from designer.base.si_unit import suffix, value_text
-from designer.cli.tables import add_row, files, new_console, new_table, print_line
+from designer.cli.console import say, table
+from designer.cli.tables import YES_NO, files
 
 LONGEST = 40
 """Lines of a table; the JSON object has them all."""
@@ -21,27 +22,31 @@ def show(answer: Mapping[str, Any], out: Path | None, reused: bool) -> None:
 
 
 def _sweep(answer: Mapping[str, Any]) -> None:
-    console = new_console()
     unit = f" [{answer['unit']}]" if answer["unit"] else ""
-    wide = answer["windows"]
-    widest = sorted(wide, key=lambda w: -w["steps"])[:LONGEST]
+    windows = answer["windows"]
+    widest = sorted(windows, key=lambda w: -w["steps"])[:LONGEST]
     si = answer.get("si_unit")
-    heads = ["from (SI)", "to (SI)"] if si else []
-    table = new_table(
-        "Windows", "track", f"from{unit}", "to", *heads, "response", "symmetric", "steps"
+    table(
+        "Windows",
+        (
+            {
+                "track": w["track"],
+                f"from{unit}": f"{w['from']:.6g}",
+                "to": f"{w['to']:.6g}",
+                **({f"{end} (SI)": _si(w, end, si) for end in ("from", "to")} if si else {}),
+                "response": w["response"],
+                "symmetric": YES_NO[w["symmetric"]],
+                "steps": str(w["steps"]),
+            }
+            for w in sorted(widest, key=lambda w: (w["track"], w["from"]))
+        ),
     )
-    for w in sorted(widest, key=lambda w: (w["track"], w["from"])):
-        symmetric = {True: "yes", False: "no", None: "-"}[w["symmetric"]]
-        ends: tuple[str, ...] = (f"{w['from']:.6g}", f"{w['to']:.6g}")
-        ends += (_si(w, "from", si), _si(w, "to", si)) if si else ()
-        add_row(table, w["track"], *ends, w["response"], symmetric, str(w["steps"]))
-    console.print(table)
-    if len(wide) > len(widest):
-        print_line(console, f"and {len(wide) - len(widest)} narrower ones (--json has them all)")
+    if len(windows) > len(widest):
+        say(f"and {len(windows) - len(widest)} narrower ones (--json has them all)")
     if answer["points"]:
-        print_line(console, "\nBifurcation points")
+        say("\nBifurcation points")
         for text in _points(answer["points"][:LONGEST], si):
-            print_line(console, text)
+            say(text)
 
 
 def _points(points: Sequence[Mapping[str, Any]], si: str | None) -> Iterator[str]:
@@ -61,19 +66,25 @@ def _si(row: Mapping[str, Any], key: str, unit: str) -> str:
 
 
 def _map(answer: Mapping[str, Any]) -> None:
-    table = new_table(
-        f"Map over {answer['x']['name']} and {answer['y']['name']}", "response", "share"
-    )
     total = answer["x"]["steps"] * answer["y"]["steps"]
-    for response, count in list(answer["counts"].items())[:LONGEST]:
-        add_row(table, response, f"{count / total:.2%}")
-    new_console().print(table)
+    counts = list(answer["counts"].items())[:LONGEST]
+    table(
+        f"Map over {answer['x']['name']} and {answer['y']['name']}",
+        ({"response": name, "share": f"{count / total:.2%}"} for name, count in counts),
+    )
 
 
 def _basins(answer: Mapping[str, Any]) -> None:
-    table = new_table("Attractors", "number", "response", "symmetric", "twin", "share of starts")
-    for a in answer["attractors"][:LONGEST]:
-        symmetric = {True: "yes", False: "no", None: "-"}[a["symmetric"]]
-        twin = "-" if a["twin"] is None else str(a["twin"])
-        add_row(table, str(a["number"]), a["response"], symmetric, twin, f"{a['share']:.2%}")
-    new_console().print(table)
+    table(
+        "Attractors",
+        (
+            {
+                "number": str(a["number"]),
+                "response": a["response"],
+                "symmetric": YES_NO[a["symmetric"]],
+                "twin": "-" if a["twin"] is None else str(a["twin"]),
+                "share of starts": f"{a['share']:.2%}",
+            }
+            for a in answer["attractors"][:LONGEST]
+        ),
+    )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import typer
 
 from designer.base.errors import InputError
-from designer.cli import bifurcation, export, reproduce, rules, search, tolerance, trade, verbs
+from designer.cli import bifurcation, tools, verbs
 from designer.cli.app import VERBS, app
 
-REGISTERED = (verbs, tolerance, bifurcation, search, trade, export, rules, reproduce)
+REGISTERED = (verbs, bifurcation, tools)
 """The modules of the verbs: importing one registers what it has."""
 
 

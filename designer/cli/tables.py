@@ -1,23 +1,22 @@
-"""Results as tables for people, on standard error."""
+"""What the verbs answer, as tables for people on standard error."""
 
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
 from designer.base.si_unit import value_text
 from designer.base.units import format_quantity
-from designer.catalog.catalog import Catalog
-from designer.report import compare_table
+from designer.cli.console import grid, say, table
 
 if TYPE_CHECKING:
+    from designer.catalog.catalog import Catalog
     from designer.spice.opamp_check import FigureCheck
+
+YES_NO = {True: "yes", False: "no", None: "-"}
 
 
 def run(answer: Mapping[str, Any]) -> None:
@@ -28,236 +27,188 @@ def run(answer: Mapping[str, Any]) -> None:
 
 def synthesised(answer: Mapping[str, Any]) -> None:
     """The chosen parts, their error and the generator's settings."""
-    console = new_console()
-    table = new_table("Parts", "value", "parts")
-    kinds: dict[tuple[str, float], list[str]] = {}
+    equal: dict[tuple[str, float], list[str]] = defaultdict(list)
     for name, value in answer["parts"].items():
-        kinds.setdefault((name[0], value), []).append(name)
-    for (kind, value), names in sorted(kinds.items()):
-        add_row(table, format_quantity(value, "F" if kind == "C" else "Ω"), " ".join(names))
-    console.print(table)
+        equal[name[0], value].append(name)
+    table(
+        "Parts",
+        (
+            {
+                "value": format_quantity(value, "F" if kind == "C" else "Ω"),
+                "parts": " ".join(names),
+            }
+            for (kind, value), names in sorted(equal.items())
+        ),
+    )
     if answer.get("better_grades"):
-        from designer.spread.part_grades import (  # only here is it needed
-            BetterGrade,
-            better_grades_text,
-        )
+        from designer.spread.part_grades import BetterGrade, better_grades_text
 
-        better = {name: BetterGrade(**said) for name, said in answer["better_grades"].items()}
-        print_line(console, better_grades_text(better))
+        better = {name: BetterGrade(**g) for name, g in answer["better_grades"].items()}
+        say(better_grades_text(better))
     certificate = answer["certificate"]
-    print_line(
-        console,
+    say(
         f"Largest coefficient error {_error(answer['max_error'])} "
         f"({certificate['status']}, lower bound {_error(certificate['lower_bound'])}); "
-        f"{answer['distinct_values']} distinct values",
+        f"{answer['distinct_values']} distinct values"
     )
     if answer["knobs"]:
-        knobs, key = answer["knobs"], "mechanism_hz"
-        heads = ("ω", *_hertz_heads(knobs, key), "expected", "frequency")
-        table = new_table("Generator", *heads, "amplitude (peak, high-Z)")
-        for knob in knobs:
-            add_row(
-                table,
-                f"{knob['omega']:g}",
-                *_hertz(knob, knobs, key),
-                knob["expected"] or "-",
-                f"{knob['frequency_hz']:.4g} Hz",
-                f"{knob['amplitude_v_peak']:.4g} V",
-            )
-        console.print(table)
+        rows = answer["knobs"]
+        table(
+            "Generator",
+            (
+                {
+                    "ω": f"{r['omega']:g}",
+                    **_mechanism(r, rows, "mechanism_hz"),
+                    "expected": r["expected"] or "-",
+                    "frequency": f"{r['frequency_hz']:.4g} Hz",
+                    "amplitude (peak, high-Z)": f"{r['amplitude_v_peak']:.4g} V",
+                }
+                for r in rows
+            ),
+        )
 
 
 def tolerance(answer: Mapping[str, Any]) -> None:
     """The responses on each engine, and their yields."""
-    console = new_console()
     spread = (answer.get("provenance", {}).get("spread") or {}).get("name", "")
-    table = new_table(
-        f"Responses, {answer['samples']} samples"
-        + (f", spread of the {spread}" if spread == "model file" else ""),
-        "ω",
-        *_hertz_heads(answer["responses"]),
-        "expected",
-        "model",
-        "circuit",
-        "ngspice",
-        "yield %",
-        "95 %",
-        "lost",
-        "grazing",
-        "failed",
+    of_file = f", spread of the {spread}" if spread == "model file" else ""
+    rows = answer["responses"]
+    table(
+        f"Responses, {answer['samples']} samples{of_file}",
+        (
+            {
+                **_asked(r, rows),
+                "model": r["model"] if r["found"] else f"{r['model']} (not what is wanted)",
+                "circuit": r["circuit"],
+                "ngspice": r["ngspice"] or "-",
+                **_counts(r),
+            }
+            for r in rows
+        ),
         gap=1,
     )
-    for r in answer["responses"]:
-        y = r["yield"]
-        counted = ["-", r.get("left_out", ""), "", "", ""]
-        if y is not None:
-            rate = "-" if r["rate"] is None else f"{100 * r['rate']:.1f}"
-            counted = [
-                rate,
-                _interval(y, y),
-                str(y["lost"]),
-                str(y["grazing"]),
-                str(y["failed"]),
-            ]
-        found = r["model"] if r["found"] else f"{r['model']} (not what is wanted)"
-        add_row(
-            table,
-            f"{r['omega']:g}",
-            *_hertz(r, answer["responses"]),
-            r["expected"] or "-",
-            found,
-            r["circuit"],
-            r["ngspice"] or "-",
-            *counted,
-        )
-    console.print(table)
-    _boards(console, answer)
-    for r in answer["responses"]:
-        for doubt in doubts(_with_its_figures(r)):
-            print_line(console, f"ω = {r['omega']:g}: {doubt}")
+    if answer.get("boards"):
+        _boards(answer)
+    for r in rows:
+        for line in untrusted(_trust_with_figures(r)):
+            say(f"ω = {r['omega']:g}: {line}")
     if answer.get("equation_check") is not None:
-        from designer.spice.equation_check import EquationCheck  # only here is it needed
+        from designer.spice.equation_check import EquationCheck
 
         problem = EquationCheck.read(answer["equation_check"]).problem
         if problem:
-            print_line(console, problem)
+            say(problem)
     blame_status(answer)
     if answer.get("until") is not None:
         reached = "reached" if answer.get("narrow") else "NOT reached: some interval is wider"
-        print_line(
-            console, f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}"
-        )
-    _further(console, answer)
+        say(f"Intervals narrower than {100 * answer['until']:g} % of boards: {reached}")
+    _further(answer)
 
 
-def _boards(console: Console, answer: Mapping[str, Any]) -> None:
+def _counts(row: Mapping[str, Any]) -> dict[str, str]:
+    """The yield of a response; of one that was left out, why."""
+    y = row["yield"]
+    if y is None:
+        counted = ["-", row.get("left_out", ""), "", "", ""]
+    else:
+        lost = [str(y[k]) for k in ("lost", "grazing", "failed")]
+        counted = [_percent(row["rate"]), _interval(y, y), *lost]
+    return dict(zip(("yield %", "95 %", "lost", "grazing", "failed"), counted, strict=True))
+
+
+def _boards(answer: Mapping[str, Any]) -> None:
     """One row for each measured board, where the study is of all of them."""
-    rows = answer.get("boards")
-    if not rows:
-        return
+    boards = answer["boards"]
     heads = [f"{r['omega']:g} {r['expected'] or '-'}" for r in answer["responses"]]
-    table = new_table(f"All {len(rows)} boards", "board", *heads, "all of them", gap=1)
-    for row in rows:
-        add_row(table, row["board"], *(cell or "-" for cell in row["cells"]), row["all"] or "-")
-    console.print(table)
+    rows = ([b["board"], *(cell or "-" for cell in b["cells"]), b["all"] or "-"] for b in boards)
+    grid(f"All {len(boards)} boards", ["board", *heads, "all of them"], rows, gap=1)
 
 
 def blame_status(answer: Mapping[str, Any]) -> None:
     """One line about a blame that is not whole; none where it is."""
     status = answer.get("blame") or {}
     if status.get("reason"):
-        print_line(new_console(), f"Blame {status['status']}: {status['reason']}")
+        say(f"Blame {status['status']}: {status['reason']}")
 
 
-def _further(console: Console, answer: Mapping[str, Any]) -> None:
+def _further(answer: Mapping[str, Any]) -> None:
     """The yields beside those as built, where there are any."""
+    rows = answer["responses"]
     kinds: dict[str, Callable[[Mapping[str, Any]], Any]] = {
-        "tuned": lambda r: r.get("tuned"),
-        "on the bench": lambda r: (r.get("tuned") or {}).get("bench"),
-        "trimmed": lambda r: r.get("trimmed"),
-        "reached": lambda r: r.get("reached"),
+        "tuned %": lambda r: r.get("tuned"),
+        "on the bench %": lambda r: (r.get("tuned") or {}).get("bench"),
+        "trimmed %": lambda r: r.get("trimmed"),
+        "reached %": lambda r: r.get("reached"),
     }
-    shown = [k for k, of in kinds.items() if any(of(r) for r in answer["responses"])]
-    both = any(r.get("combined") for r in answer["responses"])
+    shown = {kind: of for kind, of in kinds.items() if any(of(r) for r in rows)}
+    both = any(r.get("combined") for r in rows)
     if not shown and not both:
         return
-    heads = [*(f"{kind} %" for kind in shown), *(["both engines %", "95 %", "differ"] * both)]
-    first = ("ω", *_hertz_heads(answer["responses"]), "expected")
-    table = new_table("Further yields", *first, *heads, gap=1)
-    for r in answer["responses"]:
-        cells = [_percent((kinds[kind](r) or {}).get("rate")) for kind in shown]
-        c = r.get("combined")
-        if both and c is None:
-            cells += ["-", "", ""]
-        elif both:
-            differ = c["disagreement"]
-            cells += [
-                _percent(c["estimate"]),
-                _interval(c, r["yield"]),
-                f"{differ['count']} of {differ['asked']}",
-            ]
-        hertz = _hertz(r, answer["responses"])
-        add_row(table, f"{r['omega']:g}", *hertz, r["expected"] or "-", *cells)
-    console.print(table)
+    table(
+        "Further yields",
+        (
+            {
+                **_asked(r, rows),
+                **{kind: _percent((of(r) or {}).get("rate")) for kind, of in shown.items()},
+                **(_both_engines(r) if both else {}),
+            }
+            for r in rows
+        ),
+        gap=1,
+    )
     whole = answer.get("all_on_one_board") or {}
-    said = [
+    counts = [
         f"{kind.replace('built', 'as built')} {y['ok']} of {y['samples']}"
         for kind, y in whole.items()
         if y is not None
     ]
-    if said:
-        print_line(console, f"All on one board: {', '.join(said)}")
+    if counts:
+        say(f"All on one board: {', '.join(counts)}")
 
 
-def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
-    """Of a share in per cent; of all boards there are, which have none, how many they are."""
-    if counted.get("census") and ends["low"] == ends["high"]:
-        return f"all {counted['samples']}"
-    return f"{100 * ends['low']:.0f}–{100 * ends['high']:.0f}"
-
-
-def _percent(rate: float | None) -> str:
-    return "-" if rate is None else f"{100 * rate:.1f}"
+def _both_engines(row: Mapping[str, Any]) -> dict[str, str]:
+    both, cells = row.get("combined"), ["-", "", ""]
+    if both is not None:
+        differ = both["disagreement"]
+        cells = [
+            _percent(both["estimate"]),
+            _interval(both, row["yield"]),
+            f"{differ['count']} of {differ['asked']}",
+        ]
+    return dict(zip(("both engines %", "95 %", "differ"), cells, strict=True))
 
 
 def simulated(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
     head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
-    responses = answer["responses"]
-    si = all("x1_max_m" in r for r in responses)
-    table = new_table(
+    rows = answer["responses"]
+    si = all("x1_max_m" in r for r in rows)
+    ends = {"x1 max": "x1_max", "x1 min": "x1_min"}
+    si_ends = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if si else {}
+    table(
         head,
-        "ω",
-        *_hertz_heads(responses),
-        "expected",
-        "response",
-        "symmetric",
-        "x1 max",
-        "x1 min",
-        *(["x1 max (SI)", "x1 min (SI)"] if si else []),
-        "twin",
-        "others",
+        (
+            {
+                **_asked(r, rows),
+                "response": r["response"]
+                + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
+                "symmetric": YES_NO[r["symmetric"]],
+                **{h: "-" if r[k] is None else f"{r[k]:.6g}" for h, k in ends.items()},
+                **{h: "-" if r[k] is None else value_text(r[k], "m") for h, k in si_ends.items()},
+                "twin": "-" if r["twin"] is None else r["twin"]["response"],
+                "others": ", ".join(o["response"] for o in r["others"]) or "-",
+            }
+            for r in rows
+        ),
         gap=1,
     )
-    for r in responses:
-        add_row(
-            table,
-            f"{r['omega']:g}",
-            *_hertz(r, responses),
-            r["expected"] or "-",
-            r["response"] + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
-            {True: "yes", False: "no", None: "-"}[r["symmetric"]],
-            "-" if r["x1_max"] is None else f"{r['x1_max']:.6g}",
-            "-" if r["x1_min"] is None else f"{r['x1_min']:.6g}",
-            *(_metres(r[key]) for key in ("x1_max_m", "x1_min_m") if si),
-            "-" if r["twin"] is None else r["twin"]["response"],
-            ", ".join(o["response"] for o in r["others"]) or "-",
-        )
-    console = new_console()
-    console.print(table)
-    for r in answer["responses"]:
+    for r in rows:
         if r["starts"] is not None:
-            print_line(console, f"ω = {r['omega']:g}: {coexisting(r['starts'])}")
+            say(f"ω = {r['omega']:g}: {coexisting(r['starts'])}")
         if r["reason"]:
-            print_line(console, f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
-        for doubt in doubts({"this response": r.get("trust")}):
-            print_line(console, f"ω = {r['omega']:g}: {doubt}")
-
-
-def _hertz_heads(rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz") -> list[str]:
-    """The heading of the mechanism's frequency, where it is known."""
-    return ["mechanism"] if rows and all(key in row for row in rows) else []
-
-
-def _hertz(
-    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str = "frequency_hz"
-) -> list[str]:
-    """Its cell in one of the rows."""
-    return [value_text(row[key], "Hz") for _ in _hertz_heads(rows, key)]
-
-
-def _metres(value: float | None) -> str:
-    return "-" if value is None else value_text(value, "m")
+            say(f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+        for line in untrusted({"this response": r.get("trust")}):
+            say(f"ω = {r['omega']:g}: {line}")
 
 
 def coexisting(starts: Mapping[str, Any]) -> str:
@@ -275,129 +226,220 @@ def coexisting(starts: Mapping[str, Any]) -> str:
     return f"of {count} starts at drive phase 0 in the box {box}: {'; '.join(parts)}"
 
 
+def compared(answer: Mapping[str, Any]) -> None:
+    """The design beside the paper's."""
+    from designer.report import compare_table
+
+    heads, *rows = compare_table.rows(answer)
+    grid("Side by side", heads, rows)
+    for note in compare_table.notes(answer):
+        say(note)
+
+
+def searched(answer: Mapping[str, Any]) -> None:
+    """A run; then the responses at their places, what limits them, what each lever is worth."""
+    run(answer)
+    search = answer["search"]
+    pairs = zip(search["final"]["responses"], answer["confirmation"]["responses"], strict=True)
+    places = [(place["expected"] or "any", place, confirmed) for place, confirmed in pairs]
+    table(
+        "Places",
+        (
+            {
+                "response": name,
+                "ω": f"{place['omega']:.5g}",
+                "b": f"{place['b']:.4g}",
+                "distance": _sigmas(place["distance"]),
+                "predicted": f"{place['predicted_yield']:.4f}",
+                "confirmed": f"{confirmed['agreed']}/{confirmed['asked']}",
+            }
+            for name, place, confirmed in places
+        ),
+        gap=1,
+    )
+    for name, _, confirmed in places:
+        if confirmed["limited_by"]:
+            say(f"{name} is limited by {confirmed['limited_by']['line']}")
+    if search["contributions"]:
+        table(
+            "Levers: smallest distance",
+            (
+                {
+                    **{key: lever[key] for key in ("lever", "from", "to")},
+                    **{k: _sigmas(lever[k]["smallest_distance"]) for k in ("alone", "without")},
+                }
+                for lever in search["contributions"]
+            ),
+            gap=1,
+        )
+
+
+def cured(answer: Mapping[str, Any]) -> None:
+    """The upgrades of a cure."""
+    from designer.centering import cure_table
+
+    print(cure_table.text(answer), file=sys.stderr)
+
+
+def traded(answer: Mapping[str, Any]) -> None:
+    """Time and error of every rung."""
+    from designer.fidelity.trade_files import sheet
+
+    print(sheet(answer), file=sys.stderr)
+
+
+def rules(answer: Mapping[str, Any]) -> None:
+    """Every rule with what was found; then what to do about those that fail."""
+    from designer.catalog.design_rule import FAIL, NOT_RUN, PASS
+
+    rows = answer["rules"]
+    table(
+        "Design rules",
+        (
+            {
+                "rule": r["id"],
+                "status": r["status"],
+                "found": r["found"],
+                "limit": r["limit"] + (" (model file)" if r["reason"] else ""),
+            }
+            for r in rows
+        ),
+    )
+    for r in rows:
+        if r["reason"]:
+            say(f"{r['id']}: the model file's limit, because: {r['reason']}")
+    for r in rows:
+        if r["status"] == FAIL:
+            say(f"{r['id']} fails: {r['do']}")
+    count = answer["counts"]
+    say(f"{count[PASS]} pass, {count[FAIL]} fail, {count[NOT_RUN]} not run")
+    idle = [r["id"] for r in rows if r["status"] == NOT_RUN]
+    if idle:
+        say(f"Not run is no pass. Rules that were not looked at: {', '.join(idle)}")
+
+
+def pictures(folder: Path, names: Sequence[str]) -> None:
+    """Where the pictures are."""
+    written = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
+    say(f"{folder}: {written}")
+
+
+def files(folder: Path, reused: bool) -> None:
+    """Where the results are."""
+    how = "was there already, from the same inputs" if reused else "written"
+    say(f"{folder}: {how}")
+
+
+def checks(name: str, measured: Sequence[FigureCheck]) -> None:
+    """An op-amp's figures, by the catalogue and by its model in ngspice."""
+    table(
+        f"{name} in ngspice",
+        (
+            {
+                "figure": row.figure + (" (assumed)" if row.assumed else ""),
+                "catalogue": format_quantity(row.expected, row.unit),
+                "measured": format_quantity(row.measured, row.unit),
+                "": "" if row.agrees else f"differ by more than {100 * row.tolerance:g} %",
+            }
+            for row in measured
+        ),
+    )
+
+
+def catalog(known: Catalog) -> None:
+    """What can be bought."""
+    units = {"resistor": "Ω", "capacitor": "F"}
+    table(
+        "Families",
+        (
+            {
+                "name": f.name,
+                "kind": f.kind,
+                "series": " ".join(f.series),
+                "range": " to ".join(format_quantity(end, units[f.kind]) for end in f.range),
+                "grade": f"{100 * f.grade:g} %",
+                "price class": str(f.price),
+            }
+            for f in known.families
+        ),
+    )
+    table(
+        "Op-amps",
+        (
+            {
+                "name": o.name,
+                "sections": str(o.sections),
+                "saturation": f"{o.saturation.nominal:g} V at ± {o.rated_supply:g} V",
+                "gain-bandwidth": format_quantity(o.gbw.nominal, "Hz"),
+                "price class": str(o.price),
+            }
+            for o in known.opamps
+        ),
+    )
+    for kind in ("Diodes", "References", "Trimmers", "Headers"):
+        names = [entry.name for entry in getattr(known, kind.lower())]
+        say(f"{kind}: {', '.join(names) or 'none'}")
+
+
+def untrusted(trust: Mapping[str, Any]) -> list[str]:
+    """A line for each result that is not to be trusted (``check.trust``), by what it is of."""
+    known = {what: result for what, result in trust.items() if result is not None}
+    return [
+        f"{what} not to be trusted here: {'; '.join(result['reasons'])}"
+        for what, result in known.items()
+        if result["trusted"] is False
+    ] + [
+        f"{what} gave no answer: {'; '.join(result['reasons'])}"
+        for what, result in known.items()
+        if result["trusted"] is None and result["reasons"]
+    ]
+
+
+def _trust_with_figures(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The trust of a study's response; ngspice's with the reason that has the figures."""
+    trust = dict(row.get("trust") or {})
+    if trust.get("ngspice") is not None and row.get("ngspice_reason"):
+        trust["ngspice"] = {**trust["ngspice"], "reasons": [row["ngspice_reason"]]}
+    return trust
+
+
+def _asked(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The first cells of a response: what was asked for."""
+    return {
+        "ω": f"{row['omega']:g}",
+        **_mechanism(row, rows, "frequency_hz"),
+        "expected": row["expected"] or "-",
+    }
+
+
+def _mechanism(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], key: str
+) -> dict[str, str]:
+    """The mechanism's frequency, where all rows have it."""
+    return {"mechanism": value_text(row[key], "Hz")} if all(key in r for r in rows) else {}
+
+
+def _interval(ends: Mapping[str, Any], counted: Mapping[str, Any]) -> str:
+    """Of a share in per cent; of all boards there are, which have none, how many they are."""
+    if counted.get("census") and ends["low"] == ends["high"]:
+        return f"all {counted['samples']}"
+    return f"{100 * ends['low']:.0f}–{100 * ends['high']:.0f}"
+
+
 def _share(counted: Mapping[str, Any]) -> str:
     """With its 95 % interval."""
     low, high = 100 * counted["low"], 100 * counted["high"]
     return f"{100 * counted['share']:.3g} % ({low:.3g} to {high:.3g})"
 
 
-def compared(answer: Mapping[str, Any]) -> None:
-    """The design beside the paper's."""
-    console = new_console()
-    head, *rest = compare_table.rows(answer)
-    table = new_table("Side by side", *head)
-    for cells in rest:
-        add_row(table, *cells)
-    console.print(table)
-    for note in compare_table.notes(answer):
-        print_line(console, note)
+def _percent(rate: float | None) -> str:
+    return "-" if rate is None else f"{100 * rate:.1f}"
 
 
-def pictures(folder: Path, names: Sequence[str]) -> None:
-    """Where the pictures are."""
-    said = f"{len(names)} pictures written, such as {names[0]}" if names else "no orbit to draw"
-    print_line(new_console(), f"{folder}: {said}")
-
-
-def checks(name: str, measured: Sequence[FigureCheck]) -> None:
-    """An op-amp's figures, by the catalogue and by its model in ngspice."""
-    table = new_table(f"{name} in ngspice", "figure", "catalogue", "measured", "")
-    for row in measured:
-        add_row(
-            table,
-            row.figure + (" (assumed)" if row.assumed else ""),
-            format_quantity(row.expected, row.unit),
-            format_quantity(row.measured, row.unit),
-            "" if row.agrees else f"differ by more than {100 * row.tolerance:g} %",
-        )
-    new_console().print(table)
-
-
-def catalog(held: Catalog) -> None:
-    """What can be bought."""
-    console = new_console()
-    table = new_table("Families", "name", "kind", "series", "range", "grade", "price class")
-    for family in held.families:
-        unit = "Ω" if family.kind == "resistor" else "F"
-        low, high = (format_quantity(end, unit) for end in family.range)
-        add_row(
-            table,
-            family.name,
-            family.kind,
-            " ".join(family.series),
-            f"{low} to {high}",
-            f"{100 * family.grade:g} %",
-            str(family.price),
-        )
-    console.print(table)
-    table = new_table("Op-amps", "name", "sections", "saturation", "gain-bandwidth", "price class")
-    for opamp in held.opamps:
-        add_row(
-            table,
-            opamp.name,
-            str(opamp.sections),
-            f"{opamp.saturation.nominal:g} V at ± {opamp.rated_supply:g} V",
-            format_quantity(opamp.gbw.nominal, "Hz"),
-            str(opamp.price),
-        )
-    console.print(table)
-    for what, names in (
-        ("Diodes", [entry.name for entry in held.diodes]),
-        ("References", [entry.name for entry in held.references]),
-        ("Trimmers", [entry.name for entry in held.trimmers]),
-        ("Headers", [entry.name for entry in held.headers]),
-    ):
-        print_line(console, f"{what}: {', '.join(names) or 'none'}")
-
-
-def files(folder: Path, reused: bool) -> None:
-    """Where the results are."""
-    how = "was there already, from the same inputs" if reused else "written"
-    print_line(new_console(), f"{folder}: {how}")
-
-
-def doubts(trust: Mapping[str, Any]) -> list[str]:
-    """A line for each result that is not to be trusted (``check.trust``), by what it is of."""
-    return [
-        f"{what} not to be trusted here: {'; '.join(said['reasons'])}"
-        for what, said in trust.items()
-        if said is not None and said["trusted"] is False
-    ] + [
-        f"{what} gave no answer: {'; '.join(said['reasons'])}"
-        for what, said in trust.items()
-        if said is not None and said["trusted"] is None and said["reasons"]
-    ]
-
-
-def _with_its_figures(row: Mapping[str, Any]) -> dict[str, Any]:
-    """The trust of a study's response; ngspice's with the reason that has the figures."""
-    said = dict(row.get("trust") or {})
-    if said.get("ngspice") is not None and row.get("ngspice_reason"):
-        said["ngspice"] = {**said["ngspice"], "reasons": [row["ngspice_reason"]]}
-    return said
-
-
-def new_console() -> Console:
-    """On standard error; wide enough for a row where there is no terminal to ask."""
-    return Console(stderr=True, width=None if sys.stderr.isatty() else 120)
-
-
-def new_table(title: str, *columns: str, gap: int = 2) -> Table:
-    """No lines, so that the longest fits into 80 columns."""
-    table = Table(title=f"\n{title}", title_justify="left", box=None, padding=(0, gap, 0, 0))
-    for column in columns:
-        table.add_column(column)
-    return table
-
-
-def add_row(table: Table, *cells: str) -> None:
-    table.add_row(*(Text(cell) for cell in cells))
-
-
-def print_line(console: Console, text: str) -> None:
-    console.print(Text(text), soft_wrap=True)
+def _sigmas(distance: float | None) -> str:
+    return "-" if distance is None else f"{distance:.2f} σ"
 
 
 def _error(value: float) -> str:
-    """A coefficient error in words: below 1e-12 it is rounding."""
+    """A coefficient error; below 1e-12 it is rounding."""
     return f"{100 * value:.3g} %" if value >= 1e-12 else "0 to rounding"

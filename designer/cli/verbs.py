@@ -1,41 +1,32 @@
-"""The verbs of the command line: options in, one JSON object or tables out."""
+"""The verbs on model files and design folders; each calls its function of ``designer``."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
-from functools import partial
+from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from designer.base.defaults import DRAWN_STARTS, SEED
-from designer.base.progress import Progress
+from designer.base.defaults import DRAWN_STARTS, SEARCH_SAMPLES, SEED, TRADE_BOARDS
+from designer.base.errors import MISSING, InputError
 from designer.base.version import __version__
 from designer.cli.app import (
-    EngineName,
-    Jobs,
-    Json,
-    Log,
     Out,
-    Overwrite,
-    Quiet,
-    Resume,
-    RungName,
+    Output,
+    OwnSeed,
     Samples,
     Seed,
+    Session,
     Source,
-    Verbose,
     app,
-    compiling,
-    print_json,
-    session,
+    option,
+    verb,
 )
 
 if TYPE_CHECKING:
-    from designer.jobs.synthesise_job import JobOutcome
+    from designer.jobs.job_outcome import JobOutcome
 
 STUDY_KEYS = (
     "format",
@@ -51,289 +42,364 @@ STUDY_KEYS = (
     "provenance",
 )
 """Of what a study's JSON object has, in the order in which ``tolerance`` prints it."""
+KINDS = ("grade", "network", "reference", "trimmer", "op-amp", "dead-zone", "place", "trim")
+"""Of upgrades; as ``cure_branch.KINDS``."""
+StudyRung = Literal["exact", "auto", "ngspice"]
 
 
-OwnSeed = Annotated[
-    int | None,
-    typer.Option("--seed", metavar="N", help="Of the random numbers [1, or the folder's own]."),
-]
+class MapOver(StrEnum):
+    """What a yield is mapped over."""
+
+    OMEGA = "omega"
+    B = "b"
+    GRADE = "grade"
+    OMEGA_GRADE = "omega-grade"
+
+
+class DeckName(StrEnum):
+    """Simulators that a deck is written for."""
+
+    LTSPICE = "ltspice"
+    PORTABLE = "portable"
+
+
 WithBlame = Annotated[
     bool | None,
-    typer.Option("--blame/--no-blame", help="Which part is to blame [yes, or as the folder has]."),
+    option("--blame/--no-blame", None, "Which part is to blame [yes, or as the folder has]."),
 ]
 BlameBudget = Annotated[
-    int | None,
-    typer.Option("--blame-budget", metavar="STEPS", help="Of the work on the blame [20000]."),
+    int | None, option("--blame-budget", "STEPS", "Of the work on the blame [20000].")
 ]
 
 
 @app.callback(invoke_without_command=True)
 def _designer(
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    version: Annotated[bool, option("--version", None, "Print the version.")] = False,
 ) -> None:
     if version:
         print(f"designer {__version__}")
         raise typer.Exit
 
 
-@app.command()
+@verb("jobs", "overwrite", "resume")
 def run(
+    session: Session,
     model: Source,
     out: Out = None,
     samples: Samples = None,
     blame: WithBlame = None,
     blame_budget: BlameBudget = None,
     seed: OwnSeed = None,
-    jobs: Jobs = None,
-    overwrite: Overwrite = False,
-    resume: Resume = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    log: Log = None,
-) -> int:
+    **shared: Any,
+) -> Output:
     """Everything: parts, circuit, check in ngspice, yield, report."""
-    with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.jobs import folder_numbers, search_job, study_job, synthesise_job
-        from designer.jobs.options import Options
+    from designer.cli import tables
+    from designer.jobs import study_job
 
-        given = {"samples": samples, "seed": seed, "until": None}
-        given |= {"blamed": blame, "blame_budget": blame_budget}
-        said: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
-        options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **said)
-        options.check()
-        modelfile, folder = synthesise_job.source(model, out)
-        options = folder_numbers.of_study(model, folder, modelfile, options, given)
-        modelfile = search_job.chosen(modelfile, folder, options, progress)
-        command = partial(Options.command, verb="run", model=model, out=out)
-        shown = EarlyTables(progress, "run", silent=json or quiet)
-        outcome = study_job.run_into(modelfile, folder, options, progress, command, shown)
-    return print_answer(outcome, json, quiet, "run")
+    outcome = study_job.run(
+        model,
+        out,
+        samples=samples,
+        blame=blame,
+        blame_budget=blame_budget,
+        seed=seed,
+        progress=session.progress,
+        shown=session.early(tables.run, tables.tolerance),
+        **shared,
+    )
+    return _output(outcome, outcome.answer, tables.run)
 
 
-@app.command()
+@verb("jobs", "overwrite", "resume")
 def synthesise(
+    session: Session,
     model: Source,
     out: Out = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Beside the paper's values; needs no --out.")
+        bool, option("--compare", None, "Beside the paper's values; needs no --out.")
     ] = False,
     seed: Seed = SEED,
-    jobs: Jobs = None,
-    overwrite: Overwrite = False,
-    resume: Resume = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    log: Log = None,
-) -> int:
+    **shared: Any,
+) -> Output:
     """Choose the parts and write the design folder."""
-    with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.jobs import search_job, synthesise_job
-        from designer.model.model_file import read_model_file
+    from designer.cli import tables
+    from designer.jobs import synthesise_job
 
-        options = synthesise_job.Options(seed, jobs, overwrite=overwrite, resume=resume)
-        options.check()
-        if compare and out is None and not model.is_dir():
-            outcome = synthesise_job.compare_in_memory(read_model_file(model), options, progress)
-        else:
-            modelfile, folder = synthesise_job.source(model, out)
-            modelfile = search_job.chosen(modelfile, folder, options, progress)
-            outcome = synthesise_job.synthesise_into(
-                modelfile, folder, options, progress, compare=compare
-            )
-    return print_answer(outcome, json, quiet, "synthesise")
+    outcome = synthesise_job.synthesise(
+        model, out, compare=compare, seed=seed, progress=session.progress, **shared
+    )
+    return _output(outcome, outcome.answer, tables.synthesised)
 
 
 app.command("synthesize", hidden=True)(synthesise)
 
 
-@app.command()
-def simulate(
+@verb("jobs", "overwrite", "resume")
+def tolerance(
+    session: Session,
     model: Source,
-    omega: Annotated[
-        list[float] | None,
-        typer.Option("--omega", metavar="W", help="Dimensionless frequency; may be repeated."),
+    out: Out = None,
+    samples: Samples = None,
+    until: Annotated[
+        float | None, option("--until", "WIDTH", "Add boards until intervals are narrower.")
     ] = None,
-    frequency: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--frequency",
-            metavar="F",
-            help='Frequency of a [mechanical] model, such as "10 Hz" or "62.8 rad/s"; may be '
-            "repeated.",
-        ),
-    ] = None,
-    engine: Annotated[EngineName, typer.Option("--engine", help="What simulates.")] = (
-        EngineName.MODEL
-    ),
     rung: Annotated[
-        RungName, typer.Option("--rung", help="The op-amps' model, with --engine ngspice.")
-    ] = RungName.IDEAL,
-    starts: Annotated[
-        int,
-        typer.Option(
-            "--starts", metavar="N", help="Initial states that are drawn: the attractors' shares."
+        StudyRung | None,
+        option(
+            "--rung",
+            None,
+            "exact: no ngspice; ngspice: every board in ngspice too [auto, or as the folder has].",
         ),
-    ] = DRAWN_STARTS,
-    seed: Seed = SEED,
-    plots: Annotated[
-        Path | None,
-        typer.Option("--plots", metavar="DIR", help="Draw each response: PNG and SVG."),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace pictures of the same names.")
+    tuned: Annotated[
+        bool, option("--tuned", None, "Also with the generator free within its bands.")
     ] = False,
-    jobs: Jobs = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    log: Log = None,
-) -> int:
-    """The responses: those that the model file wants, or what is reached from rest at --omega
-    and --frequency."""
-    with session(verbose, quiet, log) as progress, compiling(progress):
-        from designer.jobs import synthesise_job
-
-        synthesise_job.Options(seed, jobs).check()
-        answer, found = synthesise_job.simulate_answer(
-            model,
-            tuple(omega or ()),
-            engine.value,
-            jobs,
-            progress,
-            plots,
-            overwrite,
-            rung.value,
-            frequencies=tuple(frequency or ()),
-            starts=starts,
-            seed=seed,
-        )
-    if json:
-        print_json(answer)
-    elif not quiet:
-        from designer.cli import tables
-
-        tables.simulated(answer)
-        if plots is not None:
-            tables.pictures(plots, answer["files"])
-    return 0 if found else 1
-
-
-@app.command()
-def catalog(
-    check: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Measure this op-amp's model against its figures."),
+    reached: Annotated[
+        bool, option("--reached", None, "Also from power-up, by the start recipe.")
+    ] = False,
+    map_: Annotated[
+        list[MapOver] | None,
+        option("--map", None, "Also the yield over this setting; may be repeated."),
     ] = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    log: Log = None,
-) -> int:
-    """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
-    with session(verbose, quiet, log) as progress:
-        from designer.catalog.catalog import load_catalog
+    measured: Annotated[
+        Path | None, option("--measured", "FILE", "Of the boards in this list instead (CSV).")
+    ] = None,
+    cluster: Annotated[
+        str | None, option("--cluster", "tcp://…", "A Dask scheduler that shares the work.")
+    ] = None,
+    blame: WithBlame = None,
+    blame_budget: BlameBudget = None,
+    seed: OwnSeed = None,
+    **shared: Any,
+) -> Output:
+    """How many boards will work; writes into the design folder (a model file needs --out)."""
+    from designer.cli import tables
+    from designer.jobs import study_job
 
-        held = load_catalog()
-        if check is not None:
-            from designer.spice.opamp_check import checks
-
-            progress.stage(f"{check} in ngspice")
-            measured = checks(held.opamp(check))
-    if check is not None:
-        if json:
-            rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
-            print_json({"format": 1, "opamp": check, "checks": rows, "hash": held.hash})
-        elif not quiet:
-            from designer.cli import tables
-
-            tables.checks(check, measured)
-        return 0 if all(row.agrees for row in measured) else 1
-    if json:
-        print_json(
-            {
-                "format": 1,
-                "opamps": [entry.name for entry in held.opamps],
-                "families": [entry.name for entry in held.families],
-                "diodes": [entry.name for entry in held.diodes],
-                "references": [entry.name for entry in held.references],
-                "trimmers": [entry.name for entry in held.trimmers],
-                "headers": [entry.name for entry in held.headers],
-                "hash": held.hash,
-            }
-        )
-    elif not quiet:
-        from designer.cli import tables
-
-        tables.catalog(held)
-    return 0
+    outcome = study_job.tolerance(
+        model,
+        out,
+        samples=samples,
+        until=until,
+        rung=rung,
+        tuned=tuned,
+        reached=reached,
+        map_=[over.value for over in map_ or ()],
+        measured=measured,
+        cluster=cluster,
+        blame=blame,
+        blame_budget=blame_budget,
+        seed=seed,
+        progress=session.progress,
+        shown=session.early(tables.tolerance, tables.tolerance),
+        **shared,
+    )
+    answer = {k: outcome.answer[k] for k in STUDY_KEYS if k in outcome.answer}
+    return _output(outcome, {**answer, "cost": outcome.answer["cost"]["study"]}, tables.tolerance)
 
 
-@app.command()
-def new(
-    path: Annotated[Path, typer.Argument(metavar="PATH", help="The file to write.")] = Path(
-        "model.toml"
-    ),
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
-    log: Log = None,
-) -> int:
-    """Write a commented model file to start from; an existing file is left alone."""
-    with session(verbose, quiet, log):
-        from designer.model.template import new as write_model_file
+def _output(outcome: JobOutcome, answer: Mapping[str, Any], table: Any) -> Output:
+    """What a verb that writes a design folder has to say. table : shows its answer."""
+    from designer.cli import tables
 
-        write_model_file(path)
-    if json:
-        print_json({"format": 1, "files": [str(path)]})
-    elif not quiet:
-        print(f"written: {path}", file=sys.stderr)
-    return 0
-
-
-def print_answer(outcome: JobOutcome, json: bool, quiet: bool, verb: str) -> int:
-    answer = outcome.answer
-    if verb == "tolerance":
-        answer = {k: answer[k] for k in STUDY_KEYS if k in answer} | {
-            "cost": answer["cost"]["study"]
-        }
-    if json:
-        print_json(answer)
-    elif not quiet:
-        from designer.cli import tables
-
+    def show() -> None:
         if outcome.shown:
             tables.blame_status(answer)
         else:
-            _shown(answer, verb)
+            table(answer)
         if "comparison" in answer:
             tables.compared(answer["comparison"])
         if outcome.folder is not None:
             tables.files(outcome.folder, outcome.reused)
-    return 0 if outcome.satisfied else 1
+
+    return Output(answer, show, outcome.satisfied)
 
 
-class EarlyTables:
-    """Prints the tables of a verb's answer while the work goes on: the first time all of them, then
-    those of the study alone, since parts and settings stay as they are."""
-
-    def __init__(self, progress: Progress, verb: str, silent: bool) -> None:
-        self._progress, self._verb, self._silent = progress, verb, silent
-
-    def __call__(self, answer: Mapping[str, Any]) -> None:
-        if not self._silent:
-            with self._progress.aside():
-                _shown(answer, self._verb)
-        self._verb = "tolerance"
-
-
-def _shown(answer: Mapping[str, Any], verb: str) -> None:
+@verb("jobs")
+def simulate(
+    session: Session,
+    model: Source,
+    omega: Annotated[
+        list[float] | None,
+        option("--omega", "W", "Dimensionless frequency; may be repeated."),
+    ] = None,
+    frequency: Annotated[
+        list[str] | None,
+        option(
+            "--frequency",
+            "F",
+            'Frequency of a [mechanical] model, such as "10 Hz" or "62.8 rad/s"; may be repeated.',
+        ),
+    ] = None,
+    engine: Annotated[
+        Literal["model", "circuit", "ngspice"], option("--engine", None, "What simulates.")
+    ] = "model",
+    rung: Annotated[
+        Literal["ideal", "dynamic", "full"],
+        option("--rung", None, "The op-amps' model, with --engine ngspice."),
+    ] = "ideal",
+    starts: Annotated[
+        int, option("--starts", "N", "Initial states that are drawn: the attractors' shares.")
+    ] = DRAWN_STARTS,
+    seed: Seed = SEED,
+    plots: Annotated[
+        Path | None, option("--plots", "DIR", "Draw each response: PNG and SVG.")
+    ] = None,
+    overwrite: Annotated[
+        bool, option("--overwrite", None, "Replace pictures of the same names.")
+    ] = False,
+    **shared: Any,
+) -> Output:
+    """The responses: those that the model file wants, or what is reached from rest at --omega
+    and --frequency."""
     from designer.cli import tables
+    from designer.jobs import simulate_job
 
-    shows: dict[str, Callable[[Mapping[str, Any]], None]] = {
-        "run": tables.run,
-        "synthesise": tables.synthesised,
-        "tolerance": tables.tolerance,
-    }
-    shows[verb](answer)
+    result = simulate_job.simulate(
+        model,
+        omega or (),
+        frequency=frequency or (),
+        engine=engine,
+        rung=rung,
+        starts=starts,
+        seed=seed,
+        plots=plots,
+        overwrite=overwrite,
+        progress=session.progress,
+        **shared,
+    )
+
+    def show() -> None:
+        tables.simulated(result.answer)
+        if plots is not None:
+            tables.pictures(plots, result.answer["files"])
+
+    return Output(result.answer, show, result.satisfied)
+
+
+@verb("jobs", "overwrite", "resume")
+def search(
+    session: Session,
+    model: Source,
+    out: Out = None,
+    samples: Annotated[
+        int | None, option("--samples", "N", f"Fresh boards at the end [{SEARCH_SAMPLES}].")
+    ] = None,
+    wanted: Annotated[
+        float | None, option("--yield", "Y", "Cure this design folder: the yield wanted.")
+    ] = None,
+    budget: Annotated[float | None, option("--budget", "PRICE", "Of a cure, at most.")] = None,
+    without: Annotated[
+        list[str] | None,
+        option(
+            "--without",
+            "KIND",
+            f"Of a cure, no upgrade of this kind: {', '.join(KINDS)}; may be repeated.",
+        ),
+    ] = None,
+    rung: Annotated[
+        StudyRung | None,
+        option(
+            "--rung", None, "Of the final study; auto: by a trade that is in the folder. [auto]"
+        ),
+    ] = None,
+    seed: OwnSeed = None,
+    **shared: Any,
+) -> Output:
+    """The design of the highest yield for a model file; with --yield the cure of a folder."""
+    shared |= {"seed": seed, "progress": session.progress}
+    if not model.exists():
+        raise InputError(model, "MODEL|DIR", MISSING, "a model file or a design folder")
+    if model.is_dir():
+        _refuse({"--samples": samples, "--rung": rung}, "no such option with a design folder")
+        from designer.cli import tables
+        from designer.jobs import cure_job
+
+        cured = cure_job.cure(
+            model, yield_=wanted, budget=budget, without=without or (), out=out, **shared
+        )
+        return Output(cured.answer, lambda: tables.cured(cured.answer), cured.reached)
+    expected = "a design folder to cure; a model file gets its highest yield"
+    _refuse({"--yield": wanted, "--budget": budget, "--without": without}, expected)
+    from designer.cli import tables
+    from designer.jobs import search_job
+
+    outcome = search_job.search(model, out, samples=samples, rung=rung or "auto", **shared)
+    return _output(outcome, outcome.answer, tables.searched)
+
+
+def _refuse(given: Mapping[str, object], expected: str) -> None:
+    """InputError for the first of these options that has a value."""
+    for name, value in given.items():
+        if value not in (None, []):
+            raise InputError(None, name, value, expected)
+
+
+@verb("jobs", "overwrite", "resume")
+def trade(
+    session: Session,
+    model: Source,
+    out: Out = None,
+    boards: Annotated[
+        int | None,
+        option(
+            "--boards",
+            "N",
+            f"Boards of each response for the yield; 0: none [{TRADE_BOARDS}, or the folder's "
+            "own].",
+        ),
+    ] = None,
+    seed: OwnSeed = None,
+    **shared: Any,
+) -> Output:
+    """Time and error of every rung on this design, and the cheapest for each question."""
+    from designer.cli import tables
+    from designer.jobs import trade_job
+
+    result = trade_job.trade(
+        model, out, boards=boards, seed=seed, progress=session.progress, **shared
+    )
+    return Output(result.answer, lambda: tables.traded(result.answer))
+
+
+@verb("overwrite", "resume")
+def export(
+    session: Session,
+    model: Source,
+    out: Out = None,
+    deck: Annotated[
+        list[DeckName] | None,
+        option(
+            "--deck",
+            None,
+            "Instead: a deck for another simulator, with every response. May come twice.",
+        ),
+    ] = None,
+    **shared: Any,
+) -> Output:
+    """The KiCad project: schematic, placed board, netlist; or decks; into the design folder."""
+    from designer.cli import tables
+    from designer.jobs import export_job
+
+    result = export_job.export(
+        model, out, deck=[name.value for name in deck or ()], progress=session.progress, **shared
+    )
+    return Output(result.answer, lambda: tables.files(result.folder, result.reused))
+
+
+@verb()
+def rules(
+    session: Session,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A design folder.")],
+    board: Annotated[
+        Path | None, option("--board", "FILE", "Its board, a .kicad_pcb of KiCad 7 to 9.")
+    ] = None,
+    junit: Annotated[Path | None, option("--junit", "FILE", "Also write a JUnit report.")] = None,
+    **shared: Any,
+) -> Output:
+    """Design rules on a circuit and its board; exit status 1 where one fails."""
+    from designer.cli import tables
+    from designer.jobs import rules_job
+
+    result = rules_job.rules(folder, board=board, junit=junit, progress=session.progress, **shared)
+    return Output(result.answer, lambda: tables.rules(result.answer), result.passed)

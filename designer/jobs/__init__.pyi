@@ -2,10 +2,10 @@ from . import (
     bifurcation_job as bifurcation_job,
     cure_job as cure_job,
     export_job as export_job,
-    folder_numbers as folder_numbers,
     origin as origin,
     rules_job as rules_job,
     search_job as search_job,
+    simulate_job as simulate_job,
     study_job as study_job,
     synthesise_job as synthesise_job,
     trade_job as trade_job,
@@ -13,8 +13,8 @@ from . import (
 from .design_files import (
     load as load,
 )
-from .measured_job import (
-    measured_into as measured_into,
+from .job_outcome import (
+    JobOutcome as JobOutcome,
 )
 from .options import (
     Options as Options,
@@ -27,7 +27,4 @@ from .search_job import (
 )
 from .study_folder import (
     FolderStores as FolderStores,
-)
-from .synthesise_job import (
-    JobOutcome as JobOutcome,
 )

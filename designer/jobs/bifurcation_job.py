@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from designer.base.arrays import Array
-from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.manifest import StageName
+from designer.base.manifest import StageName, Stages
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.si_unit import Unit
@@ -27,6 +26,7 @@ from designer.bifurcations import (
     titles,
     window_ends,
 )
+from designer.bifurcations.basins import BasinPlan
 from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.store import GridStore, SweepStore, work_hash
 from designer.bifurcations.subject import Subject
@@ -34,15 +34,17 @@ from designer.bifurcations.sweep import SweepPlan
 from designer.catalog.catalog import load_catalog
 from designer.circuit.swept_board import BoardSubject
 from designer.jobs.bifurcation_request import Plan, Request, Swept, plan_of
+from designer.jobs.design_source import read_design, source
+from designer.jobs.options import Options
 from designer.jobs.origin import provenance
-from designer.jobs.synthesise_job import read_design, source
 from designer.model.model_file import ModelFile, read_model_file
 from designer.model.swept_model import ModelSubject
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = 1
+_Made = tuple[dict[str, Any], dict[str, Any], Callable[[], Any]]
+"""What is in the JSON object, what it cost, and what draws the picture."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class BifurcationResult:
 
 
 def bifurcation(
-    model: Path | str,
+    model: Path | str | ModelFile,
     *,
     over: str | None = None,
     from_: float | str | None = None,
@@ -125,84 +127,89 @@ def bifurcation(
         basins=basins,
         circuit=circuit,
         points=points,
-        jobs=jobs,
-        overwrite=overwrite,
-        resume=resume,
     )
-    said = Progress() if progress is None else progress
-    return BifurcationResult(
-        *answer(Path(model), request, None if out is None else Path(out), said)
-    )
+    options = Options(jobs=jobs, overwrite=overwrite, resume=resume)
+    options.check()
+    progress = Progress() if progress is None else progress
+    return _answer(model, request, None if out is None else Path(out), options, progress)
 
 
-def answer(
-    path: Path, request: Request, out: Path | None, progress: Progress
-) -> tuple[dict[str, Any], bool]:
-    """The JSON object of the verb, and whether it was there already.
-
-    Raises
-    ------
-    InputError : the options do not fit together, a value lies outside its domain, or a file stands
-        in the way. Nothing is written then.
-    """
+def _answer(
+    model: Path | str | ModelFile,
+    request: Request,
+    out: Path | None,
+    options: Options,
+    progress: Progress,
+) -> BifurcationResult:
+    """Nothing is written where the request is refused, or ``out`` is None."""
     began = time.perf_counter()
-    modelfile, subject = _subject(path, request, progress)
+    modelfile, subject = _subject(model, request, progress)
     plan = plan_of(request, subject, modelfile)
-    said = _provenance(modelfile, request, plan)
+    work = _Work(request, plan, modelfile, options.workers, progress)
     if out is None:
-        made, _ = _make(plan, request, modelfile.title, None, said, progress)
-        return {**made, "cost": {**made["cost"], "seconds": time.perf_counter() - began}}, False
+        answer, _ = _make(work, None)
+        answer["cost"]["seconds"] = time.perf_counter() - began
+        return BifurcationResult(answer, False)
     folder = Folder(out)
     inputs = {
         "model": modelfile.sha256,
         "version": __version__,
         "subject": "circuit" if request.circuit else "model",
-        "work": work_hash(_decides(plan, request)),
+        "work": work.hash,
     }
     if request.circuit:
         inputs["catalogue"] = load_catalog().hash
-    wanted: dict[StageName, Any] = {request.kind: (inputs, _names(request.kind, plan))}
-    todo = folder.decide(wanted, overwrite=request.overwrite, resume=request.resume)
+    kind = request.kind
+    stages: Stages = {kind: (inputs, _names(kind, plan))}
+    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
-        kept = None if folder.manifest is None else folder.manifest.provenance
-        folder.begin(wanted, kept or said)
-        made, figure = _make(plan, request, modelfile.title, folder, said, progress)
-        progress.stage("pictures")
-        for name, content in _drawn(request.kind, figure()).items():
-            folder.write(name, content)
-        made["cost"]["seconds"] = time.perf_counter() - began
-        folder.write(f"{request.kind}.json", dumps(made))
-        folder.finish(request.kind)
-    return folder.json(f"{request.kind}.json"), not todo
+        before = None if folder.manifest is None else folder.manifest.provenance
+        with folder.working(stages, before or work.provenance):
+            answer, figure = _make(work, folder)
+            progress.stage("pictures")
+            for name, content in _drawn(kind, figure()).items():
+                folder.write(name, content)
+            answer["cost"]["seconds"] = time.perf_counter() - began
+            folder.write(f"{kind}.json", dumps(answer))
+    return BifurcationResult(folder.json(f"{kind}.json"), not todo)
 
 
 # ---------------------------------------------------------------------------------------------
 
 
-def _subject(path: Path, request: Request, progress: Progress) -> tuple[ModelFile, Swept]:
-    if path.is_dir():
+def _subject(
+    model: Path | str | ModelFile, request: Request, progress: Progress
+) -> tuple[ModelFile, Swept]:
+    if not isinstance(model, ModelFile) and Path(model).is_dir():
         if request.circuit:
-            made = read_design(path, progress=progress)
+            made = read_design(model, progress=progress)
             return made.modelfile, BoardSubject(made.design)
-        modelfile, _ = source(path, path)
+        modelfile, _ = source(model, model)
     else:
-        modelfile = read_model_file(path)
+        modelfile = model if isinstance(model, ModelFile) else read_model_file(Path(model))
         if request.circuit:
-            raise InputError(
-                path, "--circuit", "a model file", "a design folder (designer synthesise)"
-            )
+            expected = "a design folder (designer synthesise)"
+            raise InputError(modelfile.source, "--circuit", "a model file", expected)
     return modelfile, ModelSubject(modelfile.model, mechanical=modelfile.mechanical)
 
 
-def _decides(plan: Plan, request: Request) -> dict[str, Any]:
-    asked = {"points": request.points} if request.kind == "sweep" else {}
-    return {"kind": request.kind, **plan.as_dict(), **asked}
+class _Work:
+    """What is to be computed, and what decides it."""
 
-
-def _provenance(modelfile: ModelFile, request: Request, plan: Plan) -> dict[str, Any]:
-    settings = {"bifurcation": _decides(plan, request)}
-    seed = 0 if request.starts is not None else None
-    return provenance(modelfile, load_catalog().hash, seed=seed, settings=settings)
+    def __init__(
+        self, request: Request, plan: Plan, modelfile: ModelFile, jobs: int, progress: Progress
+    ) -> None:
+        self.request, self.plan, self.jobs, self.progress = request, plan, jobs, progress
+        self.title = modelfile.title
+        asked = {"points": request.points} if request.kind == "sweep" else {}
+        decides = {"kind": request.kind, **plan.as_dict(), **asked}
+        self.hash = work_hash(decides)
+        self.provenance = provenance(
+            modelfile,
+            load_catalog().hash,
+            seed=0 if request.starts is not None else None,
+            settings={"bifurcation": decides},
+        )
 
 
 def _names(kind: StageName, plan: Plan) -> list[str]:
@@ -218,81 +225,81 @@ def _names(kind: StageName, plan: Plan) -> list[str]:
     return [*blocks, f"{kind}.json", f"{kind}.png", f"{kind}.svg"]
 
 
-def _make(
-    plan: Plan,
-    request: Request,
-    name: str,
-    folder: Folder | None,
-    said: Mapping[str, Any],
-    progress: Progress,
-) -> tuple[dict[str, Any], Callable[[], Any]]:
+def _make(work: _Work, folder: Folder | None) -> tuple[dict[str, Any], Callable[[], Any]]:
     """The JSON object, and what draws the picture."""
+    plan = work.plan
+    if isinstance(plan, SweepPlan):
+        body, cost, draw = _sweep(work, plan, folder)
+    else:
+        body, cost, draw = _grid(work, plan, folder)
+    head = {"format": 1, "kind": work.request.kind}
+    return plain({**head, **body, "provenance": work.provenance, "cost": cost}), draw
+
+
+def _sweep(work: _Work, plan: SweepPlan, folder: Folder | None) -> _Made:
     from designer.report import bifurcation_plots
 
-    jobs = cores() if request.jobs is None else request.jobs
-    work = work_hash(_decides(plan, request))
-    head = {"format": FORMAT, "kind": request.kind}
-    tail = {"provenance": said}
-    if isinstance(plan, SweepPlan):
-        store = None
-        if folder is not None:
-            vouch = folder.vouches
-            store = SweepStore(folder.path, plan.parameter, work, said, progress.note, vouch)
-        blocks = sum(len(plan.blocks(t)) for t in plan.tracks)
-        made = sweep.run(plan, jobs, store, progress.stage(f"sweep over {plan.parameter}", blocks))
-        si = plan.subject.si.get(plan.parameter)
-        points = []
-        if request.points:
-            count = len(window_ends.windows(made))
-            step = progress.stage("bifurcation points", count)
-            points = window_ends.locate(made, jobs, step)
-        unit = plan.subject.units.get(plan.parameter, "")
-        symbol = titles.NAMES.get(plan.parameter, plan.parameter)
-        body = {
-            "parameter": plan.parameter,
-            "unit": unit,
-            **({} if si is None else {"si_unit": si.name}),
-            "tracks": list(plan.tracks),
-            "steps": len(plan.values),
-            "windows": [_with_si(w.as_dict(), si) for w in made.windows],
-            "points": [
-                {
-                    **_with_si(p.as_dict(), si),
-                    "caption": point_captions.caption(p, symbol, unit),
-                    "changes": [c.as_dict() for c in captions.changes(made, p)],
-                }
-                for p in points
-            ],
-        }
-        cost = {"periods": made.periods}
-        marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
-        return plain({**head, **body, **tail, "cost": cost}), lambda: bifurcation_plots.diagram(
-            made, marks, name
-        )
-    grid = None
+    progress, jobs, name = work.progress, work.jobs, plan.parameter
+    store = None
     if folder is not None:
-        axes = (request.kind, plan.x, plan.xs, plan.y, plan.ys)
-        grid = GridStore(folder.path, *axes, work, said, progress.note, folder.vouches)
-    step = progress.stage(f"{request.kind} over {plan.x} and {plan.y}", len(plan.ys))
+        store = SweepStore(
+            folder.path, name, work.hash, work.provenance, progress.note, folder.vouches
+        )
+    blocks = sum(len(plan.blocks(track)) for track in plan.tracks)
+    swept = sweep.run(plan, jobs, store, progress.stage(f"sweep over {name}", blocks))
+    points = []
+    if work.request.points:
+        step = progress.stage("bifurcation points", len(window_ends.windows(swept)))
+        points = window_ends.locate(swept, jobs, step)
+    si, unit = plan.subject.si.get(name), plan.subject.units.get(name, "")
+    symbol = titles.NAMES.get(name, name)
     body = {
+        "parameter": name,
+        "unit": unit,
+        **({} if si is None else {"si_unit": si.name}),
+        "tracks": list(plan.tracks),
+        "steps": len(plan.values),
+        "windows": [_with_si(w.as_dict(), si) for w in swept.windows],
+        "points": [
+            {
+                **_with_si(p.as_dict(), si),
+                "caption": point_captions.caption(p, symbol, unit),
+                "changes": [c.as_dict() for c in captions.changes(swept, p)],
+            }
+            for p in points
+        ],
+    }
+    marks = bifurcation_plots.marks(points, float(plan.values[0]), float(plan.values[-1]))
+    cost = {"periods": swept.periods}
+    return body, cost, lambda: bifurcation_plots.diagram(swept, marks, work.title)
+
+
+def _grid(work: _Work, plan: MapPlan | BasinPlan, folder: Folder | None) -> _Made:
+    from designer.report import bifurcation_plots
+
+    kind, progress, jobs = work.request.kind, work.progress, work.jobs
+    store = None
+    if folder is not None:
+        axes = (kind, plan.x, plan.xs, plan.y, plan.ys)
+        store = GridStore(
+            folder.path, *axes, work.hash, work.provenance, progress.note, folder.vouches
+        )
+    step = progress.stage(f"{kind} over {plan.x} and {plan.y}", len(plan.ys))
+    body: dict[str, Any] = {
         "x": _grid_axis(plan.subject, plan.x, plan.xs),
         "y": _grid_axis(plan.subject, plan.y, plan.ys),
     }
     if isinstance(plan, MapPlan):
-        mapped = parameter_map.run(plan, jobs, grid, step)
+        mapped = parameter_map.run(plan, jobs, store, step)
         body["counts"] = mapped.counts
-        return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.parameter_map(
-            mapped, name
-        )
-    found = basins.run(plan, jobs, grid, step)
+        return body, {}, lambda: bifurcation_plots.parameter_map(mapped, work.title)
+    plane = basins.run(plan, jobs, store, step)
     body |= {
         "at": plan.changes,
-        "attractors": [dict(a.__dict__) for a in found.attractors],
-        "cells": [c.attractor for c in found.cells],
+        "attractors": [dict(a.__dict__) for a in plane.attractors],
+        "cells": [c.attractor for c in plane.cells],
     }
-    return plain({**head, **body, **tail, "cost": {}}), lambda: bifurcation_plots.basins(
-        found, name
-    )
+    return body, {}, lambda: bifurcation_plots.basins(plane, work.title)
 
 
 def _grid_axis(subject: Subject, name: str, values: Array) -> dict[str, Any]:

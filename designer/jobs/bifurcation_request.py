@@ -68,12 +68,6 @@ class Request:
     """Whether the circuit is swept, and not the model."""
     points: bool = True
     """Whether bifurcation points are sought."""
-    jobs: int | None = None
-    """Workers; None for one a core."""
-    overwrite: bool = False
-    """Whether files that the manifest lists may be replaced."""
-    resume: bool = False
-    """Whether unfinished work goes on."""
 
     @property
     def kind(self) -> StageName:
@@ -166,8 +160,6 @@ def _check_options(request: Request) -> None:
     for option, count in (("--periods", request.periods), ("--keep", request.keep)):
         if count is not None and count > MOST_PERIODS:
             raise InputError(None, option, count, f"at most {MOST_PERIODS}")
-    if request.jobs is not None:
-        at_least("--jobs", request.jobs, 1)
 
 
 def _axis(

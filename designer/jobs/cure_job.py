@@ -19,7 +19,7 @@ from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import MISSING, InputError
 from designer.base.frames import flat_frame, table_html
 from designer.base.keyed_store import Lines
-from designer.base.manifest import StageName
+from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.schema import one_of
@@ -29,10 +29,17 @@ from designer.centering.cure_result_json import cure_json, front_csv
 from designer.centering.cure_search import find_cure
 from designer.centering.cure_upgrade import Upgrades
 from designer.check.synthesis_result import Synthesis
-from designer.jobs import design_files, folder_numbers, rung_choice
-from designer.jobs.options import Options
+from designer.jobs import folder_numbers, rung_choice
+from designer.jobs.design_source import (
+    design_inputs,
+    design_stage,
+    grade_inputs,
+    made_from,
+    read_design,
+)
+from designer.jobs.options import Options, given
 from designer.jobs.origin import provenance
-from designer.jobs.synthesise_job import design_inputs, grade_inputs, made_from, read_design
+from designer.jobs.stage_runner import write_design
 from designer.model.model_file import naming, need_responses
 from designer.synthesis.tie_break import SOLVER
 
@@ -87,20 +94,26 @@ def cure(
 ) -> CureResult:
     """The verb ``search --yield``: the cheapest cure of a design folder, which is written there.
 
-    yield_, budget, without, out : as ``cure_into``. What is not given is that of the folder's own
+    yield_ : of every wanted response, as built (trimmed where the cure says so): the lower end of
+    its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by the
+    catalogue's price classes. without : kinds of upgrades that are not wanted; a hyphen may stand
+    for a space. out : folder for the cured design. What is not given is that of the folder's own
     cure, if there is one; with ``overwrite`` its budget and its kinds are not taken over.
 
     Raises
     ------
-    InputError : as ``cure_into``, or no yield is given and the folder has no cure.
+    InputError : no yield is given and the folder has no cure; the yield or the budget is none; an
+        unknown kind; the folder is no design folder, or holds a cure of other inputs, or ``out``
+        holds a design, and nothing is said about what to do.
     """
     path = Path(folder)
     limits = () if overwrite else ("budget", "without")
     known: dict[str, Any] = {}
     if is_design_folder(path):
         known = folder_numbers.own(Folder(path), "cure", ("yield", "seed"), limits)
-    given = {"yield": yield_, "budget": budget, "without": without or None, "seed": seed}
-    asked = known | {name: value for name, value in given.items() if value is not None}
+    asked = known | given(
+        {"yield": yield_, "budget": budget, "without": without or None, "seed": seed}
+    )
     if "yield" not in asked:
         raise InputError(None, "--yield", MISSING, "the yield that the cure shall reach")
     return cure_into(
@@ -115,7 +128,7 @@ def cure(
 
 
 def cure_into(
-    folder: Path,
+    path: Path,
     *,
     target: float,
     budget: float | None = None,
@@ -124,32 +137,20 @@ def cure_into(
     options: Options | None = None,
     progress: Progress | None = None,
 ) -> CureResult:
-    """Find the cheapest cure of the design in ``folder``, write it there, and say so.
-
-    target : yield of every wanted response, as built (trimmed where the cure says so): the lower
-    end of its 95 % interval on fresh boards. budget : most that the upgrades may cost, in euro by
-    the catalogue's price classes. out : folder for the cured design. without : kinds of upgrades
-    that are not wanted; a hyphen may stand for a space. options : seed, jobs, overwrite, resume.
-
-    Raises
-    ------
-    InputError : the target or the budget is none; an unknown kind; the folder is no design folder,
-        or holds a cure of other inputs, or ``out`` holds a design, and the options do not say what
-        to do.
-    """
+    """As ``cure``, with nothing taken over from an earlier one. target : the yield."""
     options = Options() if options is None else options
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     options.check()
     unwanted = _checked(target, budget, without)
     if out is not None:
-        if out.resolve() == folder.resolve():
+        if out.resolve() == path.resolve():
             raise InputError(None, "--out", str(out), "another folder than the one that is cured")
         Folder(out)  # refuses a place where something else stands
-    base = read_design(folder, progress=said)
+    base = read_design(path, progress=progress)
     need_responses(base.modelfile)
-    place = Folder(folder)
+    folder = Folder(path)
     inputs = {
-        "design": made_from(place),
+        "design": made_from(folder),
         "catalogue": base.catalog.hash,
         "rules": RULES,
         "yield": target,
@@ -158,65 +159,72 @@ def cure_into(
         "seed": options.seed,
         **grade_inputs(base.modelfile, base.catalog),
     }
-    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {
-        "cure": (inputs, [CURE, STUDIES, *FRONT])
-    }
-    todo = place.decide(wanted, overwrite=options.overwrite, resume=options.resume)
-    if not todo:
-        answer = place.json(CURE)
+    stages: Stages = {"cure": (inputs, [CURE, STUDIES, *FRONT])}
+    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
+    if todo:
         if out is not None:
-            _write_design(base, answer, out, options, said)
-        return CureResult(answer, bool(answer["reached"]), True)
+            _check_room(base, out, options)
+        rung = rung_choice.choose(folder)
+        if rung.rung == "ngspice":
+            progress.note(
+                f"{rung.reason}; a cure is decided on the exact circuit all the same: ask ngspice "
+                "about the cured design (tolerance --rung ngspice)"
+            )
+        _find_and_write(folder, stages, base, target, budget, unwanted, options, progress)
+    answer = folder.json(CURE)
     if out is not None:
-        _check_room(base, out, options)
-    rung = rung_choice.choose(place)
-    if rung.rung == "ngspice":
-        said.note(
-            f"{rung.reason}; a cure is decided on the exact circuit all the same: ask ngspice "
-            "about the cured design (tolerance --rung ngspice)"
-        )
+        _write_design(base, answer, out, options, progress)
+    return CureResult(answer, bool(answer["reached"]), not todo)
+
+
+def _find_and_write(
+    folder: Folder,
+    stages: Stages,
+    base: Synthesis,
+    target: float,
+    budget: float | None,
+    unwanted: frozenset[str],
+    options: Options,
+    progress: Progress,
+) -> None:
+    """Find the cheapest cure of the design ``base`` and write it into its folder."""
     began = time.perf_counter()
     known = {}
-    if place.manifest and STUDIES in place.manifest.files:
-        known = _LINES.load(place / STUDIES, said.note, place.vouches)
-    provenance_ = provenance(
+    if folder.manifest and STUDIES in folder.manifest.files:
+        known = _LINES.load(folder / STUDIES, progress.note, folder.vouches)
+    origin = provenance(
         base.modelfile, base.catalog.hash, seed=options.seed, settings={"highs": SOLVER}
     )
-    place.begin(wanted, provenance_)
-    guard = place.watch()
+    with folder.working(stages, origin):
+        guard = folder.watch()
 
-    def save(studies: dict[str, Any]) -> None:
+        def save(studies: dict[str, Any]) -> None:
+            guard()
+            folder.write(STUDIES, _LINES.text(studies["studies"]))
+
+        with naming(base.modelfile):
+            best = find_cure(
+                base,
+                target,
+                budget=budget,
+                trim=base.modelfile.tuning.offset,
+                without=unwanted,
+                seed=options.seed,
+                jobs=options.jobs,
+                book=Book(known, save),
+                progress=progress,
+            )
+        progress.stage("report of the cure")
+        from designer.base.figure_style import to_png, to_svg
+        from designer.centering.cure_plots import front_chart  # matplotlib is not needed before
+
+        chart = front_chart(best)
         guard()
-        place.write(STUDIES, _LINES.text(studies["studies"]))
-
-    with naming(base.modelfile):
-        found = find_cure(
-            base,
-            target,
-            budget=budget,
-            trim=base.modelfile.tuning.offset,
-            without=unwanted,
-            seed=options.seed,
-            jobs=options.jobs,
-            book=Book(known, save),
-            progress=said,
-        )
-    said.stage("report of the cure")
-    from designer.base.figure_style import to_png, to_svg
-    from designer.centering.cure_plots import front_chart  # matplotlib is not needed before this
-
-    answer = cure_json(found, provenance_, time.perf_counter() - began)
-    guard()
-    place.write(CURE, dumps(answer))
-    place.write(FRONT[0], front_csv(found))
-    chart = front_chart(found)
-    place.write(FRONT[1], to_png(chart))
-    place.write(FRONT[2], to_svg(chart))
-    place.finish("cure")
-    answer = place.json(CURE)
-    if out is not None:
-        _write_design(base, answer, out, options, said)
-    return CureResult(answer, found.reached, False)
+        folder.write(CURE, dumps(cure_json(best, origin, time.perf_counter() - began)))
+        table_name, png_name, svg_name = FRONT
+        folder.write(table_name, front_csv(best))
+        folder.write(png_name, to_png(chart))
+        folder.write(svg_name, to_svg(chart))
 
 
 def _check_room(base: Synthesis, out: Path, options: Options) -> None:
@@ -232,26 +240,23 @@ def _check_room(base: Synthesis, out: Path, options: Options) -> None:
         expected = "a folder without a design, or --overwrite to replace it by the cured one"
         raise InputError(None, "--out", str(out), expected)
     # The cured design's files have the names of this one's.
-    folder.decide(design_inputs(base.modelfile, base.catalog), overwrite=True, resume=False)
+    inputs = design_inputs(base.modelfile, base.catalog)
+    folder.decide(design_stage(base.modelfile, inputs), overwrite=True, resume=False)
 
 
 def _write_design(
-    base: Synthesis, answer: dict[str, Any], out: Path, options: Options, said: Progress
+    base: Synthesis, answer: dict[str, Any], out: Path, options: Options, progress: Progress
 ) -> None:
     """The cured design as a design folder; nothing where there is no cure."""
     if not answer["reached"]:
-        said.note("no cure: no design is written")
+        progress.note("no cure: no design is written")
         return
-    said.stage("cured design")
+    progress.stage("cured design")
     made = cured(base, Upgrades.of_dict(answer["upgrades"]))
     folder = Folder(out)
-    wanted = design_inputs(made.modelfile, made.catalog)
-    if not folder.decide(wanted, overwrite=options.overwrite, resume=options.resume):
-        return
-    files = design_files.texts(made)
-    folder.begin(wanted, design_files.design_provenance(made))
-    design_files.write(folder, made, files)
-    folder.finish("design")
+    stages = design_stage(made.modelfile, design_inputs(made.modelfile, made.catalog))
+    if folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
+        write_design(folder, made, stages, options, progress)
 
 
 def _checked(target: float, budget: float | None, without: Collection[str]) -> frozenset[str]:

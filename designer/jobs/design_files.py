@@ -40,12 +40,8 @@ SETUP = "setup.csv"
 
 
 def check(modelfile: ModelFile, catalog: Catalog) -> None:
-    """Refuse what no design folder could be written for, before any part is chosen.
-
-    Raises
-    ------
-    InputError, Unreachable : see ``board_check.check_board``.
-    """
+    """Refuse what no design folder could be written for, before any part is chosen
+    (``board_check.check_board``)."""
     with naming(modelfile):
         check_board(modelfile, catalog)
 
@@ -62,14 +58,14 @@ def texts(made: Synthesis) -> dict[str, str]:
     }
 
 
-def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> dict[str, Any]:
+def write(folder: Folder, made: Synthesis, files: Mapping[str, str]) -> None:
+    """Write the stage. files : its ``texts``."""
     for name, text in files.items():
         folder.write(name, text)
     folder.write(board_files.PICTURE, board_files.picture(made))
     if made.modelfile.measured is not None:
         folder.write(MEASURED, made.modelfile.measured.content)
     folder.write(DESIGN, dumps(answer(made)))
-    return folder.json(DESIGN)
 
 
 def renew_bills(folder: Folder, made: Synthesis) -> None:
@@ -101,7 +97,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
 
     Nothing is chosen again; the errors are computed afresh and must be those that were written.
     """
-    said, file = folder.json(DESIGN), folder / DESIGN
+    document, file = folder.json(DESIGN), folder / DESIGN
     model, spec = modelfile.model, modelfile.circuit
     found = find(model, modelfile.responses)
     catalog = modelfile.choices(catalog)
@@ -109,37 +105,37 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
         opamp = catalog.opamp(spec.opamp, spec.supply)
     system = model.second_order()
     with reading(file, "the design of this folder's model", "parts"):
-        values = {name: _size(value, file, name) for name, value in said["parts"].items()}
+        values = {name: _size(value, file, name) for name, value in document["parts"].items()}
         circuit = build.build(
             terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
             values,
             opamp,
-            supply=float(said["circuit"]["supply"]),
-            saturation=float(said["circuit"]["saturation"]),
+            supply=float(document["circuit"]["supply"]),
+            saturation=float(document["circuit"]["saturation"]),
             clearance="A" if model.k0 > 0.0 else None,
             zone=zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
-            composites=said.get("composites", {}),
+            composites=document.get("composites", {}),
         )
-        gain, bias = (float(said["circuit"][k]) for k in ("gain", "bias"))
+        gain, bias = (float(document["circuit"][k]) for k in ("gain", "bias"))
         circuit = replace(circuit, gain=gain, bias=bias)
-        held = peaks(model, found).states
-        volts = np.array(list(said["scales"]["volts"].values()), dtype=float)
-        swing = (float((volts * held).max()), held)
+        largest = peaks(model, found).states
+        volts = np.array(list(document["scales"]["volts"].values()), dtype=float)
+        swing = (float((volts * largest).max()), largest)
         errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
-        if abs(errors.max_error - float(said["max_error"])) > 1e-9:
+        if abs(errors.max_error - float(document["max_error"])) > 1e-9:
             raise ValueError("parts and max_error do not belong together")
-        kept = said["conditions"]
-        told = {key: kept.get(key, ()) for key in ("checked", "at_limit", "binding")}
+        conditions = document["conditions"]
+        listed = {key: conditions.get(key, ()) for key in ("checked", "at_limit", "binding")}
         design = Design(
             model=model,
             circuit=circuit,
             errors=errors,
-            certificate=Certificate(**said["certificate"]),
-            conditions={k: float(v) for k, v in kept.items() if k not in told},
-            solver=dict(said["solver"]),
-            seconds=float(said["cost"]["synthesis_seconds"]),
-            checks=tuple(ConditionCheck(**check) for check in told["checked"]),
-            binding=dict(told["binding"]),
+            certificate=Certificate(**document["certificate"]),
+            conditions={k: float(v) for k, v in conditions.items() if k not in listed},
+            solver=dict(document["solver"]),
+            seconds=float(document["cost"]["synthesis_seconds"]),
+            checks=tuple(ConditionCheck(**check) for check in listed["checked"]),
+            binding=dict(listed["binding"]),
         )
     return Synthesis(modelfile, catalog, found, design)
 

@@ -1,23 +1,36 @@
-"""The verb ``export``: the KiCad project of a design."""
+"""The verb ``export``: the KiCad project of a design, or decks for other simulators.
+
+Both are stages of the design folder: a stage for each deck, so that one may come later.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from designer.base.design_folder import DESIGN, Folder
+from designer.base.design_folder import DESIGN
 from designer.base.frames import table_html
+from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
 from designer.base.version import __version__
-from designer.catalog.catalog import load_catalog
-from designer.jobs import kicad_files, synthesise_job
-from designer.jobs.deck_job import export_decks
-from designer.jobs.design_files import load
+from designer.check.deck_notes import simulator_notes
+from designer.check.deck_runs import response_runs
+from designer.check.synthesis_result import Synthesis
+from designer.jobs import kicad_files
+from designer.jobs.design_files import design_provenance
+from designer.jobs.design_source import made_from, source
 from designer.jobs.options import Options
+from designer.jobs.stage_runner import StageRunner
 from designer.model.model_file import ModelFile
-from designer.spice.simulator_decks import Dialect
+from designer.spice import simulator_decks
+from designer.spice.simulator_decks import Dialect, file_name
+
+DECK_STAGES: Mapping[Dialect, StageName] = {
+    "ltspice": "deck-ltspice",
+    "portable": "deck-portable",
+}
 
 
 @dataclass(frozen=True)
@@ -41,7 +54,7 @@ class ExportResult:
 
 
 def export(
-    model: Path | str,
+    model: Path | str | ModelFile,
     out: Path | str | None = None,
     *,
     deck: Sequence[Dialect] = (),
@@ -56,40 +69,23 @@ def export(
 
     Raises
     ------
-    InputError : as ``export_into`` and ``export_decks``.
+    InputError : a footprint that is not known here, files that somebody has changed, or decks of
+        another design or version.
     """
     options = Options(overwrite=overwrite, resume=resume)
-    said = Progress() if progress is None else progress
-    place = None if out is None else Path(out)
-    modelfile, folder = synthesise_job.source(Path(model), place)
+    progress = Progress() if progress is None else progress
+    modelfile, folder = source(model, out)
     if deck:
-        answer, reused = export_decks(modelfile, folder, deck, options, said)
-    else:
-        answer, reused = export_into(modelfile, folder, options, said)
-    return ExportResult(answer, folder, reused)
+        return export_decks(modelfile, folder, deck, options, progress)
+    return export_into(modelfile, folder, options, progress)
 
 
 def export_into(
     modelfile: ModelFile, out: Path, options: Options, progress: Progress
-) -> tuple[dict[str, Any], bool]:
-    """Write the project into a design folder, which is made where there is none.
-
-    Returns the JSON object, with ``files`` inside the folder, and whether all was there already.
-
-    Raises
-    ------
-    InputError : a footprint that is not known here, or files that somebody has changed.
-    """
-    options.check()
-    catalog, folder = load_catalog(), Folder(out)
-    design = synthesise_job.standing_inputs(folder, modelfile, catalog, progress)
-    reused = not folder.decide(design, overwrite=options.overwrite, resume=options.resume)
-    if not reused:
-        synthesise_job.synthesise_into(modelfile, out, options, progress)
-        folder = Folder(out)
-    made = load(folder, modelfile, catalog)
-    files = kicad_files.texts(made)
-    inputs = {**synthesise_job.made_from(folder), "catalogue": catalog.hash, "version": __version__}
+) -> ExportResult:
+    """Write the project into a design folder, which is made where there is none."""
+    runner, made, reused = _design(modelfile, out, options, progress)
+    folder, files, inputs = runner.folder, kicad_files.texts(made), _inputs(runner)
     if folder.state(kicad_files.STAGE, inputs) == "other" and not options.overwrite:
         # The project is of its time, as the design is: it may hold a board that somebody routed.
         assert folder.manifest is not None
@@ -97,10 +93,65 @@ def export_into(
         listed = folder.manifest.files.items()
         files = {name: "" for name, (stage, _) in listed if stage == kicad_files.STAGE}
         progress.note("so does its KiCad project: --overwrite makes it anew, with what is here")
-    stage = kicad_files.wanted(inputs, files)
-    todo = folder.decide(stage, overwrite=options.overwrite, resume=options.resume)
+    stages = kicad_files.stages(inputs, files)
+    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
     if todo:
         progress.stage("KiCad project")
         kicad_files.write(folder, made, inputs, files)
-    said = folder.json(DESIGN)["provenance"]
-    return {"format": 1, "files": sorted(files), "provenance": said}, reused and not todo
+    return _result(runner, list(files), reused and not todo)
+
+
+def export_decks(
+    modelfile: ModelFile,
+    out: Path,
+    dialects: Sequence[Dialect],
+    options: Options,
+    progress: Progress,
+) -> ExportResult:
+    """Write decks into a design folder, which is made where there is none."""
+    runner, made, reused = _design(modelfile, out, options, progress)
+    folder, inputs = runner.folder, _inputs(runner)
+    names = {DECK_STAGES[dialect]: (dialect, file_name(dialect)) for dialect in dialects}
+    stages: Stages = {stage: (dict(inputs), [name]) for stage, (_, name) in names.items()}
+    todo = folder.decide(stages, overwrite=options.overwrite, resume=options.resume)
+    if todo:
+        progress.stage("decks")
+        texts = {name: deck_text(made, dialect) for dialect, name in names.values()}
+        with folder.working({stage: stages[stage] for stage in todo}, design_provenance(made)):
+            for stage in todo:
+                _, name = names[stage]
+                folder.write(name, texts[name])
+    return _result(runner, [name for _, name in names.values()], reused and not todo)
+
+
+def deck_text(made: Synthesis, dialect: Dialect) -> str:
+    """A deck of a design, with every response that is wanted of it."""
+    runs = response_runs(made)
+    return simulator_decks.write(
+        dialect,
+        made.design.circuit,
+        runs,
+        title=made.modelfile.title,
+        notes=simulator_notes(made, dialect, runs),
+    )
+
+
+def _design(
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress
+) -> tuple[StageRunner, Synthesis, bool]:
+    """The folder with its design, and whether the design was there already."""
+    runner = StageRunner(modelfile, out, options, progress)
+    reused = not runner.decide()
+    return runner, runner.design(), reused
+
+
+def _inputs(runner: StageRunner) -> dict[str, Any]:
+    """What decides the files that are exported now."""
+    here = {"catalogue": runner.catalog.hash, "version": __version__}
+    return {**made_from(runner.folder), **here}
+
+
+def _result(runner: StageRunner, files: Sequence[str], reused: bool) -> ExportResult:
+    origin = runner.folder.json(DESIGN)["provenance"]
+    answer = {"format": 1, "files": sorted(files), "provenance": origin}
+    return ExportResult(answer, runner.folder.path, reused)

@@ -2,6 +2,8 @@
 
 A verb on a folder goes on with the folder's own seed, samples and limits. What the user gives
 stands, and where that differs from what is there, ``Folder.decide`` refuses it as it always does.
+In these functions ``given`` is what the user says, by the names of ``Options``: None where nothing
+is said, and without a name that the verb does not have.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from designer.model.model_file import ModelFile
 def own(
     folder: Folder, stage: StageName, names: Collection[str], limits: Collection[str] = ()
 ) -> dict[str, Any]:
-    """The inputs of these names that a stage of the folder was made with, by name.
+    """The inputs of these names that a stage of the folder was made with.
 
     names : numbers that the stage always has. limits : inputs that may be None or empty, which
     means that there is no limit; one without a limit is left out. Empty where there is no such
@@ -29,41 +31,60 @@ def own(
     """
     stages = {} if folder.manifest is None else folder.manifest.stages
     inputs = stages[stage].inputs if stage in stages else {}
-    found = {name: inputs[name] for name in names if name in inputs}
-    return found | {name: inputs[name] for name in limits if inputs.get(name) not in (None, [])}
+    numbers = {name: inputs[name] for name in names if name in inputs}
+    return numbers | {name: inputs[name] for name in limits if inputs.get(name) not in (None, [])}
 
 
-def goes_on(model: Path, out: Path, resume: bool) -> bool:
+def goes_on(model: Path | ModelFile, out: Path, resume: bool) -> bool:
     """Whether a verb goes on with what the folder ``out`` has: it is the verb's argument, or its
     work is to be resumed."""
-    return resume or (model.is_dir() and model.resolve() == out.resolve())
+    argument = isinstance(model, Path) and model.is_dir() and model.resolve() == out.resolve()
+    return resume or argument
 
 
 def of_study(
-    model: Path, out: Path, modelfile: ModelFile, options: Options, given: Mapping[str, Any]
+    model: Path | ModelFile,
+    out: Path,
+    modelfile: ModelFile,
+    options: Options,
+    given: Mapping[str, Any],
 ) -> Options:
-    """The options with the numbers of the folder's own study where the user gave none.
+    """The options with the numbers of the folder's own study.
 
     A study that is new has as many samples as the model file lists measured boards, if it does.
-    model : the verb's argument; out : the folder. given : what the command line says, by the names
-    of ``Options``; None where it says nothing, and without a name that the verb does not have.
-    With ``overwrite`` a width in ``until`` is not taken over, for nothing else could take it away.
+    model : the verb's argument; out : the folder. With ``overwrite`` a width in ``until`` is not
+    taken over, for nothing else could take it away.
     """
-    listed = modelfile.measured
-    if listed is not None and listed.labels and given["samples"] is None:
-        options = replace(options, samples=len(listed.labels))
+    options = of_list(modelfile, options, given)
     if not goes_on(model, out, options.resume):
         return options
     limits = () if options.overwrite else ("until",)
-    taken = own(Folder(out), "study", ("samples", "seed", "layers"), limits)
-    return _with(options, taken, given)
+    return _with(options, own(Folder(out), "study", ("samples", "seed", "layers"), limits), given)
+
+
+def of_list(modelfile: ModelFile, options: Options, given: Mapping[str, Any]) -> Options:
+    """The options with as many samples as the model file lists measured boards, if it does."""
+    listed = modelfile.measured
+    if listed is not None and listed.labels and given["samples"] is None:
+        return replace(options, samples=len(listed.labels))
+    return options
 
 
 def of_built(path: Path, options: Options, given: Mapping[str, Any]) -> Options:
-    """The same of the study of built boards in a design folder."""
+    """The options with the numbers of the study of built boards in a design folder."""
     if not is_design_folder(path):
         return options
     return _with(options, own(Folder(path), "measured", ("seed", "layers")), given)
+
+
+def of_search(out: Path, options: Options, given: Mapping[str, Any]) -> Options:
+    """The options with the numbers of the search that is resumed in the folder ``out``."""
+    if not options.resume:
+        return options
+    folder = Folder(out)
+    return _with(
+        options, own(folder, "search", ("seed",)) | own(folder, "study", ("samples",)), given
+    )
 
 
 def _with(options: Options, taken: dict[str, Any], given: Mapping[str, Any]) -> Options:
@@ -75,12 +96,3 @@ def _with(options: Options, taken: dict[str, Any], given: Mapping[str, Any]) -> 
             taken["rung"] = "exact"
     options = replace(options, **{k: v for k, v in taken.items() if given.get(k, k) is None})
     return options if options.blamed else replace(options, blame_budget=None)
-
-
-def of_search(out: Path, options: Options, given: Mapping[str, Any]) -> Options:
-    """The same of the search of a model file that is resumed in the folder ``out``."""
-    if not options.resume:
-        return options
-    folder = Folder(out)
-    taken = own(folder, "search", ("seed",)) | own(folder, "study", ("samples",))
-    return replace(options, **{k: v for k, v in taken.items() if given[k] is None})

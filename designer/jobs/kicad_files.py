@@ -11,7 +11,7 @@ from typing import Any
 
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
-from designer.base.manifest import StageName, file_hash
+from designer.base.manifest import StageName, Stages, file_hash
 from designer.base.progress import Progress
 from designer.board.board_parts import board_circuit
 from designer.board.component import components
@@ -38,17 +38,17 @@ def texts(made: Synthesis, checked: CheckedResponse | None = None) -> dict[str, 
     """
     with naming(made.modelfile):
         circuit, choice = board_circuit(made)
-        found = components(circuit, made.catalog, choice)
+        parts = components(circuit, made.catalog, choice)
         rules = rules_text(board_rules(circuit, made.modelfile.rules))
         run = first_run(made, checked)
-        project = Project(made.modelfile.title, circuit, found, run, rules)
+        project = Project(made.modelfile.title, circuit, parts, run, rules)
         return {f"{FOLDER}/{name}": text for name, text in files(project).items()}
 
 
 def beside(
     folder: Folder, made: Synthesis, inputs: Mapping[str, Any], overwrite: bool, progress: Progress
 ) -> dict[str, str]:
-    """The same for a verb that does more than this: none where there can be no project.
+    """Every file, for a verb that does more than this; none where there can be no project.
 
     Raises
     ------
@@ -56,19 +56,17 @@ def beside(
     """
     progress.stage("KiCad project")
     try:
-        found = texts(made)
+        project = texts(made)
     except InputError as error:
         progress.note(f"no KiCad project: {error}")
         return {}
-    folder.decide(wanted(inputs, found), overwrite=overwrite, resume=True)
-    return found
+    folder.decide(stages(inputs, project), overwrite=overwrite, resume=True)
+    return project
 
 
-def wanted(
-    inputs: Mapping[str, Any], made: Mapping[str, str]
-) -> dict[StageName, tuple[dict[str, Any], list[str]]]:
+def stages(inputs: Mapping[str, Any], files: Mapping[str, str]) -> Stages:
     """The stage as the folder is asked for it. inputs : the design's."""
-    return {STAGE: (dict(inputs), list(made))}
+    return {STAGE: (dict(inputs), list(files))}
 
 
 def write(
@@ -77,10 +75,9 @@ def write(
     """Write the stage."""
     if not files:
         return
-    folder.begin(wanted(inputs, files), design_provenance(made))
-    for name, text in files.items():
-        folder.write(name, text)
-    folder.finish(STAGE)
+    with folder.working(stages(inputs, files), design_provenance(made)):
+        for name, text in files.items():
+            folder.write(name, text)
 
 
 def settle(folder: Folder, made: Synthesis, checked: CheckedResponse) -> None:

@@ -1,13 +1,15 @@
-"""What the command line says about any verb that writes."""
+"""What a verb that writes is asked for, from the command line or from Python."""
 
 from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from designer.base.defaults import SAMPLES, SEED, at_least
+from designer.base.defaults import SAMPLES, SEED, at_least, cores
 from designer.base.errors import InputError
 from designer.yields.study_layers import RungName
 from designer.yields.yield_maps import Over
@@ -50,6 +52,11 @@ class Options:
     measured: Path | None = None
     """File of a list of boards that are studied instead of random ones."""
 
+    @property
+    def workers(self) -> int:
+        """How many work at a time."""
+        return cores() if self.jobs is None else self.jobs
+
     def check(self) -> None:
         """InputError for a number that cannot be."""
         at_least("--samples", self.samples, 1)
@@ -74,25 +81,29 @@ class Options:
         Files by their last names, so that no path of this machine stands in it; without options
         that change no result.
         """
-        said = ["designer", verb, _base(model)]
-        said += [] if out is None else ["--out", _base(out)]
-        if self.measured is None:
-            said += ["--samples", str(self.samples)]
-        else:
-            said += ["--measured", _base(self.measured)]
-        said += ["--seed", str(self.seed)]
-        if verb in ("tolerance", "search"):
-            said += [] if self.rung == "auto" else ["--rung", self.rung]
-        if verb == "tolerance":
-            said += [] if self.until is None else ["--until", f"{self.until:g}"]
-            said += ["--tuned"] if self.tuned else []
-            said += ["--reached"] if self.reached else []
-            said += [word for over in self.maps for word in ("--map", over)]
-        if verb in ("tolerance", "run"):
-            said += [] if self.blamed else ["--no-blame"]
-            if self.blame_budget is not None:
-                said += ["--blame-budget", str(self.blame_budget)]
-        return shlex.join(said)
+        study, blame = verb == "tolerance", verb in ("tolerance", "run")
+        words = ["designer", verb, _base(model)]
+        for option, value, applies in (
+            ("--out", None if out is None else _base(out), True),
+            ("--samples", self.samples, self.measured is None),
+            ("--measured", None if self.measured is None else _base(self.measured), True),
+            ("--seed", self.seed, True),
+            ("--rung", self.rung, self.rung != "auto" and verb in ("tolerance", "search")),
+            ("--until", None if self.until is None else f"{self.until:g}", study),
+            ("--tuned", "", study and self.tuned),
+            ("--reached", "", study and self.reached),
+            *(("--map", over, study) for over in self.maps),
+            ("--no-blame", "", blame and not self.blamed),
+            ("--blame-budget", self.blame_budget, blame),
+        ):
+            if applies and value is not None:
+                words += [option, *([] if value == "" else [str(value)])]
+        return shlex.join(words)
+
+
+def given(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of the options that have a value."""
+    return {name: value for name, value in words.items() if value is not None}
 
 
 def _base(path: Path) -> str:

@@ -11,7 +11,6 @@ from designer.base.errors import EnvironmentMissing
 from designer.base.version import __version__
 from designer.model.model_file import ModelFile
 
-FORMAT = 1
 LIBRARIES = {
     "numpy": "numpy",
     "scipy": "scipy",
@@ -24,14 +23,9 @@ LIBRARIES = {
 
 def versions() -> dict[str, str | None]:
     """Versions of everything that a result depends on; None for what is not installed."""
-    found: dict[str, str | None] = {"designer": __version__, "python": platform.python_version()}
-    for name, distribution in LIBRARIES.items():
-        try:
-            found[name] = version(distribution)
-        except PackageNotFoundError:
-            found[name] = None
-    found["ngspice"] = _ngspice()
-    return found
+    own = {"designer": __version__, "python": platform.python_version()}
+    libraries = {name: _version(distribution) for name, distribution in LIBRARIES.items()}
+    return {**own, **libraries, "ngspice": _ngspice()}
 
 
 def provenance(
@@ -54,6 +48,13 @@ def provenance(
         "model_sha256": modelfile.sha256,
         "spread": None if spread is None else dict(spread),
     }
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return None
 
 
 def _ngspice() -> str | None:

@@ -1,7 +1,4 @@
-"""The verb ``rules``: what is looked at, what is written.
-
-Nothing here prints; ``cli.rules`` does.
-"""
+"""The verb ``rules``: the design rules on a design folder and its board."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from designer.base import atomic_write
 from designer.base.design_folder import Folder, is_design_folder
 from designer.base.errors import InputError
 from designer.base.frames import frame, table_html
-from designer.base.manifest import StageName
+from designer.base.manifest import Stages
 from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.base.seal import sha256
@@ -27,17 +24,16 @@ from designer.board.kicad_rules import board_rules
 from designer.catalog.catalog import load_catalog
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.check.synthesis_result import Synthesis
-from designer.design_rules import junit, on_board as rule_board, run_rules
+from designer.design_rules import junit as junit_xml, on_board as rule_board, run_rules
 from designer.design_rules.kicad_drc import kicad_version
 from designer.design_rules.subject import RuleSubject
+from designer.jobs.design_source import read_design
 from designer.jobs.origin import provenance
-from designer.jobs.synthesise_job import read_design
 from designer.model.model_file import naming
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT = 1
 NAME = "rules.json"
 
 
@@ -83,70 +79,49 @@ def rules(
     junit: Path | str | None = None,
     progress: Progress | None = None,
 ) -> RulesResult:
-    """The verb ``rules``: the design rules on a design folder and its board.
-
-    board : a .kicad_pcb of this design. junit : where to write a JUnit report.
-
-    Raises
-    ------
-    InputError : as ``into_folder``.
-    """
-    given = None if board is None else Path(board)
-    report = None if junit is None else Path(junit)
-    said = Progress() if progress is None else progress
-    return RulesResult(*into_folder(Path(folder), given, report, said))
-
-
-def into_folder(
-    path: Path, board: Path | None, report: Path | None, progress: Progress
-) -> tuple[dict[str, Any], bool]:
-    """Look at a design folder and write ``rules.json``, and the JUnit report if one is asked for.
+    """The verb ``rules``: look at a design folder, write ``rules.json`` there, and say so.
 
     What the folder has of an earlier look is replaced, for a board changes while it is drawn.
-
-    Returns
-    -------
-    The JSON object, and whether no rule fails.
+    board : a .kicad_pcb of this design. junit : where to write a JUnit report.
 
     Raises
     ------
     InputError : no design folder, or a board that is not of this design; nothing is written then.
     """
-    began = time.perf_counter()
+    began, path = time.perf_counter(), Path(folder)
+    report = None if junit is None else Path(junit)
+    progress = Progress() if progress is None else progress
     if not is_design_folder(path):
-        raise InputError(
-            path, "DIR", "no manifest.json", "a design folder, as synthesise and run make it"
-        )
+        expected = "a design folder, as synthesise and run make it"
+        raise InputError(path, "DIR", "no manifest.json", expected)
     if report is not None and (report.is_dir() or not report.parent.is_dir()):
-        found_there = "a folder" if report.is_dir() else "no such folder"
-        raise InputError(report, "--junit", found_there, "a file in a folder that exists")
+        there = "a folder" if report.is_dir() else "no such folder"
+        raise InputError(report, "--junit", there, "a file in a folder that exists")
     catalog = load_catalog()
     made = read_design(path, catalog, progress)
-    given = None if board is None else read_board(board)
+    drawn = None if board is None else read_board(Path(board))
     progress.stage("rules")
-    found = checked(made, given)
+    checks = checked(made, drawn)
     inputs = {
         "model": made.modelfile.sha256,
         "catalogue": catalog.hash,
         "version": __version__,
-        "board": None if given is None else sha256(given.text.encode("utf-8")),
-        "kicad": found.kicad,
+        "board": None if drawn is None else sha256(drawn.text.encode("utf-8")),
+        "kicad": checks.kicad,
     }
-    settings = {"board_sha256": inputs["board"], "kicad": found.kicad}
-    said = provenance(made.modelfile, catalog.hash, settings=settings)
-    answer = plain(_json(made, given, found.outcomes, said, time.perf_counter() - began))
-    folder = Folder(path)
-    wanted: dict[StageName, tuple[dict[str, Any], list[str]]] = {"rules": (inputs, [NAME])}
-    folder.decide(wanted, overwrite=True, resume=False)  # refuses what is not ours
-    kept = {} if folder.manifest is None else folder.manifest.provenance
-    folder.begin(wanted, kept)
-    folder.write(NAME, dumps(answer))
-    folder.finish("rules")
+    settings = {"board_sha256": inputs["board"], "kicad": checks.kicad}
+    origin = provenance(made.modelfile, catalog.hash, settings=settings)
+    answer = plain(_json(made, drawn, checks.outcomes, origin, time.perf_counter() - began))
+    place = Folder(path)
+    stages: Stages = {"rules": (inputs, [NAME])}
+    place.decide(stages, overwrite=True, resume=False)  # refuses what is not ours
+    with place.working(stages):
+        place.write(NAME, dumps(answer))
     if report is not None:
-        text = junit.report(made.modelfile.title, found.outcomes)
+        text = junit_xml.report(made.modelfile.title, checks.outcomes)
         with atomic_write.appearing(report, "--junit") as partial:
             partial.write_text(text, encoding="utf-8")
-    return answer, found.passed
+    return RulesResult(answer, checks.passed)
 
 
 def checked(made: Synthesis, board: BoardFile | None = None) -> RulesAnswer:
@@ -174,17 +149,17 @@ def _json(
     made: Synthesis,
     board: BoardFile | None,
     outcomes: Sequence[RuleOutcome],
-    said: dict[str, Any],
+    origin: dict[str, Any],
     seconds: float,
 ) -> dict[str, Any]:
     count = {status: sum(o.status == status for o in outcomes) for status in (PASS, FAIL, NOT_RUN)}
     return {
-        "format": FORMAT,
+        "format": 1,
         "title": made.modelfile.title,
         "board": None if board is None else board.path.name,
         "counts": count,
         "complete": not count[NOT_RUN],
         "rules": [o.as_dict() for o in outcomes],
-        "provenance": said,
+        "provenance": origin,
         "cost": {"seconds": seconds},
     }

@@ -33,6 +33,14 @@ if TYPE_CHECKING:
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
 TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
+BLOCK_FOLDERS = {
+    "samples": SAMPLES,
+    "ngspice": NGSPICE,
+    "tuned": TUNED,
+    "trimmed": TRIMMED,
+    "reached": REACHED,
+}
+"""Folder of blocks by layer."""
 MAPS, MAP = "maps.json", "map:"
 ALL_IN_NGSPICE = "ngspice of every board"
 WITHOUT_BLAME, BLAME_BUDGET = "without blame", "blame budget "
@@ -44,19 +52,19 @@ PIECES = "study-pieces.npz"
 
 def layers_of(options: Options) -> list[str]:
     """Names of the layers that are asked for, sorted."""
-    names = {"samples"}
-    if options.rung != "exact":
-        names.add("ngspice")
-    if options.rung == "ngspice":
-        names.add(ALL_IN_NGSPICE)
-    names |= {f"{MAP}{over}" for over in options.maps}
-    names |= {"tuned"} if options.tuned else set()
-    names |= {"trimmed"} if options.trimmed else set()
-    names |= {"reached"} if options.reached else set()
-    names |= set() if options.blamed else {WITHOUT_BLAME}
-    if options.blamed and options.blame_budget is not None:
-        names.add(f"{BLAME_BUDGET}{options.blame_budget}")
-    return sorted(names)
+    budget = options.blame_budget if options.blamed else None
+    names = {
+        "samples": True,
+        "ngspice": options.rung != "exact",
+        ALL_IN_NGSPICE: options.rung == "ngspice",
+        "tuned": options.tuned,
+        "trimmed": options.trimmed,
+        "reached": options.reached,
+        WITHOUT_BLAME: not options.blamed,
+        f"{BLAME_BUDGET}{budget}": budget is not None,
+        **{f"{MAP}{over}": True for over in options.maps},
+    }
+    return sorted(name for name, wanted in names.items() if wanted)
 
 
 def blamed(layers: Iterable[str]) -> bool:
@@ -83,33 +91,29 @@ def merged(
     rung = options.rung
     if "ngspice" in names:
         rung = "ngspice" if ALL_IN_NGSPICE in names else "auto"
-    maps = tuple(over for over in OVERS if f"{MAP}{over}" in names)
-    tuned, reached = "tuned" in names, "reached" in names
     has_blame = stage is not None and stage.complete and blamed(known["layers"])
     with_blame = options.blamed or has_blame
     return replace(
         options,
         rung=rung,
-        tuned=tuned,
-        reached=reached,
-        maps=maps,
+        tuned="tuned" in names,
+        reached="reached" in names,
+        maps=tuple(over for over in OVERS if f"{MAP}{over}" in names),
         blamed=with_blame,
         blame_budget=blame_budget(names) if with_blame else None,
     )
 
 
-def study_files(options: Options, responses: int, census: bool = False) -> list[str]:
+def study_files(options: Options, responses: int, census: bool) -> list[str]:
     """What the stage writes; a name that ends in "/" is a folder of blocks. census : whether it is
     of all the boards of a list."""
+    names = layers_of(options)
+    blocks = [f"{folder}/" for name, folder in BLOCK_FOLDERS.items() if name in names]
+    boards = [BOARDS] if census else []
+    pieces = [PIECES] if options.blamed or options.maps else []
     maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
     maps += [MAPS] if maps else []
-    names = layers_of(options)
-    folders = {"samples": SAMPLES, "ngspice": NGSPICE, "tuned": TUNED, "trimmed": TRIMMED}
-    folders["reached"] = REACHED
-    places = [f"{place}/" for name, place in folders.items() if name in names]
-    pieces = [PIECES] if options.blamed or options.maps else []
-    boards = [BOARDS] if census else []
-    return [TOLERANCE, *REPORTS, KEPT, *boards, *pieces, *maps, *places]
+    return [TOLERANCE, *REPORTS, KEPT, *boards, *pieces, *maps, *blocks]
 
 
 class FolderStores(Stores):
@@ -219,13 +223,15 @@ class _FolderPieces(StoredParts):
             self._file.put_all(values, self._key)
 
 
-def write_maps(folder: Folder, study: Study, provenance: Mapping[str, Any]) -> None:
-    """``maps.json`` and a picture of each map; times are in ``tolerance.json``."""
-    from designer.report.map_plots import map_files  # Matplotlib takes a while to import
+def map_files(study: Study, provenance: Mapping[str, Any]) -> dict[str, bytes]:
+    """``maps.json`` and a picture of each map, by name; none where there are no maps. Times are in
+    ``tolerance.json``."""
+    if not study.maps:
+        return {}
+    from designer.report.map_plots import map_files as files  # Matplotlib takes a while to import
 
     labels = [
         f"ω = {q.spec.omega:g} {q.spec.expect or q.start.response}" for q in study.plan.questions
     ]
-    timeless = [replace(found, seconds=0.0) for found in study.maps]
-    for name, content in map_files(timeless, labels, {"provenance": provenance}).items():
-        folder.write(name, content)
+    timeless = [replace(each, seconds=0.0) for each in study.maps]
+    return files(timeless, labels, {"provenance": provenance})

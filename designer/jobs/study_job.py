@@ -1,49 +1,201 @@
-"""The study stage of a design folder: the verbs ``run`` and ``tolerance``.
-
-Nothing here prints; ``cli.verbs`` does.
-"""
+"""The verbs ``run`` and ``tolerance``: how many boards keep the response."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import SAMPLES, SEED, at_least, cores
-from designer.base.design_folder import Folder
-from designer.base.manifest import StageName
+from designer.base.design_folder import Folder, is_design_folder
+from designer.base.errors import InputError
+from designer.base.plain_json import plain
 from designer.base.progress import Progress
-from designer.catalog.catalog import Catalog, load_catalog
+from designer.catalog.catalog import Catalog
 from designer.check import synthesis_result
-from designer.check.synthesis_result import synthesise
-from designer.jobs import design_files, kicad_files, rung_choice
-from designer.jobs.design_files import load
-from designer.jobs.options import Options
-from designer.jobs.study_folder import layers_of, merged, study_files
+from designer.check.checked_design import CheckedResponse
+from designer.check.synthesis_result import Synthesis
+from designer.jobs import design_files, folder_numbers, kicad_files, rung_choice, search_stage
+from designer.jobs.design_source import bills_are_of_old, design_inputs, source
+from designer.jobs.job_outcome import JobOutcome
+from designer.jobs.json_answers import run_json
+from designer.jobs.options import Options, given
+from designer.jobs.stage_runner import StageRunner
+from designer.jobs.study_folder import merged
 from designer.jobs.study_stage import (
-    SPICE_TIMEOUT as SPICE_TIMEOUT,
-    Help,
     Place,
+    Shown,
+    StudyHelp,
     StudyStage,
-    checks,
+    checks_in_memory,
+    result_json,
+    run_result,
     satisfied,
+    study_of,
 )
-from designer.jobs.synthesise_job import (
-    JobOutcome,
-    bills_are_of_old,
-    design_inputs,
-    standing_inputs,
-)
+from designer.model.measured_values import MEASURED, read_measured
 from designer.model.model_file import ModelFile, naming, need_responses
-from designer.spice import equation_check
-from designer.spice.pool import SpicePool, require_ngspice
-from designer.yields.run_result import RunResult
-from designer.yields.tolerance_study import tolerance
+from designer.spread.part_rules import spread_of
+from designer.yields.study_layers import RungName
+from designer.yields.yield_maps import Over
 
-PLACE = Place()
-"""Of the study of random boards."""
+RANDOM, BUILT = Place(), Place("measured", "measured/")
+"""Of the study of random boards, and of that of the boards in a list."""
+THE_BOARD = "board"
+"""Name of the only board of a list that names none."""
+
+
+def run(
+    model: Path | str | ModelFile,
+    out: Path | str | None = None,
+    *,
+    samples: int | None = None,
+    blame: bool | None = None,
+    blame_budget: int | None = None,
+    catalog: Catalog | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+    shown: Shown = lambda _: None,
+) -> JobOutcome:
+    """The verb ``run``: synthesis, check in ngspice, tolerance study, report.
+
+    model : a model file that was read, the path of one, or a design folder. out : the folder to
+    write; a ``ModelFile`` without one is worked on in memory. samples, blame, blame_budget, seed :
+    None for the usual ones, or for the folder's own. catalog : in memory, instead of the one that
+    is found. shown : is given the answer while the work goes on (``study_stage.Shown``).
+
+    Raises
+    ------
+    InputError, Unreachable : the model file asks for what cannot be built, or the folder holds
+        something else.
+    EnvironmentMissing : there is work to do and no ngspice.
+    """
+    words = {"samples": samples, "seed": seed, "until": None, "blamed": blame}
+    words |= {"blame_budget": blame_budget}
+    options = Options(jobs=jobs, overwrite=overwrite, resume=resume, **given(words))
+    return _study("run", model, out, options, words, progress, shown, catalog)
+
+
+def tolerance(
+    model: Path | str | ModelFile | Synthesis | JobOutcome,
+    out: Path | str | None = None,
+    *,
+    samples: int | None = None,
+    until: float | None = None,
+    rung: RungName | None = None,
+    tuned: bool = False,
+    reached: bool = False,
+    map_: Sequence[Over] = (),
+    measured: Path | str | None = None,
+    cluster: str | None = None,
+    blame: bool | None = None,
+    blame_budget: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    progress: Progress | None = None,
+    shown: Shown = lambda _: None,
+) -> JobOutcome:
+    """The verb ``tolerance``: how many boards show each response, under the model file's spread.
+
+    model : as of ``run``, or a design, which is studied in its folder or, without one, in memory.
+    samples : at least. until : width of the 95 % intervals at which the study stops growing. rung :
+    "exact" asks no ngspice, "auto" about some boards, "ngspice" about every board. tuned, reached :
+    also with the generator free within its bands, and from power-up. map_ : settings over which the
+    yield is wanted too. measured : a list of built boards, which are studied instead, in a design
+    folder. cluster : address of a Dask scheduler. The others are as of ``run``.
+
+    Raises
+    ------
+    InputError, Unreachable, EnvironmentMissing : as ``run``.
+    """
+    words = {"samples": samples, "seed": seed, "until": until, "rung": rung, "blamed": blame}
+    words |= {"blame_budget": blame_budget}
+    options = Options(
+        jobs=jobs,
+        overwrite=overwrite,
+        resume=resume,
+        tuned=tuned,
+        reached=reached,
+        maps=tuple(dict.fromkeys(map_)),
+        cluster=cluster,
+        **given(words),
+    )
+    if measured is None:
+        return _study("tolerance", model, out, options, words, progress, shown)
+    options.check()
+    for name, value in (
+        ("--out", out), ("--samples", samples), ("--until", until), ("--map", ", ".join(map_))
+    ):  # fmt: skip
+        if value not in (None, ""):
+            expected = "no such option with --measured, whose boards are the samples"
+            raise InputError(None, name, str(value), expected)
+    folder = model.folder if isinstance(model, JobOutcome) else model
+    if not isinstance(folder, Path | str):
+        raise InputError(None, "DIR", "no folder", "a design folder, whose boards were measured")
+    path = Path(folder)
+    options = folder_numbers.of_built(path, options, words)
+    command = partial(Options.command, verb="tolerance", model=path, out=None)
+    progress = Progress() if progress is None else progress
+    return measured_into(path, Path(measured), options, progress, command, shown)
+
+
+def _study(
+    verb: str,
+    model: Path | str | ModelFile | Synthesis | JobOutcome,
+    out: Path | str | None,
+    options: Options,
+    words: Mapping[str, Any],
+    progress: Progress | None,
+    shown: Shown,
+    catalog: Catalog | None = None,
+) -> JobOutcome:
+    """words : what is given, by the names of ``Options``."""
+    options.check()
+    progress = Progress() if progress is None else progress
+    if isinstance(model, JobOutcome):
+        model = model.synthesis if model.folder is None else model.folder
+    if out is None and isinstance(model, ModelFile | Synthesis):
+        return _in_memory(model, options, words, progress, catalog)
+    argument = model.modelfile if isinstance(model, Synthesis) else model
+    argument = argument if isinstance(argument, ModelFile) else Path(argument)
+    modelfile, folder = source(argument, out)
+    options = folder_numbers.of_study(argument, folder, modelfile, options, words)
+    modelfile = search_stage.chosen(modelfile, folder, options, progress)
+    path = argument if isinstance(argument, Path) else modelfile.source or folder / "model.toml"
+    place = None if out is None else Path(out)
+    command = partial(Options.command, verb=verb, model=path, out=place)
+    return run_into(modelfile, folder, options, progress, command, shown)
+
+
+def _in_memory(
+    model: ModelFile | Synthesis,
+    options: Options,
+    words: Mapping[str, Any],
+    progress: Progress,
+    catalog: Catalog | None,
+) -> JobOutcome:
+    modelfile = model if isinstance(model, ModelFile) else model.modelfile
+    need_responses(modelfile)
+    options = folder_numbers.of_list(modelfile, options, words)
+    with StudyHelp.of(options, progress) as help_:
+        progress.stage("responses of the model, parts")
+        made = model
+        if isinstance(made, ModelFile):
+            made = synthesis_result.synthesise(made, catalog)
+        began = time.perf_counter()
+        equations, checked = checks_in_memory(made, help_.pool, progress)
+        study = study_of(made, options, help_, checked, progress=progress)
+    cost = {"study_seconds": time.perf_counter() - began, "design_seconds": made.seconds}
+    result = run_result(made, study, options, cost, equations)
+    answer = run_json(plain(design_files.answer(made)), plain(result_json(result)))
+    return JobOutcome(answer, satisfied(answer), made=made, result=result)
 
 
 def run_into(
@@ -52,12 +204,11 @@ def run_into(
     options: Options,
     progress: Progress,
     command: Callable[[Options], str],
-    shown: Callable[[Mapping[str, Any]], None] = lambda _: None,
+    shown: Shown = lambda _: None,
 ) -> JobOutcome:
-    """The verbs ``run`` and ``tolerance``: design, check, study, report.
+    """Design, check, study and report in the folder ``out``.
 
-    command : the command line as the report states it (``Options.command``). shown : is given the
-    answer while work goes on: see `StudyStage`.
+    command : the command line as the report states it (``Options.command``).
 
     Raises
     ------
@@ -65,104 +216,89 @@ def run_into(
     """
     options.check()
     need_responses(modelfile)
-    catalog = load_catalog()
-    folder = Folder(out)
-    options = rung_choice.chosen(folder, options, progress)
-    wanted, options = _study_wanted(folder, modelfile, catalog, options)
-    wanted |= standing_inputs(folder, modelfile, catalog, progress)
-    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
-    if not todo:
-        answer = PLACE.answer(folder)
-        return JobOutcome(answer, satisfied(answer), out, True)
-    if "design" in todo:
-        design_files.check(modelfile, catalog)
-    began = time.perf_counter()
-    with Help.of(options, progress) as help_:
-        progress.stage("responses of the model, parts")
-        if "design" in todo:
-            made = synthesis_result.synthesise(modelfile, catalog)
-            progress.stage("start recipes, files of the design")
-            with naming(modelfile):
-                files = design_files.texts(made)
-            inputs = wanted["design"][0]
-            project = kicad_files.beside(folder, made, inputs, options.overwrite, progress)
-            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
-            design_files.write(folder, made, files)
-            folder.finish("design")
-            kicad_files.write(folder, made, inputs, project)
-        else:
-            made = load(folder, modelfile, catalog)
-            folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
-            if bills_are_of_old(
-                wanted["design"][0], design_inputs(modelfile, catalog)["design"][0]
-            ):
-                design_files.renew_bills(folder, made)
-        design_seconds = time.perf_counter() - began
-        ready = time.perf_counter()
-        kept = PLACE.kept(folder, progress.note)
-        checked = checks(folder, made, help_.pool, kept, progress)
-        first = checked[1][0]
-        if first.gate is not None and first.gate.passed:
-            folder.rewrite("circuit.cir", design_files.circuit_deck(made, first))
-            kicad_files.settle(folder, made, first)
-        seconds = time.perf_counter() - ready
-        stage = StudyStage(
-            folder, PLACE, made, options, command(options), progress, shown, design_seconds
-        )
-        result = stage.done(checked, kept, help_, seconds)
-    answer = PLACE.answer(folder)
-    return JobOutcome(answer, satisfied(answer), out, False, result, shown=stage.early)
-
-
-def _study_wanted(
-    folder: Folder, modelfile: ModelFile, catalog: Catalog, options: Options
-) -> tuple[dict[StageName, tuple[dict[str, Any], list[str]]], Options]:
-    """The stages, and the options with the layers that the folder's study has already."""
-    wanted = design_inputs(modelfile, catalog)
-    inputs = {
-        **wanted["design"][0],
-        "seed": options.seed,
-        "samples": options.samples,
-        "until": options.until,
-    }
+    options = rung_choice.chosen(Folder(out), options, progress)
+    runner = StageRunner(modelfile, out, options, progress)
+    folder = runner.folder
+    # A study is of the boards as they are bought now, whatever the design's own inputs say.
+    here = design_inputs(modelfile, runner.catalog)
+    numbers = {"seed": options.seed, "samples": options.samples, "until": options.until}
+    inputs = {**here, **numbers}
     options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
     options = merged(folder, inputs, options)
     labels = () if modelfile.measured is None else modelfile.measured.labels
-    files = study_files(options, len(modelfile.responses), len(labels) == options.samples)
-    wanted["study"] = ({**inputs, "layers": layers_of(options)}, files)
-    return wanted, options
+    census = len(labels) == options.samples
+    stages = RANDOM.stages(inputs, options, len(modelfile.responses), census=census)
+    if not runner.decide(stages):
+        answer = RANDOM.answer(folder)
+        return JobOutcome(answer, satisfied(answer), out, reused=True)
+    began = time.perf_counter()
+    with StudyHelp.of(options, progress) as help_:
+        made = runner.design()
+        if bills_are_of_old(runner.design_inputs, here):
+            design_files.renew_bills(folder, made)
+        stage = StudyStage(folder, RANDOM, made, options, command(options), progress, shown)
+
+        def checked(first: CheckedResponse) -> None:
+            if first.gate is not None and first.gate.passed:
+                folder.rewrite("circuit.cir", design_files.circuit_deck(made, first))
+                kicad_files.settle(folder, made, first)
+
+        result = stage.work(help_, time.perf_counter() - began, checked)
+    answer = RANDOM.answer(folder)
+    return JobOutcome(answer, satisfied(answer), out, made=made, result=result, shown=stage.early)
 
 
-def run(
-    modelfile: ModelFile,
-    catalog: Catalog | None = None,
-    *,
-    samples: int = SAMPLES,
-    seed: int = SEED,
-    jobs: int | None = None,
-    progress: Progress | None = None,
-) -> RunResult:
-    """The whole job in memory: synthesis, check in ngspice, tolerance study.
+def measured_into(
+    path: Path,
+    file: Path,
+    options: Options,
+    progress: Progress,
+    command: Callable[[Options], str],
+    shown: Shown = lambda _: None,
+) -> JobOutcome:
+    """Study the boards of a list, once each, in the design folder whose parts they have.
+
+    The study is a stage of its own, in the folder ``measured/``; that of the random boards stays as
+    it is. file : the list, as [spread] names one; what it does not measure is drawn. command : as
+    of ``run_into``.
 
     Raises
     ------
-    InputError, Unreachable : the model file asks for what cannot be built.
-    EnvironmentMissing : ngspice is missing.
+    InputError : no design folder, or a list that is none of its boards; nothing is written then.
+    EnvironmentMissing : there is work to do and no ngspice, or no cluster, that it needs.
     """
+    if not is_design_folder(path):
+        there = "no manifest.json" if path.is_dir() else "no folder"
+        raise InputError(path, "DIR", there, "a design folder, whose boards were measured")
+    boards = read_measured(file)
+    if not boards.labels:
+        boards = replace(boards, boards=(THE_BOARD,))
+    modelfile, _ = source(path, path)
     need_responses(modelfile)
-    jobs = cores() if jobs is None else jobs
-    at_least("--jobs", jobs, 1)
-    with SpicePool(jobs) as pool:
-        require_ngspice(pool)
-        made = synthesise(modelfile, catalog)
-        equations = equation_check.check(made.design, made.found, pool)
-        study = tolerance(made, samples=samples, seed=seed, jobs=jobs, pool=pool, progress=progress)
-    return RunResult(
-        made.modelfile,
-        made.catalog,
-        made.found,
-        made.design,
-        study.checked,
-        study,
-        equations=equations,
-    )
+    options = replace(options, samples=len(boards.boards), measured=file)
+    runner = StageRunner(modelfile, path, options, progress)
+    folder = runner.folder
+    if folder.decide(runner.stages, overwrite=False, resume=False):
+        raise InputError(path, "the design", "unfinished", "a finished one (designer synthesise)")
+    made = design_files.load(folder, modelfile, runner.catalog)
+    made = replace(made, modelfile=replace(modelfile, measured=boards))
+    with naming(modelfile):
+        spread_of(made.modelfile, made.design.circuit, runner.catalog)  # refuses what is not theirs
+    options = rung_choice.chosen(folder, options, progress)
+    options = replace(options, trimmed=modelfile.board.dc_trim == "fitted")
+    numbers = {"list": boards.sha256, "seed": options.seed, "samples": options.samples}
+    inputs = {**runner.design_inputs, **numbers}
+    options = merged(folder, inputs, options, BUILT.stage)
+    stages = BUILT.stages(inputs, options, len(modelfile.responses), census=True)
+    list_file = BUILT.prefix + MEASURED
+    stages[BUILT.stage][1].append(list_file)
+    if not folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
+        answer = BUILT.answer(folder)
+        return JobOutcome(answer, satisfied(answer), path, True)
+    with StudyHelp.of(options, progress) as help_:
+        folder.begin(stages)
+        folder.write(list_file, boards.content)
+        stage = StudyStage(folder, BUILT, made, options, command(options), progress, shown)
+        result = stage.work(help_)
+    answer = BUILT.answer(folder)
+    return JobOutcome(answer, satisfied(answer), path, made=made, result=result, shown=stage.early)

@@ -1,23 +1,23 @@
 """A study that is a stage of a design folder: what it needs, what is computed, what is written.
 
-The random boards of ``jobs.study_job`` and the built ones of ``jobs.measured_job`` are
-studied and written in the same way, each at its own place in the folder.
+The random boards and the built ones of a list are studied and written in the same way, each at its
+own place in the folder.
 """
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from designer.base.defaults import cores
 from designer.base.design_folder import DESIGN, REPORTS, TOLERANCE, Folder
+from designer.base.errors import MISSING, InputError
 from designer.base.keyed_store import Note
-from designer.base.manifest import StageName
-from designer.base.plain_json import dumps
+from designer.base.manifest import StageName, Stages
+from designer.base.plain_json import dumps, plain
 from designer.base.progress import Progress
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
@@ -25,7 +25,14 @@ from designer.jobs import design_files
 from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
-from designer.jobs.study_folder import BOARDS, PIECES, FolderStores, write_maps
+from designer.jobs.study_folder import (
+    BOARDS,
+    PIECES,
+    FolderStores,
+    layers_of,
+    map_files,
+    study_files,
+)
 from designer.jobs.study_json import study_json
 from designer.report import measured_table
 from designer.spice import equation_check
@@ -40,10 +47,16 @@ from designer.yields.run_result import RunResult
 from designer.yields.study import Study
 from designer.yields.study_cache import KEPT, Kept
 from designer.yields.study_identity import RULES, checks_hash
+from designer.yields.study_layers import Stores
 from designer.yields.tolerance_study import check, tolerance
 
 SPICE_TIMEOUT = 900.0
 """The longest that one run of ngspice may take in a study, s: a way of thousands of periods."""
+Checks = tuple[EquationCheck | None, tuple[CheckedResponse, ...]]
+"""What ngspice says of a design's equations, and its nominal responses on every engine."""
+Shown = Callable[[Mapping[str, Any]], None]
+"""Called with the answer once the yields of the exact circuit stand, where ngspice is asked after
+that, and once all yields stand, where blame or maps take time after that."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +68,13 @@ class Place:
     prefix: str = ""
     """Prefix of the names of its files, "" or ending in "/"."""
 
-    def names(self, files: Iterable[str]) -> list[str]:
-        """These files of a study, in its place."""
-        return [f"{self.prefix}{name}" for name in files]
+    def stages(
+        self, inputs: Mapping[str, Any], options: Options, responses: int, *, census: bool
+    ) -> Stages:
+        """The stage as the folder is asked for it. census : whether it is of all the boards of a
+        list."""
+        files = [f"{self.prefix}{name}" for name in study_files(options, responses, census)]
+        return {self.stage: ({**inputs, "layers": layers_of(options)}, files)}
 
     def answer(self, folder: Folder) -> dict[str, Any]:
         """The answer that stands there."""
@@ -75,9 +92,44 @@ class Place:
         return Kept(folder / (self.prefix + name), write, note, vouch)
 
 
+@dataclass(frozen=True)
+class StudyHelp:
+    """Who computes a study."""
+
+    jobs: int
+    """Number of workers."""
+    pool: SpicePool | None
+    """Runs ngspice; None where it is not asked."""
+    runner: Runner
+    """Who computes blocks."""
+
+    @classmethod
+    @contextmanager
+    def of(cls, options: Options, progress: Progress) -> Iterator[StudyHelp]:
+        """What these options need, looked for before anything is written.
+
+        Raises
+        ------
+        EnvironmentMissing : it is not there.
+        """
+        with ExitStack() as stack:
+            pool = None
+            if options.rung != "exact":
+                progress.stage("ngspice")
+                pool = stack.enter_context(SpicePool(options.workers, timeout=SPICE_TIMEOUT))
+                require_ngspice(pool)
+            runner: Runner = Here(options.workers)
+            if options.cluster is not None:
+                from designer.yields.dask_runner import Cluster
+
+                progress.stage(f"cluster {options.cluster}")
+                runner = stack.enter_context(Cluster(options.cluster))
+            yield cls(options.workers, pool, runner)
+
+
 @dataclass
 class StudyStage:
-    """A study that is worked on."""
+    """A study that is worked on in a folder."""
 
     folder: Folder
     """The design folder."""
@@ -91,55 +143,52 @@ class StudyStage:
     """The command line that its report states."""
     progress: Progress
     """Told how far the work is."""
-    shown: Callable[[Mapping[str, Any]], None]
-    """Called with the answer once the yields of the exact circuit stand, where ngspice is asked
-    after that, and once all yields stand, where blame or maps take time after that."""
-    design_seconds: float
-    """Wall time that the design took [s]."""
+    shown: Shown
+    """Shows the yields while the work goes on."""
     early: bool = False
     """Whether the yields were shown."""
 
-    def done(
+    def work(
         self,
-        checked: tuple[EquationCheck | None, tuple[CheckedResponse, ...]],
-        kept: Kept,
-        help_: Help,
-        check_seconds: float,
+        help_: StudyHelp,
+        design_seconds: float = 0.0,
+        checked: Callable[[CheckedResponse], None] = lambda _: None,
     ) -> RunResult:
-        """Make the study, write it and finish the stage."""
-        folder, place = self.folder, self.place
-        began, guard = time.perf_counter(), folder.watch()
-        equations, responses = checked
-        pieces = place.kept(folder, self.progress.note, PIECES)
+        """Make the study, write it and finish the stage.
+
+        design_seconds : wall time that the design took. checked : is given the first response on
+        every engine.
+        """
+        folder, place, options = self.folder, self.place, self.options
+        began = time.perf_counter()
+        kept = place.kept(folder, self.progress.note)
+        equations, responses = checks(folder, self.made, help_.pool, kept, self.progress)
+        checked(responses[0])
+        ready, guard = time.perf_counter(), folder.watch()
         stores = FolderStores(
             folder.path,
             guard,
             self.progress.note,
             kept,
-            pieces,
+            place.kept(folder, self.progress.note, PIECES),
             place.prefix,
             folder.vouches,
         )
 
         def result_of(study: Study) -> RunResult:
             cost = {
-                "check_seconds": check_seconds,
-                "study_seconds": time.perf_counter() - began,
+                "check_seconds": ready - began,
+                "study_seconds": time.perf_counter() - ready,
                 "blame_seconds": 0.0 if study.blame is None else study.blame.seconds,
-                "maps_seconds": sum(found.seconds for found in study.maps),
+                "maps_seconds": sum(each.seconds for each in study.maps),
                 "jobs": float(help_.jobs),
-                "design_seconds": self.design_seconds,
+                "design_seconds": design_seconds,
             }
-            said = _provenance(self.made, study, self.options)
-            m = self.made
-            return RunResult(
-                m.modelfile, m.catalog, m.found, m.design, responses, study, said, cost, equations
-            )
+            return run_result(self.made, study, options, cost, equations)
 
         def sampled(study: Study) -> None:
-            document = _document(result_of(study))
             self.progress.note("yields of the exact circuit; ngspice is now asked about boards")
-            self.shown(run_json(folder.json(DESIGN), json.loads(dumps(document))))
+            self.shown(run_json(folder.json(DESIGN), plain(result_json(result_of(study)))))
 
         def standing(study: Study) -> None:
             guard()
@@ -147,32 +196,14 @@ class StudyStage:
             self.early = True
             self.shown(place.answer(folder))
 
-        options = self.options
-        study = tolerance(
-            self.made,
-            samples=options.samples,
-            until=options.until,
-            rung=options.rung,
-            tuned=options.tuned,
-            reached=options.reached,
-            blamed=options.blamed,
-            blame_budget=BUDGET if options.blame_budget is None else options.blame_budget,
-            maps=options.maps,
-            seed=options.seed,
-            jobs=help_.jobs,
-            pool=help_.pool,
-            checked=responses,
-            stores=stores,
-            runner=help_.runner,
-            progress=self.progress,
-            sampled=sampled,
-            standing=standing,
+        study = study_of(
+            self.made, options, help_, responses, stores, self.progress, sampled, standing
         )
         guard()
         kept.forget_unused()
         result = result_of(study)
-        if study.maps:
-            write_maps(folder, study, result.provenance)
+        for name, content in map_files(study, result.provenance).items():
+            folder.write(place.prefix + name, content)
         self._write(result)
         assert folder.manifest is not None
         folder.manifest.provenance = result.provenance
@@ -183,70 +214,84 @@ class StudyStage:
 
     def _write(self, result: RunResult) -> None:
         """``tolerance.json``, the boards of a list and the report, of what the study has."""
-        folder, place = self.folder, self.place
-        document = _document(result)
-        folder.write(place.prefix + TOLERANCE, dumps(document))
+        folder, prefix = self.folder, self.place.prefix
+        document = result_json(result)
+        folder.write(prefix + TOLERANCE, dumps(document))
         if document["boards"] is not None:
             asked = [(c.model.omega, c.model.expected) for c in result.checked]
             labels = measured_table.response_labels(asked)
-            text = measured_table.boards_csv(labels, document["boards"])
-            folder.write(place.prefix + BOARDS, text)
+            folder.write(prefix + BOARDS, measured_table.boards_csv(labels, document["boards"]))
         self.progress.stage("report")
         from designer.report.data import ReportData
         from designer.report.write import write_report  # matplotlib is not needed before this
 
-        data = ReportData(result, self.command, tuple(design_files.starts(folder)))
-        write_report(data, *(folder / name for name in place.names(REPORTS)))
+        data = ReportData(result, self.command, design_files.starts(folder))
+        write_report(data, *(folder / f"{prefix}{name}" for name in REPORTS))
 
 
-@dataclass(frozen=True)
-class Help:
-    """What a study is helped by."""
+def study_of(
+    made: Synthesis,
+    options: Options,
+    help_: StudyHelp,
+    checked: tuple[CheckedResponse, ...],
+    stores: Stores | None = None,
+    progress: Progress | None = None,
+    sampled: Callable[[Study], None] = lambda _: None,
+    standing: Callable[[Study], None] | None = None,
+) -> Study:
+    """The study that is asked for. checked, stores, sampled, standing : as of ``tolerance``."""
+    return tolerance(
+        made,
+        samples=options.samples,
+        until=options.until,
+        rung=options.rung,
+        tuned=options.tuned,
+        reached=options.reached,
+        blamed=options.blamed,
+        blame_budget=BUDGET if options.blame_budget is None else options.blame_budget,
+        maps=options.maps,
+        seed=options.seed,
+        jobs=help_.jobs,
+        pool=help_.pool,
+        checked=checked,
+        stores=stores,
+        runner=help_.runner,
+        progress=progress,
+        sampled=sampled,
+        standing=standing,
+    )
 
-    jobs: int
-    """Number of workers."""
-    pool: SpicePool | None
-    """Runs ngspice; None where it is not asked."""
-    runner: Runner
-    """Who computes blocks."""
 
-    @classmethod
-    @contextmanager
-    def of(cls, options: Options, progress: Progress) -> Iterator[Help]:
-        """What these options need, found before anything is written.
+def read_study(folder: Path, made: Synthesis) -> Study:
+    """The study of random boards in a folder, as the exact circuit has it: every board and its
+    verdict, without the further layers.
 
-        Raises
-        ------
-        EnvironmentMissing : it is not there.
-        """
-        jobs = cores() if options.jobs is None else options.jobs
-        with ExitStack() as stack:
-            pool = None
-            if options.rung != "exact":
-                progress.stage("ngspice")
-                pool = stack.enter_context(SpicePool(jobs, timeout=SPICE_TIMEOUT))
-                require_ngspice(pool)
-            runner: Runner = Here(jobs)
-            if options.cluster is not None:
-                from designer.yields.dask_runner import Cluster
-
-                progress.stage(f"cluster {options.cluster}")
-                runner = stack.enter_context(Cluster(options.cluster))
-            yield cls(jobs, pool, runner)
+    Raises
+    ------
+    InputError : there is no finished one.
+    """
+    place = Folder(folder)
+    stage = None if place.manifest is None else place.manifest.stages.get("study")
+    if stage is None or not stage.complete:
+        raise InputError(folder, "stages.study", MISSING, "a finished study (designer tolerance)")
+    samples = place.json(TOLERANCE)["samples"]
+    stores = FolderStores(folder, lambda: None, vouch=place.vouches)
+    options = Options(stage.inputs["seed"], samples=samples, rung="exact", blamed=False)
+    help_ = StudyHelp(options.workers, None, Here(options.workers))
+    return study_of(made, options, help_, check(made, None), stores)
 
 
 def checks(
     folder: Folder, made: Synthesis, pool: SpicePool | None, kept: Kept, progress: Progress
-) -> tuple[EquationCheck | None, tuple[CheckedResponse, ...]]:
-    """What ngspice says of the design's equations and of its nominal responses, or said before."""
+) -> Checks:
+    """The checks of a design, made now or taken from the folder."""
     if pool is None:
         return None, check(made, None, progress)
     assert folder.manifest is not None
     key = checks_hash(folder.manifest.files[DESIGN][1], pool.version)
     equations: EquationCheck | None = kept.get("equations", key)
     if equations is None:
-        progress.stage("ngspice, equation check")
-        equations = equation_check.check(made.design, made.found, pool)
+        equations = _equations(made, pool, progress)
         if not any(finding.reason for finding in equations.findings):
             kept.put("equations", key, equations)
     if not equations.passed:
@@ -260,7 +305,50 @@ def checks(
     return equations, checked
 
 
-def _document(result: RunResult) -> dict[str, Any]:
+def checks_in_memory(made: Synthesis, pool: SpicePool | None, progress: Progress) -> Checks:
+    """The checks of a design."""
+    equations = None if pool is None else _equations(made, pool, progress)
+    return equations, check(made, pool, progress)
+
+
+def _equations(made: Synthesis, pool: SpicePool, progress: Progress) -> EquationCheck:
+    progress.stage("ngspice, equation check")
+    return equation_check.check(made.design, made.found, pool)
+
+
+def run_result(
+    made: Synthesis,
+    study: Study,
+    options: Options,
+    cost: dict[str, float],
+    equations: EquationCheck | None,
+) -> RunResult:
+    """A study with all that went into it."""
+    gates = [
+        {"omega": c.model.omega, **c.gate.as_dict()} for c in study.checked if c.gate is not None
+    ]
+    origin = provenance(
+        made.modelfile,
+        made.catalog.hash,
+        seed=options.seed,
+        settings={"highs": SOLVER, "rules": RULES, "rung": options.rung, "ngspice": gates},
+        spread=study.plan.spread.as_dict(),
+    )
+    return RunResult(
+        made.modelfile,
+        made.catalog,
+        made.found,
+        made.design,
+        study.checked,
+        study,
+        origin,
+        cost,
+        equations,
+    )
+
+
+def result_json(result: RunResult) -> dict[str, Any]:
+    """What ``tolerance.json`` holds."""
     return study_json(
         result.study,
         result.provenance,
@@ -270,26 +358,9 @@ def _document(result: RunResult) -> dict[str, Any]:
     )
 
 
-def _provenance(made: Synthesis, study: Study, options: Options) -> dict[str, Any]:
-    return provenance(
-        made.modelfile,
-        made.catalog.hash,
-        seed=options.seed,
-        settings={
-            "highs": SOLVER,
-            "rules": RULES,
-            "rung": options.rung,
-            "ngspice": [
-                {"omega": c.model.omega, **c.gate.as_dict()}
-                for c in study.checked
-                if c.gate is not None
-            ],
-        },
-        spread=study.plan.spread.as_dict(),
-    )
-
-
 def satisfied(answer: Mapping[str, Any]) -> bool:
+    """Whether every response was found, the engines agree and can be trusted, and the netlist
+    computes the model's equation."""
     right = answer["equation_check"] is None or answer["equation_check"]["passed"]
     return right and all(
         r["found"] and r["engines_agree"] and _trusted(r.get("trust", {}))
@@ -297,7 +368,7 @@ def satisfied(answer: Mapping[str, Any]) -> bool:
     )
 
 
-def _trusted(said: Mapping[str, Any]) -> bool:
+def _trusted(trust: Mapping[str, Any]) -> bool:
     """Of the engines' answers, where each has one (null: it has none); a yield says only how far
     it is known. Older folders say nothing."""
-    return all(engine["trusted"] is True for name, engine in said.items() if name != "yield")
+    return all(engine["trusted"] is True for name, engine in trust.items() if name != "yield")

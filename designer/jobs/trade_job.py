@@ -1,21 +1,17 @@
-"""The verb ``trade``: a design's rungs measured, and the stage ``trade`` of its folder.
-
-Nothing here prints; ``cli.trade`` does.
-"""
+"""The verb ``trade``: a design's rungs measured, and the stage ``trade`` of its folder."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from designer.base.defaults import SEED, TRADE_BOARDS, at_least, cores
+from designer.base.defaults import SEED, TRADE_BOARDS, at_least
 from designer.base.design_folder import Folder
 from designer.base.frames import frame, table_html
 from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
-from designer.catalog.catalog import load_catalog
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.fidelity import pieces as trade_pieces, rungs as trade_rungs, yields
@@ -26,13 +22,14 @@ from designer.fidelity.rung_errors import compare
 from designer.fidelity.rungs import LEVELS, ROUNDS
 from designer.fidelity.trade_study import Trade, TradedResponse, trade as traded
 from designer.fidelity.yields import BoardTrade, LeftOut, Tally
-from designer.jobs import design_files, folder_numbers, synthesise_job
-from designer.jobs.options import Options
+from designer.jobs import folder_numbers
+from designer.jobs.design_source import grade_inputs, source
+from designer.jobs.options import Options, given
 from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import TRADE
-from designer.jobs.synthesise_job import grade_inputs, standing_inputs
+from designer.jobs.stage_runner import StageRunner
 from designer.model.find_responses import ModelResponse
-from designer.model.model_file import ModelFile, naming, need_responses, read_model_file
+from designer.model.model_file import ModelFile, need_responses, read_model_file
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields.verdict import StudyPlan
 
@@ -88,7 +85,7 @@ class TradeResult:
 
 
 def trade(
-    model: Path | str,
+    model: Path | str | ModelFile,
     out: Path | str | None = None,
     *,
     boards: int | None = None,
@@ -109,22 +106,23 @@ def trade(
     InputError : a number that cannot be, or a folder that holds something else.
     EnvironmentMissing : ngspice is missing.
     """
-    path, place = Path(model), None if out is None else Path(out)
-    given = {"boards": boards, "seed": seed}
-    numbers: dict[str, Any] = {k: v for k, v in given.items() if v is not None}
-    at_least("--boards", numbers.get("boards", TRADE_BOARDS), 0)
-    Options(numbers.get("seed", SEED), jobs).check()
+    argument = model if isinstance(model, ModelFile) else Path(model)
+    words = {"boards": boards, "seed": seed}
+    numbers = {"boards": TRADE_BOARDS, "seed": SEED} | given(words)
+    at_least("--boards", numbers["boards"], 0)
+    options = Options(numbers["seed"], jobs, overwrite=overwrite, resume=resume)
+    options.check()
     folder: Path | None = None
-    if place is None and not path.is_dir():
-        modelfile = read_model_file(path)
+    if out is not None or (isinstance(argument, Path) and argument.is_dir()):
+        modelfile, folder = source(argument, out)
     else:
-        modelfile, folder = synthesise_job.source(path, place)
-    if folder is not None and folder_numbers.goes_on(path, folder, resume):
-        numbers = folder_numbers.own(Folder(folder), "trade", tuple(given)) | numbers
-    options = Options(numbers.get("seed", SEED), jobs, overwrite=overwrite, resume=resume)
-    extent = TradeExtent(boards=numbers.get("boards", TRADE_BOARDS))
-    said = Progress() if progress is None else progress
-    return TradeResult(*answer(modelfile, folder, options, extent, said))
+        modelfile = argument if isinstance(argument, ModelFile) else read_model_file(argument)
+    if folder is not None and folder_numbers.goes_on(argument, folder, resume):
+        numbers |= folder_numbers.own(Folder(folder), "trade", tuple(words)) | given(words)
+        options = replace(options, seed=numbers["seed"])
+    extent = TradeExtent(boards=numbers["boards"])
+    progress = Progress() if progress is None else progress
+    return TradeResult(*answer(modelfile, folder, options, extent, progress))
 
 
 def measure(
@@ -153,11 +151,11 @@ def measure(
 
             def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
                 progress.stage(f"response {number} of {count}, every rung")
-                found = trade_rungs.measured(
+                measured = trade_rungs.measured(
                     made, r, pool, clock, levels=extent.levels, rounds_=extent.rounds
                 )
-                rows, truth = compare(ResponseLabel.of(number, r), found.answers)
-                return trade_pieces.rungs_json(rows, truth, found.settings, found.seconds)
+                rows, truth = compare(ResponseLabel.of(number, r), measured.answers)
+                return trade_pieces.rungs_json(rows, truth, measured.settings, measured.seconds)
 
             rungs.append(trade_pieces.rungs(pieces.piece(f"rungs {number}", rung)))
         responses = []
@@ -190,8 +188,8 @@ def _tally(
         samples = range(first, min(first + CHUNK, plan.samples))
 
         def some(samples: range = samples) -> dict[str, Any]:
-            said = f"boards {samples.start + 1} to {samples.stop} of {plan.samples}"
-            step = progress.stage(f"response {label.number} of {count}, {said}", len(samples))
+            boards = f"boards {samples.start + 1} to {samples.stop} of {plan.samples}"
+            step = progress.stage(f"response {label.number} of {count}, {boards}", len(samples))
             return asdict(yields.tally(plan, samples, pool, jobs, step))
 
         name = f"boards {label.number}, {samples.start} to {samples.stop - 1}"
@@ -209,37 +207,22 @@ def answer(
     """The JSON object, and whether the folder held it already; ``out`` None writes nothing."""
     options.check()
     need_responses(modelfile)
-    catalog = load_catalog()
     if out is None:
         progress.stage("responses of the model, parts")
-        made = synthesis_result.synthesise(modelfile, catalog)
+        made = synthesis_result.synthesise(modelfile)
         return _document(made, extent, TradePieces(), options, progress), False
-    folder = Folder(out)
-    wanted = standing_inputs(folder, modelfile, catalog, progress)
+    runner = StageRunner(modelfile, out, options, progress)
+    folder = runner.folder
     levels = [f"{factor:g}:{reltol:g}" for factor, reltol in extent.levels]
-    inputs = {**wanted["design"][0], **asdict(extent), "levels": levels, "seed": options.seed}
-    inputs |= {"rules": RULES, **grade_inputs(modelfile, catalog)}
-    wanted["trade"] = (inputs, [*NAMES, PIECES])
-    todo = folder.decide(wanted, overwrite=options.overwrite, resume=options.resume)
-    if not todo:
+    inputs = {**runner.design_inputs, **asdict(extent), "levels": levels, "seed": options.seed}
+    inputs |= {"rules": RULES, **grade_inputs(modelfile, runner.catalog)}
+    if not runner.decide({"trade": (inputs, [*NAMES, PIECES])}):
         return folder.json(TRADE), True
-    goes_on = "design" not in todo and folder.state("trade", inputs) == "unfinished"
     key = ManifestStage(inputs).hash
-    goes_on = goes_on and options.resume
-    known = read_pieces(folder / PIECES, key, progress.note) if goes_on else {}
-    if "design" in todo:
-        design_files.check(modelfile, catalog)
-    progress.stage("responses of the model, parts")
-    if "design" in todo:
-        made = synthesis_result.synthesise(modelfile, catalog)
-        with naming(modelfile):
-            files = design_files.texts(made)
-        folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
-        design_files.write(folder, made, files)
-        folder.finish("design")
-    else:
-        made = design_files.load(folder, modelfile, catalog)
-        folder.begin({s: wanted[s] for s in todo}, design_files.design_provenance(made))
+    unfinished = folder.state("trade", inputs) == "unfinished"
+    resumes = options.resume and unfinished and "design" not in runner.todo
+    known = read_pieces(folder / PIECES, key, progress.note) if resumes else {}
+    made = runner.design()
     guard = folder.watch()
 
     def save(text: str) -> None:
@@ -259,12 +242,13 @@ def _document(
 ) -> dict[str, Any]:
     from designer.fidelity.trade_files import trade_json  # Matplotlib takes a while to import
 
-    jobs = cores() if options.jobs is None else options.jobs
-    found = measure(made, extent, pieces, seed=options.seed, jobs=jobs, progress=progress)
-    said = provenance(
+    measured = measure(
+        made, extent, pieces, seed=options.seed, jobs=options.workers, progress=progress
+    )
+    origin = provenance(
         made.modelfile, made.catalog.hash, seed=options.seed, settings={"trade": asdict(extent)}
     )
-    return trade_json(found, said, pieces.seconds, made.modelfile.title)
+    return trade_json(measured, origin, pieces.seconds, made.modelfile.title)
 
 
 def _write(folder: Folder, document: dict[str, Any]) -> None:

@@ -284,8 +284,8 @@ def test_simulate_says_it(
 def test_the_tables_name_what_is_not_to_be_trusted() -> None:
     fine = Trust(answered=True).as_dict()
     open_ = Trust(doubts=(Reason("first"), Reason("second"))).as_dict()
-    assert tables.doubts({"circuit": fine, "ngspice": None}) == []
-    assert tables.doubts({"circuit": fine, "yield": open_}) == [
+    assert tables.untrusted({"circuit": fine, "ngspice": None}) == []
+    assert tables.untrusted({"circuit": fine, "yield": open_}) == [
         "yield not to be trusted here: first; second"
     ]
 

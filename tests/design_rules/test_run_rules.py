@@ -15,7 +15,6 @@ from hypothesis import given, strategies as st
 from designer.base.design_folder import Folder
 from designer.base.errors import InputError
 from designer.base.plain_json import dumps
-from designer.base.progress import Progress
 from designer.catalog.design_rule import (
     FAIL,
     NOT_RUN,
@@ -30,9 +29,9 @@ from designer.catalog.design_rules import BY_ID, RULES
 from designer.cli import entry
 from designer.design_rules import junit, markdown, run_rules
 from designer.jobs import rules_job
+from designer.jobs.design_source import design_inputs
 from designer.jobs.json_answers import synthesis_json
 from designer.jobs.origin import provenance
-from designer.jobs.synthesise_job import design_inputs
 from designer.model.model_file import parse_model_file
 from tests.cli.test_entry import _tree
 from tests.design_rules import test_rules_board
@@ -55,8 +54,8 @@ def written(path: Path, text: str) -> Path:
     """A design folder with this model file, and the parts of ``base``."""
     modelfile = parse_model_file(text)
     folder = Folder(path)
-    wanted = design_inputs(modelfile, CATALOG)
-    folder.begin({"design": (wanted["design"][0], ["model.toml", "design.json"])}, {})
+    inputs = design_inputs(modelfile, CATALOG)
+    folder.begin({"design": (inputs, ["model.toml", "design.json"])}, {})
     said = provenance(modelfile, CATALOG.hash)
     folder.write("model.toml", text)
     made = base().made
@@ -284,7 +283,7 @@ def test_bad_input_writes_nothing(
 
 
 def test_a_design_made_anew_forgets_its_rules(design: Path) -> None:
-    rules_job.into_folder(design, None, None, Progress())
+    rules_job.rules(design)
     folder = Folder(design)
     folder.begin({"design": ({"model": "another"}, ["model.toml", "design.json"])}, {})
     assert folder.manifest is not None

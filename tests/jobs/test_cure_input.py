@@ -17,7 +17,7 @@ from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, kind_named
 from designer.centering.cure_upgrade import Upgrades, upgraded_file
-from designer.cli import entry, search
+from designer.cli import entry, verbs
 from designer.jobs.cure_job import cure_into
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, parse_model_file
@@ -73,8 +73,8 @@ def test_a_kind_needs_no_quotes(said: str, meant: str | None) -> None:
 
 
 def test_help_lists_every_kind() -> None:
-    assert tuple(kind_named(name) for name in search.KINDS) == KINDS
-    assert not any(" " in name for name in search.KINDS)
+    assert tuple(kind_named(name) for name in verbs.KINDS) == KINDS
+    assert not any(" " in name for name in verbs.KINDS)
 
 
 def test_an_unknown_kind_is_answered_with_the_known_ones(
@@ -176,7 +176,7 @@ def test_a_part_that_was_picked_out_lies_anywhere_within_its_grade() -> None:
 def test_help_says_the_kinds(capsys: pytest.CaptureFixture[str]) -> None:
     assert entry.status(["search", "--help"]) == 0
     plain = re.sub(r"[\s│]+", " ", capsys.readouterr().out).replace("- ", "-")
-    for name in search.KINDS:
+    for name in verbs.KINDS:
         assert name in plain
 
 

@@ -17,9 +17,10 @@ from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, PLACE, TRIMMER
 from designer.centering.cure_measure import asked, plan_of
 from designer.jobs.cure_job import cure_into
+from designer.jobs.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.study_job import run_into
-from designer.jobs.synthesise_job import read_design, synthesise_into
+from designer.jobs.synthesise_job import synthesise_into
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.yields.yield_maps import yield_map
 from tests.shared.model_text import PAPER_TABLE

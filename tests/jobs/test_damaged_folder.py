@@ -19,8 +19,8 @@ from designer.base.design_folder import Folder
 from designer.base.seal import BLANK, MARK
 from designer.check import simulation
 from designer.cli import entry as cli
-from designer.jobs import bifurcation_job, cure_job, design_files, rules_job, study_job, study_stage
-from designer.jobs.synthesise_job import read_design
+from designer.jobs import bifurcation_job, cure_job, design_files, rules_job, study_stage
+from designer.jobs.design_source import read_design
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
 
@@ -80,7 +80,7 @@ def work_begins(finished: Finished) -> Iterator[None]:
         patched.setattr(design_files, "find", lambda *_: made.found)
         patched.setattr(study_stage, "SpicePool", lambda *_, **__: nullcontext())
         patched.setattr(study_stage, "require_ngspice", lambda _: None)
-        patched.setattr(study_job, "checks", stop)
+        patched.setattr(study_stage, "checks", stop)
         patched.setattr(rules_job, "checked", stop)
         patched.setattr(simulation, "simulate", stop)
         patched.setattr(bifurcation_job, "_make", stop)

@@ -21,8 +21,8 @@ from designer.base.plain_json import dumps
 from designer.check import synthesis_result
 from designer.check.synthesis_result import synthesise
 from designer.cli import entry
+from designer.jobs.design_source import read_design
 from designer.jobs.options import Options
-from designer.jobs.synthesise_job import read_design
 from designer.model.model_file import read_model_file
 from tests.shared.paper_cases import PAPER, synthesised
 from tests.shared.quick_folders import without_starts

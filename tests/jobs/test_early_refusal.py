@@ -16,7 +16,7 @@ from designer.catalog.entries import PartCase, mounting_of
 from designer.centering import design_search
 from designer.check import synthesis_result
 from designer.cli import entry
-from designer.jobs import search_job, study_stage
+from designer.jobs import search_stage, study_stage
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.synthesis import parts_choice
 from designer.synthesis.parts_choice import check_choices
@@ -172,7 +172,7 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for module, name in (
         (synthesis_result, "synthesise"), (design_search, "stretches"), (parts_choice, "_reach"),
-        (study_stage.Help, "of"), (search_job, "SpicePool"),
+        (study_stage.StudyHelp, "of"), (search_stage, "SpicePool"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, fail)
 

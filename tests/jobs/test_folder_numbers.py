@@ -11,7 +11,7 @@ import pytest
 from designer.base.defaults import TRADE_BOARDS
 from designer.base.design_folder import Folder
 from designer.cli import command_line, entry
-from designer.jobs import folder_numbers, search_job, study_job, synthesise_job, trade_job
+from designer.jobs import folder_numbers, search_job, study_job, trade_job
 from designer.jobs.options import Options
 from designer.model.model_file import parse_model_file
 from tests.yields.test_study import SMALL
@@ -51,7 +51,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     def source(path: Path, out: Path | None) -> Any:
         return parse_model_file(SMALL), path if out is None else out
 
-    monkeypatch.setattr(synthesise_job, "source", source)
+    for module in (study_job, search_job, trade_job):
+        monkeypatch.setattr(module, "source", source)
     monkeypatch.setattr(study_job, "run_into", study)
     monkeypatch.setattr(search_job, "search_into", study)
     monkeypatch.setattr(trade_job, "answer", trade)

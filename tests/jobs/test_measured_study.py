@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from designer.cli import entry
+from designer.jobs.design_source import read_design
 from designer.jobs.folder_numbers import of_study
 from designer.jobs.options import Options
-from designer.jobs.synthesise_job import read_design
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.report.measured_table import boards_csv, response_labels
 from tests.shared.quick_folders import quick_folder

@@ -26,7 +26,7 @@ from designer.catalog.catalog import load_catalog
 from designer.catalog.read import read_catalog_file
 from designer.catalog.vendor_model import read_vendor_model
 from designer.jobs.design_files import load, starts
-from designer.jobs.synthesise_job import read_design
+from designer.jobs.design_source import read_design
 from designer.model.find_responses import peaks
 from designer.model.measured_values import read_measured
 from designer.model.model_file import read_model_file

@@ -24,7 +24,8 @@ from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
 from designer.jobs import rung_choice
 from designer.jobs.options import Options
-from designer.jobs.search_job import confirms, searched_into, to_confirm
+from designer.jobs.search_job import confirms, to_confirm
+from designer.jobs.search_stage import searched_into
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.yields.verdict import Verdict
 from tests.shared.search_cases import asked, made
@@ -128,8 +129,8 @@ def test_a_search_keeps_the_word_of_the_trade_that_it_replaces(
     def interrupted(*_: object, **__: object) -> Any:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("designer.jobs.search_job.look", lambda *_: ())
-    monkeypatch.setattr("designer.jobs.search_job.design_search", interrupted)
+    monkeypatch.setattr("designer.jobs.search_stage.look", lambda *_: ())
+    monkeypatch.setattr("designer.jobs.search_stage.design_search", interrupted)
     words = ("search", model, "--out", out, "-q")
     assert run(*words) == 2  # the design is one that no search made
     assert run(*words, "--overwrite") == 130
@@ -199,7 +200,9 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
         ("search_json", {"format": 1}),
         ("resolved", file),
     ):
-        monkeypatch.setattr(f"designer.jobs.search_job.{name}", lambda *_, value=value, **__: value)
+        stage = f"designer.jobs.search_stage.{name}"
+        monkeypatch.setattr(stage, lambda *_, value=value, **__: value)
+    monkeypatch.setattr("designer.jobs.kicad_files.beside", lambda *_: {})
     design = "designer.jobs.design_files"
     monkeypatch.setattr(f"{design}.design_provenance", lambda _: {})
     monkeypatch.setattr(f"{design}.texts", lambda _: {MODEL: file.text})

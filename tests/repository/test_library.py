@@ -7,6 +7,7 @@ import csv
 import importlib
 import inspect
 import json
+import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import designer
@@ -66,13 +68,13 @@ def ruled(folder: Path) -> designer.RulesResult:
 
 
 @pytest.fixture(scope="module")
-def made(model: Path) -> designer.Synthesis:
+def made(model: Path) -> designer.JobOutcome:
     return designer.synthesise(designer.read_model_file(model))
 
 
 @pytest.fixture(scope="module")
-def study(made: designer.Synthesis) -> designer.Study:
-    return designer.tolerance(made, samples=SAMPLES, rung="exact", blamed=False, jobs=1)
+def study(made: designer.JobOutcome) -> designer.Study:
+    return designer.tolerance(made, samples=SAMPLES, rung="exact", blame=False, jobs=1).study
 
 
 def test_every_verb_is_a_function() -> None:
@@ -97,7 +99,7 @@ def test_new_and_load_catalog(tmp_path: Path) -> None:
 
 def test_simulate(model: Path) -> None:
     found = designer.simulate(designer.read_model_file(model), starts=4)
-    table = designer.simulated_table(found)
+    table = found.table()
     assert [s.orbit.response for s in found] == ["1-2-2", "1-1-1"]
     assert len(table) == sum(1 + (s.twin is not None) + len(s.others) for s in found)
     wanted = table[table.orbit == "wanted"]
@@ -134,10 +136,38 @@ def test_export_and_rules_of_a_folder(folder: Path, ruled: designer.RulesResult)
     assert list(ruled.table()["id"]) == [rule["id"] for rule in written["rules"]]
 
 
-def test_a_folders_design_is_read(folder: Path, made: designer.Synthesis) -> None:
+def test_a_folders_design_is_read(folder: Path, made: designer.JobOutcome) -> None:
     read = designer.read_design(folder)
     assert read.design.circuit.resistors == made.design.circuit.resistors
     assert read.modelfile.title == HOSTILE
+
+
+def test_a_folder_is_studied_as_the_design_in_memory(
+    folder: Path, tmp_path: Path, study: designer.Study
+) -> None:
+    """The same boards, written as ``tolerance`` writes them; read again from another object."""
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    words: dict[str, Any] = {"samples": SAMPLES, "rung": "exact", "blame": False, "jobs": 1}
+    made = designer.tolerance(copy, **words)
+    assert (made.folder, made.reused) == (copy, False)
+    again = designer.tolerance(str(copy), **words)
+    assert again.reused
+    assert again.answer == made.answer
+    assert again.answer["samples"] == SAMPLES
+    for outcome in (made, again):
+        pd.testing.assert_frame_equal(outcome.boards(), study.boards())
+        pd.testing.assert_frame_equal(outcome.yields(), study.yields_table())
+    assert list(again.bom().value) == list(made.bom().value)
+    written = json.loads((copy / "tolerance.json").read_text(encoding="utf-8"))
+    assert written["responses"] == made.answer["responses"]
+
+
+def test_a_path_without_a_folder_to_write_is_refused_as_on_the_command_line(model: Path) -> None:
+    for verb in (designer.synthesise, designer.run, designer.tolerance):
+        with pytest.raises(designer.InputError, match="--out"):
+            verb(model)
+    with pytest.raises(designer.InputError, match="the study"):
+        designer.synthesise(designer.read_model_file(model)).boards()
 
 
 def test_run(model: Path) -> None:
@@ -146,10 +176,15 @@ def test_run(model: Path) -> None:
     one = replace(file, responses=file.responses[:1])
     result = designer.run(one, samples=2, jobs=1)
     assert len(result.study.boards()) == 2
-    (checked,) = result.checked
+    (checked,) = result.study.checked
     assert checked.ngspice is not None
     assert checked.ngspice.response == "1-2-2"
     assert HOSTILE not in result._repr_html_()
+    (response,) = result.answer["responses"]
+    assert response["ngspice"] == "1-2-2"
+    assert response["yield"]["samples"] == 2
+    assert result.answer["equation_check"]["passed"]
+    assert result.folder is None
 
 
 def test_search_and_cure_and_trade_ask_for_the_same_as_the_command_line(
@@ -272,17 +307,17 @@ def test_the_boards_of_a_list_have_their_names(study: designer.Study) -> None:
     assert [list(names) for names in by] == [["left"], ["right"], ["left"], ["right"], ["left"]]
 
 
-def test_the_bill_is_that_of_the_folder(folder: Path, made: designer.Synthesis) -> None:
-    table = designer.bill_of_materials(made)
+def test_the_bill_is_that_of_the_folder(folder: Path, made: designer.JobOutcome) -> None:
+    table = made.bom()
     with (folder / "bom.csv").open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [str(q) for q in table.quantity] == [row["quantity"] for row in rows]
     for name in ("designators", "value", "part_number", "grade"):
         assert list(table[name]) == [row[name] for row in rows]
-    assert bills(made)["bom.csv"].splitlines()[0] == bill_csv(()).strip()
+    assert bills(made.synthesis)["bom.csv"].splitlines()[0] == bill_csv(()).strip()
 
 
-def test_the_parts_are_those_of_the_design_file(folder: Path, made: designer.Synthesis) -> None:
+def test_the_parts_are_those_of_the_design_file(folder: Path, made: designer.JobOutcome) -> None:
     table = made.design.parts_table()
     written = json.loads((folder / "design.json").read_text(encoding="utf-8"))["parts"]
     assert dict(zip(table.name, table.value, strict=True)) == written
@@ -293,15 +328,15 @@ def test_the_parts_are_those_of_the_design_file(folder: Path, made: designer.Syn
 # Notebooks
 
 
-def test_a_hostile_title_is_escaped(made: designer.Synthesis, ruled: designer.RulesResult) -> None:
+def test_a_hostile_title_is_escaped(made: designer.JobOutcome, ruled: designer.RulesResult) -> None:
     for shown in (made, ruled):
         text = shown._repr_html_()
         assert "<script" not in text
         assert "&lt;script&gt;" in text
 
 
-def test_what_shows_itself_has_its_rows(made: designer.Synthesis, study: designer.Study) -> None:
-    (found,) = designer.simulate(made.modelfile, [0.85], starts=4)
+def test_what_shows_itself_has_its_rows(made: designer.JobOutcome, study: designer.Study) -> None:
+    (found,) = designer.simulate(made.synthesis.modelfile, [0.85], starts=4)
     for shown, words in (
         (made.design, (made.design.circuit.resistors[0].name, "Ω", "more rows")),
         (study, ("1-2-2", "1-1-1", f"{SAMPLES} boards")),

@@ -18,7 +18,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import nominal_board
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.jobs import design_files
-from designer.jobs.deck_job import text
+from designer.jobs.export_job import deck_text
 from designer.model.find_responses import find
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, simulator_decks
@@ -107,7 +107,7 @@ def named(name: str, number: int, found: Waveforms) -> str:
 def test_the_deck_shows_what_circuit_cir_shows(name: str, dialect: Dialect, number: int) -> None:
     stop = stop_of(name, number)
     ours = by_circuit_cir(name, number)
-    theirs = waves(switched(text(design(name), dialect), number), design(name), stop)
+    theirs = waves(switched(deck_text(design(name), dialect), number), design(name), stop)
     assert named(name, number, theirs) == named(name, number, ours)
     grid = np.linspace(0.0, stop, 10_001)
     for net in design(name).design.circuit.state_nets:
@@ -117,7 +117,7 @@ def test_the_deck_shows_what_circuit_cir_shows(name: str, dialect: Dialect, numb
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_portable_deck_has_nothing_that_simulators_do_not_share(name: str) -> None:
-    lines = text(design(name), "portable").splitlines()
+    lines = deck_text(design(name), "portable").splitlines()
     assert lines[-1] == ".end"
     kinds = {line[0] for line in lines[:-1] if line[0] not in "*."}
     assert kinds <= set("RCDVIEG")
@@ -136,7 +136,7 @@ def test_the_portable_deck_has_nothing_that_simulators_do_not_share(name: str) -
 def test_every_response_is_in_the_deck_and_one_is_on() -> None:
     whole = design("rectifier")
     for dialect in DIALECTS:
-        deck = text(whole, dialect)
+        deck = deck_text(whole, dialect)
         for mark, count in (("VM1 ", 2), ("C1 ", 2), (".tran ", 2)):
             lines = [line for line in deck.splitlines() if line.lstrip("*").startswith(mark)]
             assert len(lines) == count
@@ -155,7 +155,7 @@ def test_the_deck_as_it_is_runs_in_the_plain_program(
     dialect: Dialect, mode: str, tmp_path: Path
 ) -> None:
     (tmp_path / ".spiceinit").write_text(f"set ngbehavior={mode}\n" if mode else "")
-    (tmp_path / "deck.cir").write_text(text(design("rectifier"), dialect))
+    (tmp_path / "deck.cir").write_text(deck_text(design("rectifier"), dialect))
     done = subprocess.run(
         ["ngspice", "-b", "-r", "out.raw", "deck.cir"],
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300,
@@ -194,8 +194,8 @@ def test_foreign_text_stays_in_its_comment(dialect: Dialect) -> None:
         modelfile=replace(whole.modelfile, title=hostile),
         design=replace(whole.design, circuit=circuit),
     )
-    plain = text(whole, dialect).splitlines()
-    deck = text(changed, dialect).splitlines()
+    plain = deck_text(whole, dialect).splitlines()
+    deck = deck_text(changed, dialect).splitlines()
     assert len(deck) == len(plain)
     differ = [line for line, other in zip(deck, plain, strict=True) if line != other]
     assert all(line.startswith("* ") and not set(line) & set("`${};") for line in differ)
@@ -203,7 +203,7 @@ def test_foreign_text_stays_in_its_comment(dialect: Dialect) -> None:
 
 
 def test_a_rail_that_nothing_uses_has_a_load() -> None:
-    lines = text(design("rectifier"), "portable").splitlines()
+    lines = deck_text(design("rectifier"), "portable").splitlines()
     for rail in ("vcc", "vee"):
         assert sum(f" {rail} " in line for line in lines if line[0] not in "*.") >= 2
 
@@ -221,7 +221,7 @@ def test_offsets_and_unequal_limits_reach_both_decks(monkeypatch: pytest.MonkeyP
     )
     monkeypatch.setattr(simulator_decks, "nominal_board", lambda circuit: board)
     stop = stop_of("saturation, upper", 1)
-    found = [waves(text(whole, dialect), whole, stop) for dialect in DIALECTS]
+    found = [waves(deck_text(whole, dialect), whole, stop) for dialect in DIALECTS]
     net = circuit.state_nets[0]
     grid = np.linspace(0.0, stop, 2001)
     one, other = (np.interp(grid, w.axis, w.signals[net]) for w in found)

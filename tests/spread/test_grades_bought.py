@@ -23,9 +23,9 @@ from designer.centering.design_search import look
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Circuit
 from designer.cli import entry, tables
-from designer.jobs import board_files, design_files, study_job
+from designer.jobs import board_files, design_files, study_job, study_stage
+from designer.jobs.design_source import bills_are_of_old, design_inputs
 from designer.jobs.options import Options
-from designer.jobs.synthesise_job import bills_are_of_old, design_inputs
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
@@ -377,10 +377,10 @@ def test_which_files_it_can_be_about() -> None:
     assert once_otherwise(file_of(FIVE), CATALOG)
     assert once_otherwise(file_of('resistors = "E192"\n'), CATALOG)
     assert once_otherwise(upgraded_file(file_of(), Upgrades(grades={"R4": 0.005})), CATALOG)
-    here = design_inputs(file_of(FIVE), CATALOG)["design"][0]
+    here = design_inputs(file_of(FIVE), CATALOG)
     assert bills_are_of_old({k: v for k, v in here.items() if k != "grades"}, here)
     assert not bills_are_of_old(here, here)
-    plain = design_inputs(file_of(), CATALOG)["design"][0]
+    plain = design_inputs(file_of(), CATALOG)
     assert set(plain) == {"model", "catalogue", "version"}
 
 
@@ -408,7 +408,7 @@ def test_a_study_renews_the_bill_of_a_folder_of_that_time(
     def studied(*_: object) -> None:
         raise Studied
 
-    monkeypatch.setattr(study_job, "checks", studied)
+    monkeypatch.setattr(study_stage, "checks", studied)
     for bill in (old, new):
         assert (out / "bom.csv").read_text() == bill
         with pytest.raises(Studied):

@@ -20,8 +20,9 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.resistors import effective
 from designer.circuit.scale_fit import minimax
+from designer.jobs.design_source import read_design
 from designer.jobs.options import Options
-from designer.jobs.synthesise_job import read_design, synthesise_into
+from designer.jobs.synthesise_job import synthesise_into
 from designer.model.board_table import BoardChoice
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks

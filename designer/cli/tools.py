@@ -1,0 +1,86 @@
+"""The verbs ``catalog``, ``new`` and ``reproduce``, which know no design folder."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from designer.cli.app import Output, Session, option, verb
+
+
+@verb(computes=False)
+def catalog(
+    session: Session,
+    check: Annotated[
+        str | None, option("--check", "NAME", "Measure this op-amp's model against its figures.")
+    ] = None,
+    **_: Any,
+) -> Output:
+    """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
+    from designer.catalog.catalog import load_catalog
+    from designer.cli import tables
+
+    known = load_catalog()
+    if check is None:
+        kinds = ("opamps", "families", "diodes", "references", "trimmers", "headers")
+        names = {kind: [entry.name for entry in getattr(known, kind)] for kind in kinds}
+        answer = {"format": 1, **names, "hash": known.hash}
+        return Output(answer, lambda: tables.catalog(known))
+    from designer.spice.opamp_check import checks
+
+    session.progress.stage(f"{check} in ngspice")
+    measured = checks(known.opamp(check))
+    rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
+    return Output(
+        {"format": 1, "opamp": check, "checks": rows, "hash": known.hash},
+        lambda: tables.checks(check, measured),
+        all(row.agrees for row in measured),
+    )
+
+
+@verb(computes=False)
+def new(
+    _session: Session,
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="The file to write.")] = Path(
+        "model.toml"
+    ),
+    **_: Any,
+) -> Output:
+    """Write a commented model file to start from; an existing file is left alone."""
+    from designer.model.template import new as write_model_file
+
+    write_model_file(path)
+    answer = {"format": 1, "files": [str(path)]}
+    return Output(answer, lambda: print(f"written: {path}", file=sys.stderr))
+
+
+@verb("jobs", "resume", json=False)
+def reproduce(
+    session: Session,
+    what: Annotated[
+        Literal["dynamics", "circuit", "tolerance"],
+        typer.Argument(metavar="dynamics|circuit|tolerance", help="Which part of the paper."),
+    ],
+    out: Annotated[
+        Path | None,
+        option(
+            "--out",
+            "DIR",
+            "Where to [default: reports/paper-dynamics, reports/paper-circuit, reports/tolerance].",
+        ),
+    ] = None,
+    samples: Annotated[int | None, option("--samples", "N", "Boards a case (tolerance).")] = None,
+    seed: Annotated[int | None, option("--seed", "N", "Of the boards (tolerance).")] = None,
+    **shared: Any,
+) -> Output:
+    """The paper's figures and statements, measured again."""
+    from designer.paper import paper_reports
+
+    paper_reports.reproduce(
+        what, out, samples=samples, seed=seed, progress=session.progress, **shared
+    )
+    return Output({})

@@ -1,0 +1,130 @@
+"""The design of the highest yield as stages of a design folder: what is searched, what is written.
+
+A found design is written as any other: ``model.toml`` is the model file with everything filled in,
+``asked.toml`` the one that was given.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from designer.base.design_folder import DESIGN_FILES, MODEL, Folder
+from designer.base.errors import InputError
+from designer.base.manifest import MANIFEST
+from designer.base.plain_json import dumps
+from designer.base.progress import Progress
+from designer.base.version import __version__
+from designer.catalog.catalog import load_catalog
+from designer.centering.design_search import look, search as design_search
+from designer.centering.memory import Memory
+from designer.centering.ngspice_check import Listener
+from designer.centering.resolved_file import resolved
+from designer.centering.result_json import search_json
+from designer.jobs import rung_choice
+from designer.jobs.design_source import design_inputs, design_stage, model_file
+from designer.jobs.options import Options
+from designer.jobs.origin import provenance
+from designer.jobs.rung_choice import SEARCH
+from designer.jobs.stage_runner import write_design
+from designer.jobs.study_stage import SPICE_TIMEOUT
+from designer.model.model_file import ModelFile
+from designer.spice.batch_backend import program_version
+from designer.spice.pool import SpicePool
+
+ASKED, CANDIDATES = "asked.toml", "candidates.jsonl"
+FILES = [ASKED, SEARCH, CANDIDATES]
+RULES = 5
+"""Number of the rules by which a search goes; whoever changes what it finds raises it."""
+
+
+def chosen(modelfile: ModelFile, out: Path, options: Options, progress: Progress) -> ModelFile:
+    """The model file that a verb is to work with: as it is, or where it leaves the design to a
+    search, that of the folder ``out``, with the design found and written there.
+
+    A design folder's own model file has its design already.
+    """
+    if modelfile.circuit.objective != "yield" or modelfile.source == out / MODEL:
+        return modelfile
+    return searched_into(modelfile, out, options, progress)
+
+
+def searched_into(
+    modelfile: ModelFile, out: Path, options: Options, progress: Progress
+) -> ModelFile:
+    """Search for a design of this model file, unless the folder has it; the folder's model file.
+
+    Raises
+    ------
+    InputError, Unreachable : see ``design_search.search``; nothing was written by then, but for
+        what a design could not be made of.
+    EnvironmentMissing : no ngspice; said before any work.
+    """
+    options.check()
+    catalog, folder = load_catalog(), Folder(out)
+    inputs = design_inputs(modelfile, catalog)
+    inputs |= {"version": __version__, "rules": RULES, "seed": options.seed}
+    todo = folder.decide(
+        {"search": (inputs, [*FILES, *DESIGN_FILES])},
+        overwrite=options.overwrite,
+        resume=options.resume,
+    )
+    if not todo:
+        return model_file(out / MODEL)
+    begun = folder.state("search", inputs) == "unfinished"
+    if not (begun or options.overwrite) and folder.manifest and "design" in folder.manifest.stages:
+        raise InputError(
+            folder / MODEL,
+            "the design",
+            "one that no search made",
+            "another folder, or --overwrite to replace what manifest.json lists",
+        )
+    program_version()
+    resumes = begun and options.resume
+    trade = _trade_of(folder, modelfile, resumes=resumes)
+    began = time.perf_counter()
+    windows = look(modelfile, catalog, options.workers, progress)
+    origin = provenance(modelfile, catalog.hash, seed=options.seed, settings={"rules": RULES})
+    if not resumes:
+        (folder / CANDIDATES).unlink(missing_ok=True)
+    # trade.json goes with its design, and so before this is done.
+    folder.begin({"search": (inputs, FILES)}, origin, {"trade": trade} if trade else None)
+    folder.write(ASKED, modelfile.text)
+    memory = Memory(folder / CANDIDATES, inputs["model"], progress.note)
+    with SpicePool(options.workers, timeout=SPICE_TIMEOUT) as pool:
+        searched = design_search(
+            modelfile,
+            catalog,
+            seed=options.seed,
+            jobs=options.workers,
+            memory=memory,
+            windows=windows,
+            listen=Listener(pool, memory),
+            progress=progress,
+        )
+    final = resolved(modelfile, searched.made, searched.final.choice, out / MODEL)
+    made = replace(searched.made, modelfile=final, seconds=time.perf_counter() - began)
+    stages = design_stage(final, design_inputs(final, catalog))
+    write_design(folder, made, stages, options, progress)
+    if trade is not None:
+        trade = {**trade, "model": final.sha256}
+    cost = {"seconds": time.perf_counter() - began}
+    document = {**search_json(searched), "trade": trade, "provenance": origin, "cost": cost}
+    folder.write(SEARCH, dumps(document))
+    folder.finish("search")
+    return model_file(out / MODEL)
+
+
+def _trade_of(folder: Folder, modelfile: ModelFile, *, resumes: bool) -> dict[str, Any] | None:
+    """What a trade says that stood here when the search began, as ``rung_choice.RungChoice``."""
+    if resumes:
+        assert folder.manifest is not None
+        trade: object = folder.manifest.stages["search"].kept.get("trade")
+        if not (trade is None or isinstance(trade, dict)):
+            field = "stages.search.kept.trade"
+            raise InputError(folder / MANIFEST, field, trade, "the choice of a trade")
+        return trade
+    choice = rung_choice.before_search(folder, modelfile.sha256)
+    return None if choice is None else asdict(choice)

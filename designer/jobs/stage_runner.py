@@ -1,0 +1,102 @@
+"""The one way in which a verb works on the stages of a design folder.
+
+What is to be done is decided, and refused, before any work. The design is made, or read where it
+stands. Every stage is marked as begun before its first file is written, and as finished after its
+last; what is interrupted in between can be resumed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from designer.base.design_folder import Folder
+from designer.base.manifest import StageName, Stages
+from designer.base.progress import Progress
+from designer.catalog.catalog import load_catalog
+from designer.check import synthesis_result
+from designer.check.synthesis_result import Synthesis
+from designer.jobs import design_files, kicad_files
+from designer.jobs.design_source import design_inputs, design_stage, standing_design
+from designer.jobs.options import Options
+from designer.model.model_file import ModelFile, naming
+
+
+class StageRunner:
+    """The design of a folder, and the stages that a verb makes of it.
+
+    Parameters
+    ----------
+    out : the folder, which need not exist. anew : whether a design that was made with another
+    catalogue or version is to be chosen anew; it stands otherwise.
+
+    Raises
+    ------
+    InputError : an option that cannot be, or something else at the folder's place.
+    """
+
+    def __init__(
+        self,
+        modelfile: ModelFile,
+        out: Path,
+        options: Options,
+        progress: Progress,
+        *,
+        anew: bool = False,
+    ) -> None:
+        options.check()
+        self.modelfile, self.options, self.progress = modelfile, options, progress
+        self.catalog, self.folder = load_catalog(), Folder(out)
+        self.stages = (
+            design_stage(modelfile, design_inputs(modelfile, self.catalog))
+            if anew
+            else standing_design(self.folder, modelfile, self.catalog, progress)
+        )
+        self.todo: list[StageName] = []
+
+    @property
+    def design_inputs(self) -> dict[str, Any]:
+        """What decides the design, as it is to stand in the folder."""
+        return self.stages["design"][0]
+
+    def decide(self, stages: Stages | None = None) -> bool:
+        """Whether the design, or one of these stages beside it, is to be done.
+
+        Raises
+        ------
+        InputError : as ``Folder.decide``, or a design that could not be built.
+        """
+        self.stages |= stages or {}
+        overwrite, resume = self.options.overwrite, self.options.resume
+        self.todo = self.folder.decide(self.stages, overwrite=overwrite, resume=resume)
+        if "design" in self.todo:
+            design_files.check(self.modelfile, self.catalog)
+        return bool(self.todo)
+
+    def design(self) -> Synthesis:
+        """The design, made and written if that is to be done, else read. All stages are begun."""
+        stages = {stage: self.stages[stage] for stage in self.todo}
+        if "design" in stages:
+            self.progress.stage("responses of the model, parts")
+            made = synthesis_result.synthesise(self.modelfile, self.catalog)
+            write_design(self.folder, made, stages, self.options, self.progress)
+        else:
+            made = design_files.load(self.folder, self.modelfile, self.catalog)
+            if stages:
+                self.folder.begin(stages, design_files.design_provenance(made))
+        return made
+
+
+def write_design(
+    folder: Folder, made: Synthesis, stages: Stages, options: Options, progress: Progress
+) -> None:
+    """Write a design and its KiCad project. stages : that begin now, the design among them."""
+    progress.stage("start recipes, files of the design")
+    with naming(made.modelfile):
+        files = design_files.texts(made)
+    inputs = stages["design"][0]
+    project = kicad_files.beside(folder, made, inputs, options.overwrite, progress)
+    folder.begin(stages, design_files.design_provenance(made))
+    design_files.write(folder, made, files)
+    folder.finish("design")
+    kicad_files.write(folder, made, inputs, project)
