@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from designer.base.figure_style import (
     CIRCUIT_COLOUR,
@@ -17,14 +17,17 @@ from designer.base.figure_style import (
     MUTED,
     NGSPICE_COLOUR,
     new_figure,
+    plain_numbers,
     styled,
 )
+from designer.base.page import Block, Page, PageSection, Table, bullets, markdown, table
 from designer.base.plain_json import FORMAT, plain
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
 from designer.fidelity.rungs import RUNGS
 from designer.fidelity.trade_study import RESPONSE, WAVEFORM, Cheapest, Trade
 from designer.fidelity.yields import BoardTrade, LeftOut
 
+NONE = "–"
 TITLES = {
     "rk4": "model, Runge-Kutta",
     "model": "model, exact",
@@ -131,96 +134,106 @@ def name(row: Mapping[str, Any]) -> str:
 
 def sheet(answer: Mapping[str, Any]) -> str:
     """trade.md: the cheapest rung for each question, then every rung, from the JSON object."""
-    lines = [
-        f"# Time and error: {answer['title']}",
-        "",
-        f"Made by `designer trade` with `--boards {_boards_asked(answer)} --seed "
-        f"{answer['provenance']['seed']}`; the data are in `trade.json`.",
-        "",
-        "The cheapest rung and setting that answers each question, for all responses together, and "
-        "against what its error is measured: `board` is the nominal circuit with full op-amps in "
-        "ngspice at the finest step, `equations` the exact flow of the model, `ideal` ngspice with "
-        "ideal op-amps on the same boards. Where the bound is not kept by any rung, the one that "
-        "comes nearest is named. A setting of ngspice that did not pass the numerics gate is never "
-        "named; the board itself is, by what its two finest steps differ by, where nothing less "
-        "will do.",
-        "",
-        "| question | against | rung | setting | measured | kept | CPU seconds | |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    alone = len(answer["truths"]) == 1
-    lines += [_answered(c) for c in answer["cheapest"] if c["number"] is None or alone]
-    lines += [
-        "",
+    head = [
+        Markup(
+            f"Made by `designer trade` with `--boards {_boards_asked(answer)} --seed "
+            f"{answer['provenance']['seed']}`; the data are in `trade.json`."
+        ),
+        Markup(
+            "The cheapest rung and setting that answers each question, for all responses together, "
+            "and against what its error is measured: `board` is the nominal circuit with full "
+            "op-amps in ngspice at the finest step, `equations` the exact flow of the model, "
+            "`ideal` ngspice with ideal op-amps on the same boards. Where the bound is not kept by "
+            "any rung, the one that comes nearest is named. A setting of ngspice that did not pass "
+            "the numerics gate is never named; the board itself is, by what its two finest steps "
+            "differ by, where nothing less will do."
+        ),
+        _answers(answer),
         "Seconds are of one drive period of each response, for yields of one board of each. "
         "Measured is the largest error with the uncertainty of what it is measured against, or the "
         "number of responses with another n-p-q.",
-        "",
-        "## By response",
-        "",
-        "Error of x₁ (RMS over its peak) against the board, and CPU milliseconds of a drive period;"
-        " another n-p-q than the board's is named. `step ×4` is four times the step that the gate "
-        "tries first, so coarser; `step ×0.5` is finer.",
-        "",
     ]
-    kinds = list(dict.fromkeys((row["rung"], row["level"]) for row in answer["rungs"]))
-    heads = [f"{name(t)}: {t['response']}" for t in answer["truths"]]
-    lines += ["| rung | setting | " + " | ".join(heads) + " |", "|---" * (2 + len(heads)) + "|"]
-    by = {(row["rung"], row["level"], row["number"]): row for row in answer["rungs"]}
-    for rung, level in kinds:
-        cells = [_cell(by.get((rung, level, t["number"]))) for t in answer["truths"]]
-        lines.append(f"| {TITLES[rung]} | {level} | {' | '.join(cells)} |")
+    sections = [PageSection("By response", _by_response(answer))]
     if answer["boards"]:
-        lines += [
-            "",
-            "## Boards",
-            "",
-            "Yield of the exact circuit less that of ngspice with ideal op-amps on the boards that "
-            "both decided, with its 95 % interval. The interval holds for all boards that were "
-            "asked: those that one of them left undecided count as ok on the exact circuit alone "
-            "for its upper end, and in ngspice alone for its lower end.",
-            "",
-            "| response | boards | ok | only exact | only ngspice | undecided | difference |"
-            " interval |",
-            "|---|---|---|---|---|---|---|---|",
-        ]
-        lines += [
-            f"| {name(b)} | {b['boards']} | {b['ok']} | {b['lost']} | {b['gained']} | "
-            f"{b['undecided']} | {_percent(b['difference'])} | {_percent(b['low'])} to "
-            f"{_percent(b['high'])} |"
-            for b in answer["boards"]
-        ]
+        sections.append(PageSection("Boards", _board_blocks(answer["boards"])))
     if answer["left_out"]:
-        lines += ["", "No boards were asked of:", ""]
-        lines += [f"- {name(row)}: {row['reason']}" for row in answer["left_out"]]
-    return "\n".join(lines) + "\n"
+        rows = [f"{name(row)}: {row['reason']}" for row in answer["left_out"]]
+        sections.append(PageSection("Left out", ["No boards were asked of:", bullets(rows)]))
+    return markdown(Page(f"Time and error: {answer['title']}", head, sections))
 
 
 def _boards_asked(answer: Mapping[str, Any]) -> int:
     return int(answer["provenance"]["settings"]["trade"]["boards"])
 
 
-def _answered(c: Mapping[str, Any]) -> str:
-    start = f"| {c['question']} | {c['of']} |"
-    if c["rung"] is None:
-        kept = "–" if c["shown"] is None else "no"
-        return f"{start} – | – | – | {kept} | – | {c['note']} |"
-    kept = "yes" if c["shown"] else "no"
-    return (
-        f"{start} {TITLES[c['rung']]} | {c['level']} | {_measured(c)} | {kept} | "
-        f"{_short(c['seconds'])} | {c['note']} |"
-    )
+def _answers(answer: Mapping[str, Any]) -> Table | None:
+    """What answers each question, of all responses together."""
+    alone = len(answer["truths"]) == 1
+    rows = []
+    for c in answer["cheapest"]:
+        if c["number"] is not None and not alone:
+            continue
+        kept = {True: "yes", False: "no", None: NONE}[c["shown"]]
+        rung = [TITLES[c["rung"]], c["level"], _measured(c)] if c["rung"] else [NONE] * 3
+        seconds = _short(c["seconds"]) if c["rung"] else NONE
+        rows.append((c["question"], c["of"], *rung, kept, seconds, c["note"]))
+    columns = (
+        "question", "against", "rung", "setting", "measured", "kept", "CPU seconds", "note",
+    )  # fmt: skip
+    return table(columns, rows)
+
+
+def _by_response(answer: Mapping[str, Any]) -> list[Block]:
+    truths = answer["truths"]
+    by = {(row["rung"], row["level"], row["number"]): row for row in answer["rungs"]}
+    rows = [
+        (TITLES[rung], level, *(_cell(by.get((rung, level, t["number"]))) for t in truths))
+        for rung, level in dict.fromkeys((row["rung"], row["level"]) for row in answer["rungs"])
+    ]
+    heads = (f"{name(t)}: {t['response']}" for t in truths)
+    return [
+        Markup(
+            "Error of x₁ (RMS over its peak) against the board, and CPU milliseconds of a drive "
+            "period; another n-p-q than the board's is named. `step ×4` is four times the step "
+            "that the gate tries first, so coarser; `step ×0.5` is finer."
+        ),
+        table(("rung", "setting", *heads), rows),
+    ]
+
+
+def _board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
+    keys = ("boards", "ok", "lost", "gained", "undecided")
+    rows = [
+        (
+            name(b),
+            *(str(b[key]) for key in keys),
+            _percent(b["difference"]),
+            f"{_percent(b['low'])} to {_percent(b['high'])}",
+        )
+        for b in boards
+    ]
+    columns = (
+        "response", "boards", "ok", "only exact", "only ngspice", "undecided", "difference",
+        "interval",
+    )  # fmt: skip
+    return [
+        "Yield of the exact circuit less that of ngspice with ideal op-amps on the boards that "
+        "both decided, with its 95 % interval. The interval holds for all boards that were "
+        "asked: those that one of them left undecided count as ok on the exact circuit alone "
+        "for its upper end, and in ngspice alone for its lower end.",
+        table(columns, rows),
+    ]
 
 
 def _measured(c: Mapping[str, Any]) -> str:
     if c["measured"] is None:
-        return "–"
+        return NONE
     return f"{c['measured']:.0f} wrong" if c["question"] == RESPONSE else _percent(c["measured"])
 
 
 def _cell(row: Mapping[str, Any] | None) -> str:
     if row is None:
-        return "–"
+        return NONE
     error = _percent(row["error"]) if row["right"][BOARD] else row["response"]
     seconds = row["seconds_per_period"]
     said = f"{error}, {_short(None if seconds is None else 1e3 * seconds)}"
@@ -228,13 +241,13 @@ def _cell(row: Mapping[str, Any] | None) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{100.0 * value:.2g} %"
+    return NONE if value is None else f"{100.0 * value:.2g} %"
 
 
 def _short(value: float | None) -> str:
     """To two figures, without an exponent where it need not be."""
     if value is None:
-        return "–"
+        return NONE
     return f"{float(f'{value:.2g}'):.10g}"
 
 
@@ -311,7 +324,5 @@ def _panel(axes: Axes, rows: Sequence[Mapping[str, Any]], key: str) -> None:
     axes.axhline(WAVEFORM, color=MUTED, lw=0.9, ls=(0, (4, 2)), zorder=1)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        axis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.xaxis, axes.yaxis)
     axes.grid(True, color=GRID, lw=0.6)

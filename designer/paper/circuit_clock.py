@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -46,22 +47,6 @@ CLAIM = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
-class Method:
-    """What one method of integration costs, and its error."""
-
-    name: str
-    """Name of the method."""
-    setting: str
-    """Setting of the method, as text."""
-    seconds: float
-    """CPU time of a drive period, median of the rounds."""
-    ratio: float
-    """CPU time over that of ``BASE`` in the same round, median."""
-    error: float
-    """RMS of x1 over a drive period, over its peak; nan without a run."""
-
-
-@dataclass(frozen=True)
 class _Entry:
     setting: str
     entrant: Entrant
@@ -76,16 +61,27 @@ def measure(
     *,
     rounds_: int = ROUNDS,
     progress: Callable[[], None] = lambda: None,
-) -> tuple[Method, ...]:
-    """Every method on one response; pool : of one worker."""
+) -> list[dict[str, Any]]:
+    """Every method on one response, a row each; pool : of one worker.
+
+    name, setting : of the method. seconds : CPU time of a drive period [s], median of the rounds.
+    ratio : to that of ``BASE`` in the same round, median. error : RMS of x1 over a drive period,
+    over its peak; nan without a run.
+    """
     entries = [*_models(response), *_circuits(pool, one, settled)]
     taken = rounds([e.entrant for e in entries], rounds_, progress)
     base = next(i for i, e in enumerate(entries) if e.entrant.name == BASE)
-    ratios = np.median(taken / taken[:, base : base + 1], axis=0)
-    return tuple(
-        Method(e.entrant.name, e.setting, float(s), float(r), e.error)
-        for e, s, r in zip(entries, np.median(taken, axis=0), ratios, strict=True)
-    )
+    seconds, ratios = np.median(taken, axis=0), np.median(taken / taken[:, base, None], axis=0)
+    return [
+        {
+            "name": e.entrant.name,
+            "setting": e.setting,
+            "seconds": float(s),
+            "ratio": float(r),
+            "error": e.error,
+        }
+        for e, s, r in zip(entries, seconds, ratios, strict=True)
+    ]
 
 
 def _models(response: ModelResponse) -> list[_Entry]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,30 +20,13 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import nominal_board
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse
 from designer.paper.circuits import Built
 from designer.yields.verdict import Verdict, Yield, judge
 
 PATTERNS = 512
 """Sign patterns, at most; twelve sections have 4096."""
-
-
-@dataclass(frozen=True)
-class Shift:
-    """One response with offsets of one size: verdicts over the sign patterns."""
-
-    omega: float
-    """Dimensionless frequency."""
-    expected: str
-    """The wanted n-p-q."""
-    size: float
-    """Size of the offsets [V]."""
-    there: bool
-    """Whether the nominal circuit shows the response; where not, nothing is counted."""
-    counted: Yield
-    """Counts of the sign patterns."""
-    to: tuple[tuple[str, int], ...]
-    """What the boards that lose it show, and on how many patterns, most frequent first."""
 
 
 def signs(sections: int, most: int = PATTERNS) -> Array:
@@ -67,8 +51,13 @@ def shifts(
     *,
     jobs: int = 1,
     most: int = PATTERNS,
-) -> tuple[Shift, ...]:
-    """Each response on every board with offsets of ± size [V]."""
+) -> list[dict[str, Any]]:
+    """Each response on every board with offsets of ± size [V], a row each.
+
+    there : whether the nominal circuit shows the response; where not, nothing is counted.
+    counted, interval : verdicts over the sign patterns, and the yield's 95 % interval. to : what
+    the boards that lose it show, and on how many patterns, most frequent first.
+    """
     circuit = one.circuit
     patterns = signs(len(circuit.sections), most)
     nominal = Boards.of(circuit, [nominal_board(circuit)])
@@ -76,28 +65,33 @@ def shifts(
     offset = {s.name: size * patterns[:, i] for i, s in enumerate(circuit.sections)}
     ensemble = Ensemble(replace(many, offset=offset), jobs=jobs)
     system = one.reduction().system()
-    out = []
+    rows = []
     for r in wanted:
-        assert r.expected is not None
         drive = one.excitation(r.omega).drive
         own = settle(Flow(system, drive), r.orbit.start * one.volts)
-        if judge(own, r.spec, own)[0] is not Verdict.OK:
-            out.append(Shift(r.omega, r.expected, size, False, Yield(0, 0, 0, 0), ()))
-            continue
-        orbits = ensemble.settle(
-            range(len(patterns)),
-            [drive] * len(patterns),
-            np.tile(own.start, (len(patterns), 1)),
-            jobs=jobs,
-        )
-        judged = [judge(orbit, r.spec, own)[0] for orbit in orbits]
-        tally = Counter(judged)
+        there = judge(own, r.spec, own)[0] is Verdict.OK
+        orbits: Sequence[Orbit] = ()
+        if there:
+            starts = np.tile(own.start, (len(patterns), 1))
+            drives = [drive] * len(patterns)
+            orbits = ensemble.settle(range(len(patterns)), drives, starts, jobs=jobs)
+        verdicts = [judge(orbit, r.spec, own)[0] for orbit in orbits]
         lost = Counter(
-            orbit.response for orbit, v in zip(orbits, judged, strict=True) if v is not Verdict.OK
+            orbit.response for orbit, v in zip(orbits, verdicts, strict=True) if v is not Verdict.OK
         )
+        tally = Counter(verdicts)
         counted = Yield(
             tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
         )
-        to = tuple(sorted(lost.items(), key=lambda item: (-item[1], item[0])))
-        out.append(Shift(r.omega, r.expected, size, True, counted, to))
-    return tuple(out)
+        rows.append(
+            {
+                "omega": r.omega,
+                "expected": r.expected,
+                "size": size,
+                "there": there,
+                "counted": asdict(counted),
+                "to": sorted(lost.items(), key=lambda item: (-item[1], item[0])),
+                "interval": counted.interval,
+            }
+        )
+    return rows

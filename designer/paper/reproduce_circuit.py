@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
 from designer.base.defaults import at_least, cores
@@ -29,9 +28,9 @@ from designer.catalog.catalog import Catalog, load_catalog
 from designer.dynamics.flow import Flow
 from designer.jobs.origin import provenance
 from designer.model.find_responses import ModelResponse, find
-from designer.paper import circuit_clock, circuit_ngspice, circuit_pictures, misprints, offsets
+from designer.paper import circuit_clock, circuit_ngspice, misprints, offsets
 from designer.paper.circuit_ngspice import FINE
-from designer.paper.circuit_page import circuit_page
+from designer.paper.circuit_page import circuit_figures, circuit_page
 from designer.paper.circuits import (
     CIRCUITS,
     CORRECTED,
@@ -128,27 +127,13 @@ def reproduce(
         ),
         "cost": {"seconds": sum(seconds.values()), "pieces": seconds},
     }
-    write_files(out, (DATA, document), circuit_page(pieces, COMMAND), _figures(pieces))
+    write_files(out, (DATA, document), circuit_page(pieces, COMMAND), circuit_figures(pieces))
 
 
 def _timed(make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """A piece in the types of JSON, with its wall time."""
     began = time.perf_counter()
     return {**plain(make()), "seconds": time.perf_counter() - began}
-
-
-def _figures(pieces: Mapping[str, dict[str, Any]]) -> dict[str, Figure]:
-    circuits = [p for name, p in pieces.items() if name.startswith("circuit-")]
-    offset_pieces = [p for name, p in pieces.items() if name.startswith("offsets-")]
-    return {
-        "fig7": circuit_pictures.dc_curves(circuits),
-        **{
-            f"fig8-{p['circuit']}": circuit_pictures.portraits(pieces["model"], p) for p in circuits
-        },
-        "misprints": circuit_pictures.misprints(pieces["misprints"]["misprints"]),
-        "offsets": circuit_pictures.offsets(offset_pieces),
-        "times": circuit_pictures.times(pieces["clock"]["responses"]),
-    }
 
 
 def _without_curves(piece: Mapping[str, Any]) -> dict[str, Any]:
@@ -282,8 +267,9 @@ def _offsets(bench: _Bench, name: str) -> dict[str, Any]:
     for kind, size in (("typical", offset.typ), ("maximum", offset.max)):
         assert size is not None
         bench.progress.stage(f"{TITLES[name]}: {kind} offset of {1e3 * size:g} mV")
-        rows = offsets.shifts(one, bench.wanted, size, jobs=bench.jobs, most=bench.extent.patterns)
-        out["sizes"][kind] = [{**asdict(r), "interval": r.counted.interval} for r in rows]
+        out["sizes"][kind] = offsets.shifts(
+            one, bench.wanted, size, jobs=bench.jobs, most=bench.extent.patterns
+        )
     return out
 
 
@@ -299,7 +285,7 @@ def _clock(bench: _Bench) -> dict[str, Any]:
             methods = circuit_clock.measure(
                 pool, one, r, f, rounds_=bench.extent.rounds, progress=step
             )
-            rows.append({"omega": r.omega, "p": p, "methods": [asdict(m) for m in methods]})
+            rows.append({"omega": r.omega, "p": p, "methods": methods})
     return {"rounds": bench.extent.rounds, "responses": rows}
 
 

@@ -37,9 +37,14 @@ from designer.model import swept_model
 from designer.model.find_responses import scale_of
 from designer.model.model_file import parse_model_file
 from designer.model.swept_model import ModelSubject
-from designer.paper import dynamics_pictures
-from designer.paper.dynamics_page import KINDS, Dynamics, dynamics_page
-from designer.paper.dynamics_pictures import Portrait
+from designer.paper.dynamics_page import (
+    KINDS,
+    Dynamics,
+    Portrait,
+    branch_chart,
+    dynamics_page,
+    portrait_sheet,
+)
 from designer.paper.report_files import README, write_files
 from designer.paper.response_order import gaps
 from designer.paper.statements import main_cascades, main_windows, statements, symmetric_mains
@@ -195,8 +200,8 @@ def _figures(
     dynamics: Dynamics, extent: DynamicsExtent, sweeps: Mapping[str, sweep.Sweep]
 ) -> dict[str, Figure]:
     figures = {
-        "branches": dynamics_pictures.branches(dynamics.survey, extent.low, extent.high),
-        "fig3": dynamics_pictures.portraits(_portraits(dynamics)),
+        "branches": branch_chart(dynamics.survey, extent.low, extent.high),
+        "fig3": portrait_sheet(_portraits(dynamics)),
     }
     for name, result in sweeps.items():
         marks = bifurcation_plots.marks(dynamics.survey.points, *FIGURES[name][:2])
