@@ -1,18 +1,14 @@
 """Catalogues: what can be bought, and what its data sheets say (docs/catalogue.md).
 
-A catalogue is a folder of TOML and CSV files, ``format = 1``. Folders are searched in this order,
-and an entry of the same kind and name in an earlier folder replaces the later one:
-
-1. the folder that the caller names, then those of the environment variable DESIGNER_CATALOGS
-2. the user's own: ``catalogs`` in the configuration folder of this system
-3. the catalogue that comes with the tool
+A catalogue is a folder of TOML and CSV files, ``format = 1``. Several folders are searched, and an
+entry of the same kind and name in an earlier one replaces the later one (``catalog.read``).
 """
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -40,11 +36,12 @@ from designer.catalog.entries import (
     Use,
     mounting_of,
 )
-from designer.catalog.read import read_folders
+from designer.catalog.read import Entry, read_folders
 from designer.catalog.shortage import Offer, no_part, no_values, other_case
 
 _SAME = 1e-9  # relative; values and grades closer than this are the same
 _NamedT = TypeVar("_NamedT", OpAmp, DiodeEntry, ReferenceEntry, PartFamily)
+_EntryT = TypeVar("_EntryT", bound=Entry)
 _CasedT = TypeVar("_CasedT", OpAmp, DiodeEntry, ReferenceEntry, TrimmerEntry)
 
 
@@ -143,15 +140,17 @@ class Catalog:
         nobody sells the value in it, it is the cheapest of a better one, and of equally cheap ones
         the best. Then it is the one that is listed first.
         """
-        found = self._holding(self._families(kind, grade, use), value)
-        return _choice(*min(found, key=lambda each: _preference(each[0], grade))) if found else None
+        return _best(
+            self._holding(self._families(kind, grade, use), value),
+            lambda family: _preference(family, grade),
+        )
 
     def cheapest(self, kind: Kind, value: float, grade: float) -> PartChoice | None:
         """The cheapest signal part of this value at ``grade`` or better, whatever its grade; of
         equally cheap ones the best. None where nobody sells it."""
-        found = self._holding(self._families(kind, grade), value)
-        return (
-            _choice(*min(found, key=lambda each: (each[0].price, each[0].grade))) if found else None
+        return _best(
+            self._holding(self._families(kind, grade), value),
+            lambda family: (family.price, family.grade),
         )
 
     def part(self, kind: Kind, value: float, grade: float, use: Use = "signal") -> PartChoice:
@@ -161,12 +160,12 @@ class Catalog:
         ------
         Unreachable : no family holds the value at that grade or a better one.
         """
-        found = self.sold(kind, value, grade, use)
-        if found is None:
+        part = self.sold(kind, value, grade, use)
+        if part is None:
             offer = self._offer(kind, grade, use)
             holding = [family for family, _ in self._holding(offer.families, value)]
             raise no_part(offer, value, holding, self._offer(kind, 1.0, use))
-        return found
+        return part
 
     def array(self, name: str, value: float) -> PartChoice:
         """The array of this family with parts of this value.
@@ -181,28 +180,23 @@ class Catalog:
         if self.mounting not in ("mixed", family.mounting):
             expected = f'"{family.mounting}" or "mixed": {name} is sold in no other case'
             raise InputError(None, "board.mounting", self.mounting, expected)
-        found = self._holding([family], value)
-        if not found:
+        holding = self._holding([family], value)
+        if not holding:
             low, high = (format_quantity(v, UNITS[family.kind]) for v in family.range)
             spelled = format_quantity(value, UNITS[family.kind])
-            said = f"a value that {name} is sold in: {' '.join(family.series)}, {low} to {high}"
-            raise Unreachable(None, "array", spelled, said)
-        return _choice(*found[0])
+            expected = f"a value that {name} is sold in: {' '.join(family.series)}, {low} to {high}"
+            raise Unreachable(None, "array", spelled, expected)
+        return _choice(*holding[0])
 
     def substitute(self, part: PartChoice, grade: float) -> PartChoice | None:
         """Another maker's part of the same value, use and footprint, chosen as ``part`` is; None
         where the catalogue has none."""
-        family = part.family
-        found = [
-            (other, exact)
-            for other, exact in self._holding(
-                self._families(family.kind, grade, family.use), part.value
-            )
-            if other.footprint == part.footprint and other.manufacturer != part.manufacturer
+        others = [
+            family
+            for family in self._families(part.family.kind, grade, part.family.use)
+            if family.footprint == part.footprint and family.manufacturer != part.manufacturer
         ]
-        if not found:
-            return None
-        return _choice(*min(found, key=lambda each: _preference(each[0], grade)))
+        return _best(self._holding(others, part.value), lambda family: _preference(family, grade))
 
     def opamp(self, name: str, supply: float | None = None) -> OpAmp:
         """The op-amp of this name; InputError names the known ones and a likely one, or says that
@@ -313,18 +307,21 @@ def load_catalog(extra: Path | None = None) -> Catalog:
     ------
     InputError : a named folder does not exist, or a file in one is wrong; names file and field.
     """
-    held = read_folders(extra)
-    entries = held.entries
+    entries, content_hash, folders = read_folders(extra)
+
+    def of(sort: type[_EntryT]) -> tuple[_EntryT, ...]:
+        return tuple(entry for entry in entries if isinstance(entry, sort))
+
     return Catalog(
-        tuple(entry for entry in entries if isinstance(entry, PartFamily)),
-        tuple(entry for entry in entries if isinstance(entry, OpAmp)),
-        tuple(entry for entry in entries if isinstance(entry, DiodeEntry)),
-        tuple(entry for entry in entries if isinstance(entry, ReferenceEntry)),
-        held.hash,
-        held.folders,
-        tuple(entry for entry in entries if isinstance(entry, TrimmerEntry)),
-        tuple(entry for entry in entries if isinstance(entry, Header)),
-        tuple(entry for entry in entries if isinstance(entry, Price)),
+        families=of(PartFamily),
+        opamps=of(OpAmp),
+        diodes=of(DiodeEntry),
+        references=of(ReferenceEntry),
+        hash=content_hash,
+        folders=folders,
+        trimmers=of(TrimmerEntry),
+        headers=of(Header),
+        prices=of(Price),
     )
 
 
@@ -342,6 +339,13 @@ def _footprints(entry: OpAmp | DiodeEntry | ReferenceEntry | TrimmerEntry) -> tu
 def _preference(family: PartFamily, grade: float) -> tuple[bool, int, float]:
     """Least for the family that is bought from where ``grade`` is asked for."""
     return not math.isclose(family.grade, grade, rel_tol=_SAME), family.price, family.grade
+
+
+def _best(
+    holding: Sequence[tuple[PartFamily, float]], key: Callable[[PartFamily], tuple[float, ...]]
+) -> PartChoice | None:
+    """The part of the family for which the key is least."""
+    return _choice(*min(holding, key=lambda each: key(each[0]))) if holding else None
 
 
 def _choice(family: PartFamily, value: float) -> PartChoice:

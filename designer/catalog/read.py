@@ -58,20 +58,12 @@ LAYOUTS = "bom-layouts"
 _MAX_BYTES = 4_000_000
 
 
-@dataclass(frozen=True)
-class Contents:
-    """What the folders hold; an entry of the same sort and name in an earlier one counts."""
+def read_folders(extra: Path | None = None) -> tuple[tuple[Entry, ...], str, tuple[Path, ...]]:
+    """The entries of all catalogue folders, the hash of their files' content, and the folders.
 
-    entries: tuple[Entry, ...]
-    """What the files hold, earlier folders first."""
-    hash: str
-    """Hash of the content of all files, wherever they lie."""
-    folders: tuple[Path, ...]
-    """The folders that were read, in order."""
+    Of entries of the same sort and name, the one in the earliest folder counts.
 
-
-def read_folders(extra: Path | None = None) -> Contents:
-    """Read all catalogue folders, ``extra`` first.
+    extra : a folder that comes first.
 
     Raises
     ------
@@ -83,7 +75,7 @@ def read_folders(extra: Path | None = None) -> Contents:
     for folder in folders:
         for key, entry in _read_folder(folder, digest).items():
             held.setdefault(key, entry)
-    return Contents(tuple(held.values()), digest.hexdigest(), folders)
+    return tuple(held.values()), digest.hexdigest(), folders
 
 
 def _folders(extra: Path | None) -> tuple[Path, ...]:

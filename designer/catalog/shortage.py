@@ -56,13 +56,13 @@ class Offer:
         """What keeps these from being bought, after a semicolon; "" where nothing does."""
         forbidden = [f for f in families if f.name in self.refused]
         cased = [f for f in families if self.bars(f) and f not in forbidden]
-        said = ""
+        text = ""
         if cased:
             has = "has" if len(cased) == 1 else "have"
-            said += f"; {_listed(cased)} {has} no {CASES[self.mounting]} form"
+            text += f"; {_listed(cased)} {has} no {CASES[self.mounting]} form"
         if forbidden:
-            said += f"; circuit.{self.kind}_family leaves out {_listed(forbidden)}"
-        return said
+            text += f"; circuit.{self.kind}_family leaves out {_listed(forbidden)}"
+        return text
 
 
 def _listed(families: Sequence[PartFamily]) -> str:

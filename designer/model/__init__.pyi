@@ -18,7 +18,7 @@ from .circuit_table import (
 )
 from .distributions import (
     Binned as Binned,
-    Law as Law,
+    Distribution as Distribution,
     Normal as Normal,
     Split as Split,
     Uniform as Uniform,

@@ -6,8 +6,9 @@ distribution, and studies that differ in a grade or a shape compare the same boa
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -15,20 +16,21 @@ from scipy.special import ndtr, ndtri
 from designer.base.arrays import Array
 
 
-class Law(Protocol):
+@dataclass(frozen=True)
+class Distribution(ABC):
     """A distribution on a bounded interval."""
 
+    @abstractmethod
     def ppf(self, u: Array) -> Array:
         """(N,) values with probabilities u (N,) below them: non-decreasing."""
-        ...
 
     def as_dict(self) -> dict[str, Any]:
         """Name and parameters."""
-        ...
+        return {"law": type(self).__name__.lower(), **self.__dict__}
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(Distribution):
     """Every value between two limits is equally likely."""
 
     low: float
@@ -39,12 +41,9 @@ class Uniform:
     def ppf(self, u: Array) -> Array:
         return self.low + (self.high - self.low) * u
 
-    def as_dict(self) -> dict[str, Any]:
-        return {"law": "uniform", "low": self.low, "high": self.high}
-
 
 @dataclass(frozen=True)
-class Normal:
+class Normal(Distribution):
     """Normal about 0 and cut: what lies beyond was sorted out."""
 
     sigma: float
@@ -63,12 +62,9 @@ class Normal:
         z = np.clip(z, -cut, 0.0)
         return np.asarray(self.sigma * np.where(u < 0.5, z, -z))
 
-    def as_dict(self) -> dict[str, Any]:
-        return {"law": "normal", "sigma": self.sigma, "limit": self.limit}
-
 
 @dataclass(frozen=True)
-class Binned:
+class Binned(Distribution):
     """Uniform about 0 without a middle part: the better grade was picked out."""
 
     inner: float
@@ -80,12 +76,9 @@ class Binned:
         away = (self.outer - self.inner) * np.abs(2.0 * u - 1.0) + self.inner
         return np.asarray(np.where(u < 0.5, -away, away))
 
-    def as_dict(self) -> dict[str, Any]:
-        return {"law": "binned", "inner": self.inner, "outer": self.outer}
-
 
 @dataclass(frozen=True)
-class Split:
+class Split(Distribution):
     """Half of the values lie uniformly on one side of a middle, half on the other.
 
     This is all that the minimum, typical and maximum of a data sheet say.
@@ -102,6 +95,3 @@ class Split:
         below = self.low + (self.middle - self.low) * 2.0 * u
         above = self.middle + (self.high - self.middle) * (2.0 * u - 1.0)
         return np.asarray(np.where(u < 0.5, below, above))
-
-    def as_dict(self) -> dict[str, Any]:
-        return {"law": "split", "low": self.low, "middle": self.middle, "high": self.high}

@@ -27,6 +27,12 @@ SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
 """Frequencies that set the swing of a model file that names no response."""
 
 
+_A_NUMBER = (
+    "a number; the verb search chooses one, and so does what makes a design with "
+    'circuit.objective = "yield"'
+)
+
+
 @dataclass(frozen=True)
 class ModelResponse:
     """A wanted response and what the model shows there."""
@@ -61,22 +67,14 @@ def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelRespons
     """
     out = []
     for number, spec in enumerate(wanted, start=1):
-        if spec.omega is None:
-            raise InputError(
-                None,
-                f"response[{number}].omega",
-                "best",
-                "a number; the verb search chooses one, and so does what makes a design with "
-                'circuit.objective = "yield"',
-            )
-        if isinstance(spec.b, tuple):
-            raise InputError(
-                None,
-                f"response[{number}].b",
-                list(spec.b),
-                "a number; the verb search chooses one, and so does what makes a design with "
-                'circuit.objective = "yield"',
-            )
+        for key, found in (
+            ("omega", "best" if spec.omega is None else None),
+            ("b", list(spec.b) if isinstance(spec.b, tuple) else None),
+        ):
+            if found is not None:
+                raise InputError(None, f"response[{number}].{key}", found, _A_NUMBER)
+        assert spec.omega is not None
+        assert not isinstance(spec.b, tuple)
         check_omega(f"response[{number}].omega", spec.omega)
         b = model.b if spec.b is None else spec.b
         if len(wanted) > 1:

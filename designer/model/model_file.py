@@ -16,8 +16,9 @@ found and what was expected; nothing is read by half.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -233,16 +234,12 @@ def need_responses(modelfile: ModelFile, more: str = "") -> None:
         )
 
 
-class naming:  # noqa: N801 - reads as a word in a with statement
+@contextlib.contextmanager
+def naming(modelfile: ModelFile) -> Iterator[None]:
     """Names the model file in an InputError that names none."""
-
-    def __init__(self, modelfile: ModelFile) -> None:
-        self._source = modelfile.source
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if not isinstance(error, InputError) or error.file is not None or self._source is None:
-            return
-        raise type(error)(self._source, error.field, error.found, error.expected) from None
+    try:
+        yield
+    except InputError as error:
+        if error.file is not None or modelfile.source is None:
+            raise
+        raise type(error)(modelfile.source, error.field, error.found, error.expected) from None

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import Accepts, FileTable, fraction, line, number, one_of, several, span
 from designer.base.units import parse_quantity
-from designer.model.distributions import Binned, Law, Normal, Uniform
+from designer.model.distributions import Binned, Distribution, Normal, Uniform
 
 DataSheet = Literal["typical", "data sheet"]
 LawName = Literal["uniform", "normal", "binned"]
@@ -33,13 +33,13 @@ class SpreadShape:
     inner: float = 0.0
     """No part lies within ± this, a fraction as a grade is: these were picked out ("binned")."""
 
-    def of(self, grade: float) -> Law:
+    def of(self, grade: float) -> Distribution:
         """The relative deviation of parts of this grade."""
         if self.law == "normal":
             return Normal(grade / self.sigmas, grade)
         return Binned(self.inner, grade) if self.law == "binned" else Uniform(-grade, grade)
 
-    def over(self, grade: float) -> Law:
+    def over(self, grade: float) -> Distribution:
         """The same, over the grade."""
         if self.law == "normal":
             return Normal(1.0 / self.sigmas)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from designer.base.natural_sort import natural_key
 from designer.circuit.netlist import Circuit
-from designer.model.distributions import Binned, Law, Normal, Split, Uniform
+from designer.model.distributions import Binned, Distribution, Normal, Split, Uniform
 from designer.report.words import quantity
 from designer.spread.spread import NO_BANDWIDTH, Spread
 
@@ -68,7 +68,7 @@ def _ageing(spread: Spread) -> str:
     )
 
 
-def _grade(shape: Law, grade: float) -> str:
+def _grade(shape: Distribution, grade: float) -> str:
     width = f"within ± {_percent(grade)}"
     if isinstance(shape, Normal):
         return f"normal with σ = {_percent(grade * shape.sigma)}, cut at ± {_percent(grade)}"
@@ -77,13 +77,13 @@ def _grade(shape: Law, grade: float) -> str:
     return f"uniform {width}"
 
 
-def _between(law: Law, unit: str) -> str:
+def _between(law: Distribution, unit: str) -> str:
     low, high = (quantity(v, unit) for v in _ends(law))
     middle = f", half of them below {quantity(law.middle, unit)}" if isinstance(law, Split) else ""
     return f"from {low} to {high}{middle}"
 
 
-def _ends(law: Law) -> tuple[float, float]:
+def _ends(law: Distribution) -> tuple[float, float]:
     if isinstance(law, Uniform | Split):
         return law.low, law.high
     raise TypeError(law)

@@ -14,7 +14,7 @@ from designer.catalog.entries import Kind, PartFamily
 from designer.catalog.fields import Figure
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor
 from designer.circuit.resistors import composites_of
-from designer.model.distributions import Law, Split, Uniform
+from designer.model.distributions import Distribution, Split, Uniform
 from designer.model.spread_table import DataSheet, PartRule, SpreadShape, check_binned
 from designer.spread.measured_check import check_measured, check_measured_names
 from designer.spread.spread import Group, Spread
@@ -229,7 +229,7 @@ class _Rules:
             named += [r.name for r in self.circuit.references]
         return {name: self.drawn[name] for name in (*named, *self.asked)}
 
-    def shapes(self) -> dict[str, Law]:
+    def shapes(self) -> dict[str, Distribution]:
         """Over the grade, of the parts for which one is stated.
 
         A binned law is about the grade that was asked for: a part that is bought at a better one
@@ -246,9 +246,9 @@ class _Rules:
                 found[name] = shape.over(grade)
         return found
 
-    def tempco(self) -> dict[str, Law]:
+    def tempco(self) -> dict[str, Distribution]:
         """Of every part [1/K]: its own, or ± what the catalogue says of its family."""
-        found: dict[str, Law] = {}
+        found: dict[str, Distribution] = {}
         for name, part in self.parts.items():
             rule = self.own.get(name)
             if rule is not None and rule.tempco is not None:
@@ -285,9 +285,9 @@ class _Rules:
             raise self.refuse(key, said, expected) from None
         return bought.family
 
-    def ageing(self) -> dict[str, Law]:
+    def ageing(self) -> dict[str, Distribution]:
         """Of the parts that age: resistors and capacitors by the file's figure, or their own."""
-        found: dict[str, Law] = {}
+        found: dict[str, Distribution] = {}
         for name, part in self.parts.items():
             rule = self.own.get(name)
             if rule is not None and rule.ageing is not None:
@@ -355,7 +355,7 @@ def _sold(part: Part) -> float:
     return part.value
 
 
-def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Law | None:
+def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Distribution | None:
     """A section's figure from board to board; None: the typical one on all.
 
     A bound that the data sheet does not give is as far from the typical figure, as a ratio, as the

@@ -19,7 +19,7 @@ from designer.base.arrays import Array
 from designer.catalog.entries import OpAmp
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resistor
-from designer.model.distributions import Law, Normal, Uniform
+from designer.model.distributions import Distribution, Normal, Uniform
 from designer.model.measured_values import MeasuredBoards
 from designer.spread import random_streams
 
@@ -79,26 +79,26 @@ class Spread:
     """Half-width of the output limits as a fraction."""
     reference: float = 1.0
     """Half-width of each reference's voltage over its grade."""
-    resistor_shape: Law = EVEN
-    """Law of a resistor's deviation over the grade."""
-    capacitor_shape: Law = EVEN
-    """Law of a capacitor's deviation over the grade."""
-    bias: Law | None = None
+    resistor_shape: Distribution = EVEN
+    """Distribution of a resistor's deviation over the grade."""
+    capacitor_shape: Distribution = EVEN
+    """Distribution of a capacitor's deviation over the grade."""
+    bias: Distribution | None = None
     """Input bias current of each section [A]; None: the circuit's, which is the typical figure."""
-    gain_bandwidth: Law | None = None
+    gain_bandwidth: Distribution | None = None
     """Gain-bandwidth product of each section [Hz]; None: the circuit's, which is the typical
     figure."""
     supply: float = 0.0
     """Half-width of the rails as a fraction, each rail its own."""
     grades: Mapping[str, float] = field(default_factory=dict)
     """Grades of the parts that have their own, fractions by part."""
-    shapes: Mapping[str, Law] = field(default_factory=dict)
+    shapes: Mapping[str, Distribution] = field(default_factory=dict)
     """Laws of the deviation over the grade of the parts that have their own, by part."""
     temperature: tuple[float, float] | None = None
     """Range of the board's temperature [°C]."""
-    tempco: Mapping[str, Law] = field(default_factory=dict)
+    tempco: Mapping[str, Distribution] = field(default_factory=dict)
     """Temperature coefficient [1/K] by part; it counts where there is a temperature."""
-    ageing: Mapping[str, Law] = field(default_factory=dict)
+    ageing: Mapping[str, Distribution] = field(default_factory=dict)
     """Relative change by part."""
     groups: tuple[Group, ...] = ()
     """Groups of parts that vary together."""
@@ -192,19 +192,19 @@ class Spread:
             raise ValueError(f"a cube of {cube.shape}; this circuit has {len(names)} coordinates")
         return _Draw(self, circuit, dict(zip(names, cube.T, strict=True)), len(cube)).boards()
 
-    def _known(self, spread: Law | float | None, name: str) -> bool:
+    def _known(self, spread: Distribution | float | None, name: str) -> bool:
         """Whether this quantity of a board is drawn or was measured."""
         return bool(spread) or (self.measured is not None and name in self.measured.values)
 
     @property
-    def _slow(self) -> tuple[tuple[str, Mapping[str, Law]], ...]:
+    def _slow(self) -> tuple[tuple[str, Mapping[str, Distribution]], ...]:
         """What a part does after it was measured, as a suffix of its name; by part."""
         found = [(".ageing", self.ageing)] if self.ageing else []
         if self.temperature is not None:
             found.insert(0, (".tempco", self.tempco))
         return tuple(found)
 
-    def shape_of(self, part: Passive | Reference) -> Law:
+    def shape_of(self, part: Passive | Reference) -> Distribution:
         """Of a part's relative deviation over its grade."""
         if part.name in self.shapes:
             return self.shapes[part.name]
@@ -288,7 +288,7 @@ class _Draw:
     def same(self, value: float) -> Array:
         return np.full(self.count, value)
 
-    def drawn(self, name: str, law: Law | None, typical: float) -> Array:
+    def drawn(self, name: str, law: Distribution | None, typical: float) -> Array:
         """What a section has of its own, unless it was measured."""
         return self.known(name, self.same(typical) if law is None else law.ppf(self.u[name]))
 
@@ -313,7 +313,7 @@ class _Draw:
             value = value * (1.0 + tempco * warmer)
         return value
 
-    def shared(self, name: str, what: str, law: Law) -> Array:
+    def shared(self, name: str, what: str, law: Distribution) -> Array:
         """A part's own draw; in a group mixed with the common one."""
         own = law.ppf(self.u[name + what])
         group = self.group.get(name)

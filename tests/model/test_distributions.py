@@ -12,7 +12,7 @@ from scipy import integrate
 from scipy.stats import kstest, norm, truncnorm
 
 from designer.base.arrays import Array
-from designer.model.distributions import Binned, Law, Normal, Split, Uniform
+from designer.model.distributions import Binned, Distribution, Normal, Split, Uniform
 
 U = np.random.default_rng(20).random(20_000)
 
@@ -34,7 +34,7 @@ def _split(x: Array) -> Array:
 CUT = 10.0 / 3.0
 LEFT = 1.0 - 2.0 * CUT * norm.pdf(CUT) / (norm.cdf(CUT) - norm.cdf(-CUT))
 SPLIT_SQUARE = 0.5 * (19.0 / 3.0) + 0.5 * (79.0 / 3.0)  # mean square: (b² + ab + a²)/3 each half
-LAWS: list[tuple[Law, Callable[[Array], Array], float, float]] = [
+LAWS: list[tuple[Distribution, Callable[[Array], Array], float, float]] = [
     (Uniform(-2.0, 4.0), lambda x: (x + 2.0) / 6.0, 1.0, 3.0),
     (Normal(3.0, 10.0), truncnorm(-CUT, CUT, scale=3.0).cdf, 0.0, 9.0 * LEFT),
     (Binned(1.0, 5.0), _binned, 0.0, 31.0 / 3.0),  # (25 + 5 + 1)/3
@@ -45,7 +45,7 @@ EACH = pytest.mark.parametrize(("law", "cdf", "mean", "variance"), LAWS)
 
 @EACH
 def test_distribution_and_moments(
-    law: Law, cdf: Callable[[Array], Array], mean: float, variance: float
+    law: Distribution, cdf: Callable[[Array], Array], mean: float, variance: float
 ) -> None:
     drawn = law.ppf(U)
     assert kstest(cdf(drawn), "uniform").pvalue > 1e-3
@@ -56,7 +56,7 @@ def test_distribution_and_moments(
 
 @EACH
 def test_moments_by_quadrature(
-    law: Law, cdf: Callable[[Array], Array], mean: float, variance: float
+    law: Distribution, cdf: Callable[[Array], Array], mean: float, variance: float
 ) -> None:
     """The integral over u of ppf and its square; and cdf(ppf(u)) is u."""
 
@@ -74,19 +74,19 @@ def test_moments_by_quadrature(
 
 
 @st.composite
-def laws(draw: st.DrawFn) -> Law:
+def laws(draw: st.DrawFn) -> Distribution:
     positive = st.floats(1e-12, 1e6)
     a, b, c = sorted(draw(st.tuples(positive, positive, positive)))
     sign = draw(st.sampled_from([-1.0, 1.0]))
     low, high = sorted((sign * a, c))
-    each: list[Law] = [Uniform(low, high), Normal(a, c), Binned(a, c)]
+    each: list[Distribution] = [Uniform(low, high), Normal(a, c), Binned(a, c)]
     if low <= b <= high:
         each.append(Split(low, b, high))
     return draw(st.sampled_from(each))
 
 
 @given(laws(), st.lists(st.floats(0.0, 1.0, exclude_max=True), min_size=2, max_size=20))
-def test_more_is_more_and_stays_within(law: Law, numbers: list[float]) -> None:
+def test_more_is_more_and_stays_within(law: Distribution, numbers: list[float]) -> None:
     u = np.sort(np.array(numbers))
     drawn = law.ppf(u)
     assert np.all(np.diff(drawn) >= -1e-12 * np.abs(drawn).max())
