@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import cast
+
 import typer
+import typer.core
+import typer.main
 
 from designer.base.errors import InputError
 from designer.cli import bifurcation, tools, verbs
@@ -12,9 +17,10 @@ REGISTERED = (verbs, bifurcation, tools)
 """The modules of the verbs: importing one registers what it has."""
 
 
-def application() -> typer.Typer:
-    """The application with every verb."""
-    return app
+@cache  # typer reads the signatures of all verbs
+def application() -> typer.core.TyperGroup:
+    """The parser with every verb."""
+    return cast(typer.core.TyperGroup, typer.main.get_command(app))
 
 
 def dispatch(arguments: list[str]) -> int:
@@ -23,5 +29,5 @@ def dispatch(arguments: list[str]) -> int:
         from designer.base.schema import one_of
 
         raise InputError(None, "the verb", arguments[0], one_of(arguments[0], VERBS))
-    result = app(args=arguments, prog_name="designer", standalone_mode=False)
+    result = application().main(arguments, prog_name="designer", standalone_mode=False)
     return result if isinstance(result, int) else 0

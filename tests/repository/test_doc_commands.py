@@ -14,7 +14,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
 
 from designer.cli import command_line, entry
 from tests.shared.doc_commands import PAGES, ROOT, Command, Snippet, commands, snippets
@@ -102,12 +101,9 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def verbs() -> dict[str, set[str]]:
     """Options of every verb, by the command line itself."""
-
-    group = get_command(command_line.application())
-    found = group.commands  # type: ignore[attr-defined]
     return {
         name: {o for p in verb.params for o in (*p.opts, *p.secondary_opts)} | {"-h", "--help"}
-        for name, verb in found.items()
+        for name, verb in command_line.application().commands.items()
     }
 
 

@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import pytest
-import typer.main
 
 from designer.base import defaults, design_folder
 from designer.base.progress import SILENCE
@@ -32,8 +31,8 @@ from designer.yields.verdict import BLOCK
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTRACT = (DOCS / "contract.md").read_text("utf-8")
-ROOT = typer.main.get_command(command_line.application())
-VERBS = {name: verb for name, verb in ROOT.commands.items() if not verb.hidden}  # type: ignore[attr-defined]
+ROOT = command_line.application()
+VERBS = {name: verb for name, verb in ROOT.commands.items() if not verb.hidden}
 COMMON = {"-h", "--help"}
 
 
@@ -90,7 +89,7 @@ SEEDED = sorted(verb for verb in VERBS if "--seed" in options(verb) and verb != 
 def test_a_default_is_one_constant(verb: str, option: str, default: int) -> None:
     """The option's own, or where it may be the folder's, the number that its help begins with."""
     own = options(verb)[option]
-    (said,) = (p.help or "" for p in VERBS[verb].params if option in p.opts)
+    (said,) = (getattr(p, "help", "") for p in VERBS[verb].params if option in p.opts)
     assert own == default or (own is None and re.search(rf"\[{default}[],]", said))
 
 
