@@ -120,7 +120,7 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
             short.append(error)
         if choice == DesignChoice.of(modelfile.circuit):
             zone = zone_of_spec(modelfile.model, spec, catalog)
-            check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone))
+            check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone), catalog)
     if len(short) == len(wanted):
         raise short[0]
 

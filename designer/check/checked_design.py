@@ -117,7 +117,7 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     """
     check_choices(modelfile.model, modelfile.circuit, catalog)
     choice = modelfile.model, modelfile.circuit, catalog
-    check_names(modelfile, parts_of(*choice, zone_of_spec(*choice)))
+    check_names(modelfile, parts_of(*choice, zone_of_spec(*choice)), catalog)
     found = find(modelfile.model, modelfile.responses)
     design = synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found

@@ -56,19 +56,15 @@ def work(connection: Connection, backend: Backend, folder: str) -> None:
     os.setsid()  # what it starts ends with it
     os.dup2(2, 1)  # standard output is the parent's: no library prints into its JSON
     _move_to(folder)
-    try:
-        simulator = open_simulator(backend)
-    except EnvironmentMissing as error:
-        connection.send_bytes(pickle.dumps(Reply(str(error), last=True)))
-        return
-    connection.send_bytes(pickle.dumps(Reply(simulator.version)))
-    while simulator.usable:
+    with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone
         try:
-            job = connection.recv_bytes()
-        except EOFError:  # the parent is gone
-            break
-        value = _outcome(simulator, job)
-        with contextlib.suppress(BrokenPipeError):
+            simulator = open_simulator(backend)
+        except EnvironmentMissing as error:
+            connection.send_bytes(pickle.dumps(Reply(str(error), last=True)))
+            return
+        connection.send_bytes(pickle.dumps(Reply(simulator.version)))
+        while simulator.usable:
+            value = _outcome(simulator, connection.recv_bytes())
             connection.send_bytes(pickle.dumps(Reply(value=value, last=not simulator.usable)))
     os._exit(0)  # libngspice tidies up a heap that may be corrupt; there is nothing to tidy
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from designer.base.errors import InputError, Unreachable
@@ -38,14 +39,16 @@ def spread_of(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> Sprea
     return _Rules(modelfile, circuit, catalog).spread()
 
 
-def check_names(modelfile: ModelFile, circuit: Circuit) -> None:
-    """Refuse names of parts that no design of this circuit has, before one is sought.
+def check_names(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> None:
+    """Refuse what boards of no design of this circuit can be, before one is sought: unknown parts,
+    networks that cannot be, and an ageing of which the catalogue says nothing.
 
-    circuit : of any values. Where resistors may become two parts, their names are known too.
+    circuit : of any values. Where resistors may become two parts, their names are known too, and
+    networks are looked at once the parts are chosen.
 
     Raises
     ------
-    InputError : names the first unknown part, and the known ones.
+    InputError : names the first unknown part, and the known ones; or what else is wrong.
     """
     may = modelfile.circuit.composites
     halves = [f"{r.name}{half}" for r in circuit.resistors for half in "AB" if may]
@@ -60,6 +63,29 @@ def check_names(modelfile: ModelFile, circuit: Circuit) -> None:
                 raise InputError(modelfile.source, f"spread.{field}", name, one_of(name, known))
     if modelfile.measured is not None:
         check_measured_names(modelfile.measured, circuit, halves)
+    if not may:
+        # Which array holds a part is decided by its value; the rest of a network is not.
+        network = tuple(replace(n, family=None, share=n.share or 0.0) for n in rules.network)
+        plain = replace(modelfile, spread=replace(rules, network=network))
+        _Rules(plain, circuit, catalog).networks()
+    if rules.ageing == "catalogue":
+        _check_drifts(modelfile, circuit, catalog)
+
+
+def _check_drifts(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> None:
+    """Refuse an ageing by the catalogue where it has no drift of any family of some part's kind."""
+    rules = modelfile.spread
+    own = {name for rule in rules.part if rule.ageing is not None for name in rule.names}
+    for kind, parts in (("resistor", circuit.resistors), ("capacitor", circuit.capacitors)):
+        families = [family for family in catalog.families if family.kind == kind]
+        aged = f"{kind}s" in own or all(part.name in own for part in parts)
+        if families and not aged and all(family.drift is None for family in families):
+            raise InputError(
+                modelfile.source,
+                "spread.ageing",
+                f"{kind}s, of which the catalogue has no drift",
+                "a drift there, or an ageing in [[spread.part]]",
+            )
 
 
 class _Rules:

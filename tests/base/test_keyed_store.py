@@ -204,3 +204,10 @@ def test_a_sealed_line(values: list[Any]) -> None:
     for place in range(len(line)):
         with pytest.raises(ValueError, match="seal"):
             read_line(flipped(line, place, place % 8))
+
+
+def test_a_file_without_lines_is_whole(tmp_path: Path) -> None:
+    path, notes = tmp_path / "lines.json", list[str]()
+    path.write_text(LINES.text({}))
+    assert LINES.load(path, notes.append) == {}
+    assert notes == []

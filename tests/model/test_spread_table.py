@@ -263,7 +263,33 @@ def test_halves_of_a_composite_may_come_to_be() -> None:
         choice = modelfile.model, modelfile.circuit, CATALOG
         circuit = parts_of(*choice, zone_of_spec(*choice))
         if known:
-            check_names(modelfile, circuit)
+            check_names(modelfile, circuit, CATALOG)
         else:
             with pytest.raises(InputError, match="R203A"):
-                check_names(modelfile, circuit)
+                check_names(modelfile, circuit, CATALOG)
+
+
+@pytest.mark.parametrize(
+    ("spread", "word"),
+    [
+        ('ageing = "catalogue"', "capacitors, of which the catalogue has no drift"),
+        ('[[spread.network]]\nparts = ["R203"]\nshare = 1.0', "two or more resistors"),
+        ('[[spread.network]]\nparts = ["R203", "C1"]\nshare = 1.0', "two or more resistors"),
+        (
+            '[[spread.network]]\nparts = ["R203", "R204"]\nfamily = "Vishay ACAS 0612"\n'
+            '[[spread.network]]\nparts = ["R204", "R205"]\nshare = 1.0',
+            "parts that are in one network",
+        ),
+    ],
+)
+def test_what_no_boards_can_be_is_refused_before_a_design_is_sought(
+    spread: str, word: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from designer.check import checked_design, synthesis_result
+
+    def sought(*_: object) -> None:
+        raise AssertionError("work before the refusal")
+
+    monkeypatch.setattr(checked_design, "find", sought)
+    with pytest.raises(InputError, match=word):
+        synthesis_result.synthesise(parse_model_file(f"{PAPER}\n[spread]\n{spread}\n"), CATALOG)

@@ -345,3 +345,35 @@ def test_ctrl_c_ends_everything_at_once(tmp_path: Path) -> None:
     assert stderr.count("Traceback") == 1
     assert all(ends(int(file.name)) for file in pids.iterdir())
     assert list(temporary.iterdir()) == []
+
+
+_LEFT = """
+import multiprocessing
+import sys
+from designer.spice.worker import work
+
+if __name__ == "__main__":
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=work, args=(theirs, "batch", sys.argv[1]))
+    process.start()
+    theirs.close()
+    assert ours.poll(60.0)
+    ours.close()  # with the worker's first word unread, as a parent that is killed leaves it
+    process.join()
+    assert process.exitcode == 0, process.exitcode
+"""
+
+
+def test_a_worker_whose_parent_is_killed_ends_without_a_word(tmp_path: Path) -> None:
+    script, folder = tmp_path / "script.py", tmp_path / "worker"
+    script.write_text(_LEFT)
+    folder.mkdir()
+    done = subprocess.run(
+        [sys.executable, str(script), str(folder)],
+        env={**os.environ, "PYTHONPATH": str(Path(designer.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
