@@ -20,10 +20,13 @@ from designer.circuit.netlist import Capacitor, Circuit, Part, Resistor
 from designer.model.board_table import BoardChoice, BoardSpec
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile
-from designer.synthesis.attempt import to_choose_from, zone_of_spec
-from designer.synthesis.part_choice import diode_of, opamp_of
-from designer.synthesis.part_names import parts_of
-from designer.synthesis.parts_choice import check_choices
+from designer.synthesis.part_checks import (
+    buyable,
+    check_choices,
+    diode_of,
+    opamp_of,
+    unit_circuit,
+)
 
 
 def check_board(modelfile: ModelFile, catalog: Catalog, spec: CircuitSpec | None = None) -> None:
@@ -55,7 +58,7 @@ def _standing_in(modelfile: ModelFile, spec: CircuitSpec, catalog: Catalog) -> C
     values: Mapping[Kind, float] = {
         kind: float(sold[len(sold) // 2])
         for kind in ("resistor", "capacitor")
-        for sold in [to_choose_from(kind, spec, catalog)]
+        for sold in [buyable(kind, spec, catalog)]
     }
 
     def bought(part: Part) -> Part:
@@ -63,8 +66,7 @@ def _standing_in(modelfile: ModelFile, spec: CircuitSpec, catalog: Catalog) -> C
             return replace(part, value=values["resistor"])
         return replace(part, value=values["capacitor"]) if isinstance(part, Capacitor) else part
 
-    zone = zone_of_spec(modelfile.model, spec, catalog)
-    circuit = parts_of(modelfile.model, spec, catalog, zone)
+    circuit = unit_circuit(modelfile.model, spec, catalog)
     return replace(circuit, parts=tuple(bought(part) for part in circuit.parts))
 
 

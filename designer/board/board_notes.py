@@ -21,7 +21,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Connector, Trimmer
 from designer.circuit.netlist import Circuit, Section, nominal_board
-from designer.circuit.rest_point import at_rest
+from designer.circuit.working_modes import at_rest
 from designer.model.board_table import BoardChoice
 
 PROBE = 100e-12

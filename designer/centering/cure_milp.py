@@ -16,7 +16,7 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.milp import SOLVER, chosen_row
 
 SLACK = 1e-7
 """Of a demand's room: what the solver's tolerance may exceed it by."""
@@ -130,11 +130,10 @@ def cheapest(program: CureProgram) -> tuple[int, ...] | None:
     )
     problem = cp.Problem(cp.Minimize(cost), held)
     problem.solve(solver=cp.HIGHS, **SOLVER)
-    for x in takes:
-        # An infeasible or interrupted program may leave zeros behind: only whole choices count.
-        if x.value is None or abs(x.value.sum() - 1.0) > 1e-6 or abs(x.value.max() - 1.0) > 1e-6:
-            return None
-    pick = tuple(int(np.argmax(x.value)) for x in takes)
+    rows = [chosen_row(x) for x in takes]
+    pick = tuple(row for row in rows if row is not None)
+    if len(pick) < len(rows):
+        return None
     if not program.keeps(pick):
         raise ArithmeticError(f"the solver's choice breaks a demand ({problem.status})")
     return pick

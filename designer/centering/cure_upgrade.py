@@ -22,9 +22,9 @@ from designer.board.bom import bill
 from designer.board.component import components, to_buy
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
-from designer.circuit import build, terms
+from designer.circuit import build
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import zone_of
+from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.circuit.reduction import Reduction
@@ -160,16 +160,14 @@ def _was_picked_out(modelfile: ModelFile, name: str, grade: float) -> bool:
 def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
     """The design's parts with the op-amp and the references that this file names."""
     spec, model = modelfile.circuit, modelfile.model
-    system = model.second_order()
     opamp = catalog.opamp(spec.opamp)
-    return build.build(
-        terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
+    return build.circuit_of(
+        model,
         design.circuit.values,
         opamp,
         supply=design.circuit.supply,
         saturation=spec.saturation or opamp.saturation_at(spec.supply),
-        clearance="A" if model.k0 > 0.0 else None,
-        zone=zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+        stage=dead_zone_stage(model, spec, catalog),
         composites=design.composites,
     )
 

@@ -46,8 +46,7 @@ from designer.model.model_file import ModelFile, naming, need_responses
 from designer.model.response_table import Response
 from designer.spread.part_rules import check_names, spread_of
 from designer.synthesis import parts_choice
-from designer.synthesis.attempt import zone_of_spec
-from designer.synthesis.part_names import parts_of
+from designer.synthesis.part_checks import unit_circuit
 
 BOARDS = 128
 """Boards by which designs are compared, at each stretch of the spread."""
@@ -119,8 +118,8 @@ def _check_topologies(modelfile: ModelFile, catalog: Catalog) -> None:
         except Unreachable as error:
             short.append(error)
         if choice == DesignChoice.of(modelfile.circuit):
-            zone = zone_of_spec(modelfile.model, spec, catalog)
-            check_names(modelfile, parts_of(modelfile.model, spec, catalog, zone), catalog)
+            circuit = unit_circuit(modelfile.model, spec, catalog)
+            check_names(modelfile, circuit, catalog)
     if len(short) == len(wanted):
         raise short[0]
 

@@ -34,9 +34,8 @@ from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
 from designer.spread.part_rules import check_names, spread_of
-from designer.synthesis.attempt import zone_of_spec
-from designer.synthesis.part_names import parts_of
-from designer.synthesis.parts_choice import check_choices, synthesise
+from designer.synthesis.part_checks import check_choices, unit_circuit
+from designer.synthesis.parts_choice import synthesise
 
 
 @dataclass(frozen=True)
@@ -116,8 +115,8 @@ def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelRespo
     InputError, Unreachable : see ``find_responses.find`` and ``parts_choice.synthesise``.
     """
     check_choices(modelfile.model, modelfile.circuit, catalog)
-    choice = modelfile.model, modelfile.circuit, catalog
-    check_names(modelfile, parts_of(*choice, zone_of_spec(*choice)), catalog)
+    circuit = unit_circuit(modelfile.model, modelfile.circuit, catalog)
+    check_names(modelfile, circuit, catalog)
     found = find(modelfile.model, modelfile.responses)
     design = synthesise(
         modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found

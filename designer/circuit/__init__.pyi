@@ -1,9 +1,7 @@
 from . import (
     build as build,
-    drive_resistors as drive_resistors,
     nominal as nominal,
     paper_values as paper_values,
-    terms as terms,
 )
 from .board_arrays import (
     Boards as Boards,
@@ -20,12 +18,10 @@ from .coefficients import (
     CutShort as CutShort,
     coefficient_errors as coefficient_errors,
 )
-from .dead_zone_kind import (
-    Zone as Zone,
-    zone_of as zone_of,
-)
 from .dead_zone_parts import (
     OUTPUT as OUTPUT,
+    DeadZoneStage as DeadZoneStage,
+    dead_zone_stage as dead_zone_stage,
     idle_limits as idle_limits,
 )
 from .design import (
@@ -88,9 +84,6 @@ from .resistors import (
     composites_of as composites_of,
     effective as effective,
 )
-from .rest_point import (
-    at_rest as at_rest,
-)
 from .scale_fit import (
     minimax as minimax,
 )
@@ -105,4 +98,7 @@ from .swept_board import (
 )
 from .terms import (
     Term as Term,
+)
+from .working_modes import (
+    at_rest as at_rest,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,17 +12,9 @@ from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.circuit.netlist import Board, Circuit, nominal_board
 
-_BY_NAME = (
-    "values",
-    "offset",
-    "low",
-    "high",
-    "bias",
-    "reference",
-    "drop",
-    "supply",
-    "gain_bandwidth",
-)
+_RAILS = ("low", "high")
+_OF_A_BOARD = ("values", "offset", "bias", "reference", "drop", "supply", "gain_bandwidth")
+_BY_NAME = (*_OF_A_BOARD, *_RAILS)
 
 
 @dataclass(frozen=True)
@@ -56,24 +48,23 @@ class Boards:
     def __len__(self) -> int:
         return len(self.inverse_gain)
 
+    @property
+    def stacked(self) -> Board:
+        """All in the form of one board, an array (N,) wherever a board has a number."""
+        return self._board(lambda column: column)
+
     def board(self, index: int) -> Board:
         """One of them."""
+        return self._board(lambda column: float(column[index]))
 
-        def at(arrays: Mapping[str, Array]) -> dict[str, float]:
-            return {name: float(column[index]) for name, column in arrays.items()}
-
-        low, high = at(self.low), at(self.high)
-        return Board(
-            values=at(self.values),
-            offset=at(self.offset),
-            rails={name: (low[name], high[name]) for name in low},
-            inverse_gain=float(self.inverse_gain[index]),
-            bias=at(self.bias),
-            reference=at(self.reference),
-            drop=at(self.drop),
-            supply=at(self.supply),
-            gain_bandwidth=at(self.gain_bandwidth),
-        )
+    def _board(self, pick: Callable[[Array], Any]) -> Board:
+        columns: dict[str, Any] = {
+            group: {name: pick(column) for name, column in getattr(self, group).items()}
+            for group in _BY_NAME
+        }
+        low, high = columns.pop("low"), columns.pop("high")
+        rails = {name: (low[name], high[name]) for name in low}
+        return Board(**columns, rails=rails, inverse_gain=pick(self.inverse_gain))
 
     def take(self, which: Index | Sequence[int]) -> Boards:
         """These of them, in this order; one may be taken more than once."""
@@ -115,21 +106,14 @@ class Boards:
     def of(cls, circuit: Circuit, boards: Sequence[Board]) -> Boards:
         """Single boards together. A name must be in all of them or in none."""
 
-        def columns(group: str) -> dict[str, Array]:
-            first: Mapping[str, float] = getattr(boards[0], group)
-            return {name: np.array([getattr(b, group)[name] for b in boards]) for name in first}
+        def columns(groups: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+            return {name: np.array([group[name] for group in groups]) for name in groups[0]}
 
-        names = boards[0].rails
+        grouped = {group: columns([getattr(b, group) for b in boards]) for group in _OF_A_BOARD}
         return cls(
             circuit=circuit,
-            values=columns("values"),
-            offset=columns("offset"),
-            low={name: np.array([b.rails[name][0] for b in boards]) for name in names},
-            high={name: np.array([b.rails[name][1] for b in boards]) for name in names},
-            bias=columns("bias"),
-            reference=columns("reference"),
-            drop=columns("drop"),
-            supply=columns("supply"),
-            gain_bandwidth=columns("gain_bandwidth"),
+            low=columns([{name: low for name, (low, _) in b.rails.items()} for b in boards]),
+            high=columns([{name: high for name, (_, high) in b.rails.items()} for b in boards]),
             inverse_gain=np.array([b.inverse_gain for b in boards]),
+            **grouped,
         )

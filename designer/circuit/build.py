@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from designer.catalog.entries import OpAmp
-from designer.circuit.dead_zone_kind import Zone
-from designer.circuit.dead_zone_parts import OUTPUT, dead_zone
+from designer.circuit.dead_zone_parts import OUTPUT, DeadZoneStage
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section, Stop
 from designer.circuit.packing import packed
 from designer.circuit.resistors import Composite, Resistors
-from designer.circuit.terms import Term, inverted_states
+from designer.circuit.terms import Term, inverted_states, terms as input_terms
+from designer.model.model import Dimensionless
 
 GENERATOR = Generator("VM1", "vg")
 
@@ -30,7 +30,32 @@ _PAPER_SECTIONS = {
     ("inverter", 2): "U2B",
     ("inverter", 3): "U1D",
 }
-BOTH = Zone()
+SATURATING = DeadZoneStage()
+
+
+def circuit_of(
+    model: Dimensionless,
+    values: Mapping[str, float],
+    opamp: OpAmp,
+    *,
+    supply: float,
+    saturation: float,
+    stage: DeadZoneStage = SATURATING,
+    composites: Mapping[str, Composite] = MappingProxyType({}),
+) -> Circuit:
+    """The circuit of a model, as ``build`` makes it of the model's terms."""
+    system = model.second_order()
+    matrices = system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()
+    return build(
+        input_terms(*matrices),
+        values,
+        opamp,
+        supply=supply,
+        saturation=saturation,
+        clearance="A" if model.k0 > 0.0 else None,
+        stage=stage,
+        composites=composites,
+    )
 
 
 def build(
@@ -41,7 +66,7 @@ def build(
     supply: float,
     saturation: float,
     clearance: str | None,
-    zone: Zone = BOTH,
+    stage: DeadZoneStage = SATURATING,
     composites: Mapping[str, Composite] = MappingProxyType({}),
 ) -> Circuit:
     """The circuit of these terms.
@@ -49,7 +74,7 @@ def build(
     values : ohm and farad by part name; holds R100 … for the inverters and, where there is a
     clearance, R50 and the resistors of the dead-zone stage.
     clearance : its name, or None for a model without stops: then there is no nonlinear stage.
-    zone : which stage it is. composites : resistors NAME made of two, whose values are those of
+    stage : of the dead zone. composites : resistors NAME made of two, whose values are those of
     NAMEA and NAMEB.
 
     Raises
@@ -63,15 +88,15 @@ def build(
         stop = clearance is not None and state == 1
         parts += _integrator(state, terms, values, resistors, stop)
     inverted = set(inverted_states(terms))
-    if clearance is not None and zone.kind == "rectifier":
+    if clearance is not None and stage.kind == "rectifier":
         inverted.add(0)  # it works on -v1, whether or not a term needs that
     for state in sorted(inverted):
         parts += _inverter(state, resistors)
     stops: tuple[Stop, ...] = ()
     if clearance is not None:
-        stage, stop_ = dead_zone(zone, clearance, resistors)
-        parts += stage
-        stops = (stop_,)
+        stage_parts, dead_zone = stage.parts(clearance, resistors)
+        parts += stage_parts
+        stops = (dead_zone,)
     resistors.done()
     circuit = Circuit(
         parts=tuple(parts),
@@ -89,12 +114,7 @@ def build(
     return packed(circuit, opamp)
 
 
-def inverter_resistors(state: int) -> tuple[str, str]:
-    """Input and feedback resistor of the inverter of one state: R100 and R101 for v1, …"""
-    return f"R{100 + 2 * state}", f"R{101 + 2 * state}"
-
-
-def describe_quantity(term: Term) -> str:
+def _role(term: Term) -> str:
     """A term's role in words, for the bill of materials and the drawing."""
     kind, i, j = term.quantity
     if kind == "mass":
@@ -126,20 +146,19 @@ def _integrator(
             net = GENERATOR.net
         else:
             net = f"v{t.source + 1}" + ("n" if t.inverted else "")
-        parts += resistors(t.resistor, net, node, describe_quantity(t))
+        parts += resistors(t.resistor, net, node, _role(t))
     if stop:
         parts += resistors("R50", OUTPUT, node, "stop force on M1")
     return parts
 
 
 def _inverter(state: int, resistors: Resistors) -> list[Part]:
-    r_in, r_fb = inverter_resistors(state)
     node, net = f"i{state + 1}", f"v{state + 1}"
     role = f"inverter of {net}"
     return [
         Section(_section("inverter", state), node, GROUND, f"{net}n", role),
-        *resistors(r_in, net, node, role),
-        *resistors(r_fb, node, f"{net}n", role),
+        *resistors(f"R{100 + 2 * state}", net, node, role),
+        *resistors(f"R{101 + 2 * state}", node, f"{net}n", role),
     ]
 
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from designer.base.errors import InputError
+from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
-from designer.circuit.dead_zone_kind import Zone
+from designer.catalog.entries import DiodeEntry, ReferenceEntry
 from designer.circuit.netlist import (
     GROUND,
     NEGATIVE,
@@ -25,6 +27,11 @@ from designer.circuit.netlist import (
     Stop,
 )
 from designer.circuit.resistors import Resistors
+from designer.model.circuit_table import CircuitSpec
+from designer.model.model import Dimensionless
+
+Kind = Literal["saturation", "rectifier"]
+Sides = Literal["both", "upper", "lower"]
 
 OUTPUT = "fv"
 """Net of the stage's output."""
@@ -32,19 +39,51 @@ MOVING = "C1"
 """Capacitor whose voltage is the displacement at the stop."""
 
 
-def dead_zone(zone: Zone, clearance: str, resistors: Resistors) -> tuple[list[Part], Stop]:
-    """The stage's parts, and how the clearance of this name shows in them.
+@dataclass(frozen=True)
+class DeadZoneStage:
+    """Which stage makes the dead zone."""
+
+    kind: Kind = "saturation"
+    """"saturation", the paper's stage that clips, or "rectifier", whose dead zone is flat."""
+    sides: Sides = "both"
+    """The stops that exist."""
+    diode: DiodeEntry | None = None
+    """The rectifier's diode; None for the other kind."""
+    reference: ReferenceEntry | None = None
+    """The rectifier's reference; None for the other kind."""
+
+    @property
+    def positions(self) -> tuple[int, ...]:
+        """1 for the upper stop, -1 for the lower."""
+        return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[self.sides]
+
+    def parts(self, clearance: str, resistors: Resistors) -> tuple[list[Part], Stop]:
+        """The stage's parts, and how the clearance of this name shows in them.
+
+        Raises
+        ------
+        InputError : a rectifier without its diode or reference.
+        """
+        make = _saturation if self.kind == "saturation" else _rectifier
+        return make(self, clearance, resistors)
+
+
+def dead_zone_stage(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:
+    """The stage that a model file asks for.
 
     Raises
     ------
-    InputError : a rectifier without its diode or reference.
+    InputError : the catalogue has no such diode or reference.
     """
-    if zone.kind == "saturation":
-        return _saturation(zone, clearance, resistors)
-    return _rectifier(zone, clearance, resistors)
+    if spec.dead_zone == "saturation":
+        return DeadZoneStage(spec.dead_zone, model.sides)
+    diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
+    return DeadZoneStage(spec.dead_zone, model.sides, diode, reference)
 
 
-def _saturation(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[Part], Stop]:
+def _saturation(
+    stage: DeadZoneStage, clearance: str, resistor: Resistors
+) -> tuple[list[Part], Stop]:
     """The saturating path U3B, U3C and the linear path U3A, added by U3D.
 
     U3C is linear inside the clearance and at its limit in contact. With one stop only, a constant
@@ -69,11 +108,11 @@ def _saturation(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[P
         *resistor("R209", "v12", "d4", total),
         *resistor("R210", "d4", OUTPUT, total),
     ]
-    if zone.sides != "both":
-        here, back = (POSITIVE, NEGATIVE) if zone.sides == "upper" else (NEGATIVE, POSITIVE)
+    if stage.sides != "both":
+        here, back = (POSITIVE, NEGATIVE) if stage.sides == "upper" else (NEGATIVE, POSITIVE)
         parts += resistor("R211", here, "d1", "shift to one stop")
         parts += resistor("R212", back, "d4", "shift to one stop, taken out again")
-    ends = {side: Contact("U3C", side) for side in zone.positions}
+    ends = {side: Contact("U3C", side) for side in stage.positions}
     return parts, Stop(clearance, MOVING, ends.get(1), ends.get(-1))
 
 
@@ -116,7 +155,9 @@ _HALVES = {
 }  # fmt: skip
 
 
-def _rectifier(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[Part], Stop]:
+def _rectifier(
+    stage: DeadZoneStage, clearance: str, resistor: Resistors
+) -> tuple[list[Part], Stop]:
     """A half-wave rectifier for each stop, both on one output node.
 
     Inside the clearance the clamp diode holds the half's output away and the feedback resistor
@@ -128,12 +169,12 @@ def _rectifier(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[Pa
     2 Vref R208/R201 and a drop. It has R201's value unless it is given one of its own. Without the
     other half there is nothing to keep off.
     """
-    if zone.diode is None or zone.reference is None:
+    if stage.diode is None or stage.reference is None:
         raise InputError(None, "dead zone", "no diode or reference", "both, for a rectifier")
-    model = diode_model(zone.diode)
+    model = diode_model(stage.diode)
     parts: list[Part] = []
     contacts: dict[int, Contact] = {}
-    for side in zone.positions:
+    for side in stage.positions:
         half = _HALVES[side]
         word = "upper" if side > 0 else "lower"
         role, clamped = f"{word} half of the dead zone", half.output
@@ -144,7 +185,7 @@ def _rectifier(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[Pa
             *resistor(half.feedback, half.node, OUTPUT, role),
             _diode(half.series, half.output, OUTPUT, side, model, False, role),
         ]
-        if zone.sides == "both":
+        if stage.sides == "both":
             clamped = half.between
             parts += resistor(
                 half.lift, clamped, half.output, f"clamp of the {role}", like=half.threshold
@@ -155,12 +196,12 @@ def _rectifier(zone: Zone, clearance: str, resistor: Resistors) -> tuple[list[Pa
             Reference(
                 half.reference,
                 *ground,
-                volts=zone.reference.voltage,
-                grade=zone.reference.grade,
-                model=zone.reference.name,
+                volts=stage.reference.voltage,
+                grade=stage.reference.grade,
+                model=stage.reference.name,
                 role=f"reference of the {role}",
-                least=zone.reference.least_current,
-                impedance=zone.reference.dynamic_impedance,
+                least=stage.reference.least_current,
+                impedance=stage.reference.dynamic_impedance,
             ),
             *resistor(half.feed, half.supply, half.rail, f"feed of the reference, {word} half"),
         ]

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import GROUND, Board, Circuit, Diode, Section, Stop
 from designer.dynamics.piecewise_linear import ModeKey
 
@@ -45,21 +44,6 @@ class Exit:
     """Key of the mode beyond."""
     clearance: int
     """Index of the clearance whose contact begins or ends, or -1."""
-
-
-def stacked(boards: Boards) -> Board:
-    """N boards in the form of one, an array (N,) wherever a board has a number."""
-    values: dict[str, Any] = {
-        "values": boards.values,
-        "offset": boards.offset,
-        "rails": {name: (boards.low[name], boards.high[name]) for name in boards.low},
-        "inverse_gain": boards.inverse_gain,
-        "bias": boards.bias,
-        "reference": boards.reference,
-        "drop": boards.drop,
-        "supply": boards.supply,
-    }
-    return Board(**values)
 
 
 class NodalEquations:

@@ -12,24 +12,21 @@ from designer.circuit.netlist import GROUND, Circuit, Resistor, Section
 
 
 @dataclass(frozen=True)
-class Conductance:
-    """A conductance between two nets."""
+class _Conductance:
+    """A conductance [S] between two nets."""
 
     a: str
-    """One net."""
     b: str
-    """The other net."""
     siemens: float
-    """Conductance [S]."""
 
     def other(self, net: str) -> str:
         return self.b if net == self.a else self.a
 
 
-def branches(circuit: Circuit) -> tuple[Conductance, ...]:
+def _conductances(circuit: Circuit) -> list[_Conductance]:
     """The resistors, with the nets that only resistors meet taken out, star to mesh: the middle of
     two in series, the tap of a divider."""
-    found = [Conductance(r.a, r.b, 1.0 / r.value) for r in circuit.resistors]
+    found = [_Conductance(r.a, r.b, 1.0 / r.value) for r in circuit.resistors]
     held = {GROUND, circuit.generator.net, *(supply.net for supply in circuit.supplies)}
     held = held.union(*(p.nets for p in circuit.parts if not isinstance(p, Resistor)))
     for net in circuit.nets:
@@ -39,10 +36,10 @@ def branches(circuit: Circuit) -> tuple[Conductance, ...]:
         total = sum(f.siemens for f in star)
         found = [f for f in found if f not in star]
         found += [
-            Conductance(one.other(net), two.other(net), one.siemens * two.siemens / total)
+            _Conductance(one.other(net), two.other(net), one.siemens * two.siemens / total)
             for one, two in combinations(star, 2)
         ]
-    return tuple(found)
+    return found
 
 
 @dataclass(frozen=True)
@@ -51,6 +48,8 @@ class SectionStage:
 
     section: Section
     """The section."""
+    outputs: frozenset[str]
+    """Net of its output, and those that a diode joins to it."""
     load: float
     """Load of its output, every resistor there taken to ground [ohm]; infinite without one."""
     integrates: bool
@@ -68,12 +67,12 @@ class SectionStage:
 
 def stages(circuit: Circuit) -> Iterator[SectionStage]:
     """The stages of a circuit whose amplifiers all invert, in its order."""
-    wires = branches(circuit)
+    wires = _conductances(circuit)
     for s in circuit.sections:
         node = s.inverting
         # What hangs on the far end of a diode hangs on the output while the diode conducts.
         joined = {net for d in circuit.diodes if s.output in d.nets for net in d.nets}
-        outputs = ({s.output} | joined) - {node}
+        outputs = frozenset({s.output, *joined} - {node})
         load = sum(w.siemens for w in wires if {w.a, w.b} & outputs)
         at_node = [w for w in wires if node in (w.a, w.b)]
         total = sum(w.siemens for w in at_node)
@@ -85,6 +84,7 @@ def stages(circuit: Circuit) -> Iterator[SectionStage]:
         )
         yield SectionStage(
             section=s,
+            outputs=outputs,
             load=1.0 / load if load > 0.0 else float("inf"),
             integrates=farads > 0.0,
             gain=1.0 if farads > 0.0 else total / back if back > 0.0 else float("inf"),

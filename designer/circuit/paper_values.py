@@ -24,7 +24,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import OpAmp
-from designer.circuit import build, terms
+from designer.circuit import build
 from designer.circuit.netlist import Circuit
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
@@ -202,15 +202,7 @@ def generator(model: Dimensionless, values: Mapping[str, float]) -> tuple[float,
 
 def circuit(model: Dimensionless, values: Mapping[str, float], opamp: OpAmp) -> Circuit:
     """The paper's Fig. 4 and Fig. 5 with these values; terms that are zero have no part."""
-    system = model.second_order()
-    return build.build(
-        terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
-        values,
-        opamp,
-        supply=SUPPLY,
-        saturation=SATURATION,
-        clearance="A" if model.k0 > 0.0 else None,
-    )
+    return build.circuit_of(model, values, opamp, supply=SUPPLY, saturation=SATURATION)
 
 
 def _dead_zone(values: Mapping[str, float], mu: float) -> dict[str, float]:

@@ -41,7 +41,7 @@ from designer.jobs.options import Options, given
 from designer.jobs.origin import provenance
 from designer.jobs.stage_runner import write_design
 from designer.model.model_file import naming, need_responses
-from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.milp import SOLVER
 
 if TYPE_CHECKING:
     import pandas as pd

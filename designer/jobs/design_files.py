@@ -20,9 +20,9 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.deck_notes import circuit_notes
 from designer.check.first_responses import first_run
 from designer.check.synthesis_result import Synthesis
-from designer.circuit import build, terms
+from designer.circuit import build
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import zone_of
+from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.netlist import nominal_board
 from designer.jobs import board_files
@@ -34,7 +34,7 @@ from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming
 from designer.spice import deck
 from designer.spread.part_grades import better_grades
-from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.milp import SOLVER
 
 SETUP = "setup.csv"
 
@@ -103,17 +103,15 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     catalog = modelfile.choices(catalog)
     with naming(modelfile):
         opamp = catalog.opamp(spec.opamp, spec.supply)
-    system = model.second_order()
     with reading(file, "the design of this folder's model", "parts"):
         values = {name: _size(value, file, name) for name, value in document["parts"].items()}
-        circuit = build.build(
-            terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
+        circuit = build.circuit_of(
+            model,
             values,
             opamp,
             supply=float(document["circuit"]["supply"]),
             saturation=float(document["circuit"]["saturation"]),
-            clearance="A" if model.k0 > 0.0 else None,
-            zone=zone_of(spec.dead_zone, model.sides, catalog, spec.diode, spec.reference),
+            stage=dead_zone_stage(model, spec, catalog),
             composites=document.get("composites", {}),
         )
         gain, bias = (float(document["circuit"][k]) for k in ("gain", "bias"))
@@ -121,7 +119,9 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
         largest = peaks(model, found).states
         volts = np.array(list(document["scales"]["volts"].values()), dtype=float)
         swing = (float((volts * largest).max()), largest)
-        errors = coefficient_errors(circuit, system, swing=None if circuit.stops else swing)
+        errors = coefficient_errors(
+            circuit, model.second_order(), swing=None if circuit.stops else swing
+        )
         if abs(errors.max_error - float(document["max_error"])) > 1e-9:
             raise ValueError("parts and max_error do not belong together")
         conditions = document["conditions"]

@@ -39,7 +39,7 @@ from designer.spice import equation_check
 from designer.spice.equation_check import EquationCheck
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
-from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.milp import SOLVER
 from designer.yields.blame_extent import BUDGET
 from designer.yields.blame_status import BlameStage
 from designer.yields.layers import Here, Runner

@@ -1,7 +1,7 @@
 """The table ``[circuit]`` of a model file: what the circuit is made of, and what is asked of it.
 
 Names of parts in ``matched`` and ``composites`` are only read here; which parts a model has is
-known once its terms are (``synthesis.part_names``).
+known once its terms are (``synthesis.part_checks``).
 """
 
 from __future__ import annotations

@@ -3,15 +3,15 @@ from . import (
     parts_choice as parts_choice,
     side_conditions as side_conditions,
 )
-from .attempt import (
-    to_choose_from as to_choose_from,
-    zone_of_spec as zone_of_spec,
-)
 from .limits import (
     NO_AIMS as NO_AIMS,
     Aims as Aims,
     bandwidth_limit as bandwidth_limit,
     guaranteed as guaranteed,
+)
+from .milp import (
+    SOLVER as SOLVER,
+    chosen_row as chosen_row,
 )
 from .output_loads import (
     REST as REST,
@@ -20,20 +20,16 @@ from .output_loads import (
     Run as Run,
     Sampled as Sampled,
 )
-from .part_choice import (
+from .part_checks import (
+    buyable as buyable,
+    check_choices as check_choices,
     diode_of as diode_of,
     opamp_of as opamp_of,
-)
-from .part_names import (
-    parts_of as parts_of,
+    unit_circuit as unit_circuit,
 )
 from .parts_choice import (
-    check_choices as check_choices,
     synthesise as synthesise,
 )
 from .side_conditions import (
     saturating as saturating,
-)
-from .tie_break import (
-    SOLVER as SOLVER,
 )

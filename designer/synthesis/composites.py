@@ -22,8 +22,8 @@ from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT, CoefficientErrors
 from designer.circuit.resistors import Composite
 from designer.synthesis.attempt import Attempt, Order
-from designer.synthesis.part_names import matching_resistors
-from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.milp import SOLVER
+from designer.synthesis.part_checks import matching_resistors
 
 REACH = 3.0
 """Half width, in ln, of the tables of pairs at least, in units of the error to be cured."""

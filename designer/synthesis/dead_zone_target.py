@@ -1,12 +1,30 @@
-"""What a dead-zone stage has to do, and what sizing it returns."""
+"""What a dead-zone stage has to do beside a chosen linear block, and what sizing it returns.
+
+The linear block leaves freedom: its scales may move as long as none of its errors grows past the
+largest one. The stop's slope is sought inside the interval that this leaves.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
+from scipy.optimize import linprog
 
+from designer.base.arrays import Array
+from designer.catalog.diode_curve import diode_model
+from designer.circuit.dead_zone_parts import DeadZoneStage, Kind, Sides
+from designer.circuit.scale_fit import minimax
+from designer.model.find_responses import Peaks
+from designer.model.model import Dimensionless
+from designer.synthesis.limits import ConditionLimits, depth
+from designer.synthesis.linear_block import PARTS, Targets, residuals_of
+
+LEAST_GAIN = 1.25
+"""Of the saturating path, so that it does saturate where the clearance is never closed."""
+REFERENCE_MARGIN = 1.5
+"""Between a reference's current and the ends of the range in which it regulates."""
 EXCURSION_MARGIN = 1.05
 """Of the largest excursion on the free side of a one-sided stop."""
 LEAST_SPAN, SPAN_ROOM = 1.25, 1.6
@@ -37,9 +55,9 @@ class DeadZoneTarget:
     """Largest noise gain of an amplifier of the stage."""
     strict: bool = True
     """Whether these limits are conditions; otherwise they only say where the search begins."""
-    kind: Literal["saturation", "rectifier"] = "saturation"
+    kind: Kind = "saturation"
     """Kind of the stage."""
-    sides: Literal["both", "upper", "lower"] = "both"
+    sides: Sides = "both"
     """The stops that exist."""
     excursion: float = 1.0
     """Largest excursion on the free side of a one-sided stop, over the clearance."""
@@ -77,10 +95,6 @@ class DeadZone:
     """How the bound is known."""
     solver: str
     """What the solver said of the search."""
-    looked_at: int
-    """Rows of tables that the search went through."""
-    seconds: float
-    """Wall time [s]."""
 
     @property
     def error(self) -> float:
@@ -98,9 +112,9 @@ class DeadZone:
         return abs(self.errors.get("dead-zone null", 0.0))
 
 
-def outside(found: float, interval: tuple[float, float]) -> float:
+def outside(value: float, interval: tuple[float, float]) -> float:
     """ln of how far a positive value lies above (below: negative) an interval; 0 inside."""
-    over, under = np.log(found / interval[1]), np.log(found / interval[0])
+    over, under = np.log(value / interval[1]), np.log(value / interval[0])
     return float(max(over, 0.0) + min(under, 0.0))
 
 
@@ -115,3 +129,83 @@ def parts_of(kind: str, sides: str) -> tuple[str, ...]:
         return ("R50", *(f"R{i}" for i in halves[sides]))
     last = 211 if sides == "both" else 213
     return ("R50", *(f"R{i}" for i in range(200, last)))
+
+
+def target_of(
+    model: Dimensionless,
+    values: Mapping[str, float],
+    stage: DeadZoneStage,
+    limits: ConditionLimits,
+    peaks: Peaks,
+    *,
+    saturation: float,
+    supply: float,
+) -> DeadZoneTarget:
+    """What the stage has to do beside this linear block.
+
+    values : of the linear block by part name. saturation, supply : ± [V].
+    """
+    targets = Targets.from_state_matrix(model.second_order().state_matrix())
+    _, p, q1, q3 = minimax(*_residuals(values, targets))
+    relative = np.exp([0.0, -q1, -q1 + p + q3, -q1 + p])  # volts of each state over those of x1
+    top = limits.swing / float((peaks.states * relative).max())  # volts per unit of x1
+    peak = float(peaks.states[0])
+    drop, reference, current = 0.0, 5.0, (0.0, float("inf"))
+    if stage.diode is not None and stage.reference is not None:
+        drop, reference = diode_model(stage.diode).drop, stage.reference.voltage
+        least, most = stage.reference.current.min or 0.0, stage.reference.current.max or np.inf
+        current = (REFERENCE_MARGIN * least, most / REFERENCE_MARGIN)
+    # Where the swing is no condition an output may go as far as it can.
+    more = 1.0 if "swing" in limits.conditions else saturation / limits.swing
+    return DeadZoneTarget(
+        mu=model.mu,
+        slope=slope_interval(values, targets, model.mu),
+        saturation=saturation,
+        threshold=min(model.b * top, saturation / LEAST_GAIN),
+        linear_gain=more * (limits.swing / (top * peak)),
+        output_gain=more * ((limits.swing - drop) / (top * depth(peaks))),
+        load=limits.load,
+        noise_gain=limits.noise_gain,
+        strict=bool(limits.conditions),
+        kind=stage.kind,
+        sides=model.sides,
+        excursion=(peaks.excursion or peak) / model.b,
+        supply=supply,
+        reference=reference,
+        reference_current=current,
+    )
+
+
+def slope_interval(values: Mapping[str, float], targets: Targets, mu: float) -> tuple[float, float]:
+    """Least and largest (fv slope)/R50 [1/ohm] that make the stop's slope right while no error of
+    the linear block exceeds its least largest one.
+
+    The slope's error is ln(fv slope/R50) + alpha + q1 - ln mu, so the extremes of alpha + q1 over
+    all scales with |h + D s| <= error are two linear programs of four variables.
+    """
+    h, D = _residuals(values, targets)
+    best = minimax(h, D)
+    error = float(np.abs(h + D @ best).max())
+    limit = np.concatenate([error - h, error + h]) + 1e-12
+    ends = []
+    for sign in (1.0, -1.0):
+        found = linprog(
+            np.array([sign, 0.0, sign, 0.0]),
+            A_ub=np.concatenate([D, -D]),
+            b_ub=limit,
+            bounds=[(None, None)] * 4,
+            method="highs",
+        )
+        # HiGHS' own tolerance can make a point of the interval empty: then the point itself.
+        scales = best if found.x is None else found.x
+        ends.append(float(scales[0] + scales[2]))
+    middle = float(best[0] + best[2])
+    low, high = min(*ends, middle), max(*ends, middle)
+    return float(mu * np.exp(-high)), float(mu * np.exp(-low))
+
+
+def _residuals(values: Mapping[str, float], t: Targets) -> tuple[Array, Array]:
+    """(10,) offsets and (10, 4) scales (alpha, p, q1, q3) of the linear block's errors."""
+    logs = np.log([values[name] for name in PARTS])
+    h, D = residuals_of(logs[None, :10], logs[None, 10:], t.logs)
+    return h[0], D

@@ -15,7 +15,7 @@ from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
-from designer.synthesis.linear_rules import Bounds
+from designer.synthesis.linear_block import Bounds
 
 SWING_SHARE = 0.85
 """Of the op-amp's limit: what the peaks of an output may use; the rest is for spread."""
@@ -63,7 +63,7 @@ NO_AIMS = Aims()
 class ConditionLimits:
     """Limits of the side conditions; those of conditions that do not hold are infinite or zero."""
 
-    kept: frozenset[str]
+    conditions: frozenset[str]
     """Names of the conditions that hold."""
     seconds: tuple[float, float]
     """Range of the time scale [s per unit of model time]."""
@@ -125,16 +125,16 @@ class ConditionLimits:
         """Without the resistor that loads this section's output most, and any as small."""
         output = next(s.output for s in design.circuit.sections if s.name == section)
         values = effective(design.circuit.values, design.composites)
-        at = {r.name: r.value for r in design.circuit.resistors if output in r.nets}
-        name = min(at, key=lambda n: at[n])
-        floor = values.get(name, at[name]) * (1.0 + MARGIN)
-        low = max(floor, self.signal[0]) if name in SIGNAL_RESISTORS else self.signal[0]
+        loads = [r for r in design.circuit.resistors if output in r.nets]
+        heaviest = min(loads, key=lambda r: r.value)
+        floor = values.get(heaviest.name, heaviest.value) * (1.0 + MARGIN)
+        low = max(floor, self.signal[0]) if heaviest.name in SIGNAL_RESISTORS else self.signal[0]
         return replace(self, load=max(floor, self.load), signal=(low, self.signal[1]))
 
 
 def limits(
     spec: CircuitSpec,
-    kept: frozenset[str],
+    conditions: frozenset[str],
     opamp: OpAmp,
     saturation: float,
     fastest: float,
@@ -146,19 +146,19 @@ def limits(
     """
     low, high = spec.frequency
     seconds = 1.0 / (2.0 * np.pi * high), 1.0 / (2.0 * np.pi * low)
-    if "bandwidth" in kept:
+    if "bandwidth" in conditions:
         least = INVERTER_GAIN * fastest / (2.0 * np.pi * bandwidth_limit(opamp))
         seconds = max(seconds[0], least), seconds[1]
     inf = float("inf")
     return ConditionLimits(
-        kept=kept,
+        conditions=conditions,
         seconds=seconds,
         swing=min(SWING_SHARE, aims.swing) * saturation,
-        level=LEVEL_RATIO if "level" in kept else inf,
-        share=min(SHARE, aims.share) if "level" in kept else inf,
-        load=LOAD if "load" in kept else 0.0,
-        signal=SIGNAL if "resistors" in kept else (0.0, inf),
-        noise_gain=min(NOISE_GAIN, aims.noise_gain) if "noise_gain" in kept else inf,
+        level=LEVEL_RATIO if "level" in conditions else inf,
+        share=min(SHARE, aims.share) if "level" in conditions else inf,
+        load=LOAD if "load" in conditions else 0.0,
+        signal=SIGNAL if "resistors" in conditions else (0.0, inf),
+        noise_gain=min(NOISE_GAIN, aims.noise_gain) if "noise_gain" in conditions else inf,
     )
 
 

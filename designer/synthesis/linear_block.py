@@ -24,12 +24,14 @@ lower bound of the whole.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from designer.base.arrays import Array, Index
+from designer.base.arrays import Array, Index, Mask
+from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.kernel_linear import Rules, Values, join
 
 PARTS = ("R1", "R2", "R3", "R4", "R5", "R7", "R8", "R9", "R10", "R11", "C1", "C2", "C3", "C4")
@@ -41,6 +43,8 @@ SCALES = np.array(
     ]
 )  # fmt: skip
 """(10, 2) coefficients of alpha and p."""
+ANY = CircuitSpec()
+"""What asks for no equal parts and prefers no values."""
 SLICE = 50_000
 """Rows that are joined at a time."""
 SAME = 1e-12
@@ -51,34 +55,35 @@ SAME = 1e-12
 class Targets:
     """The eight terms that the linear block has to realise."""
 
-    w2: float
-    """ln |wanted| of the term that R2 realises."""
-    w3: float
-    """ln |wanted| of the term that R3 realises."""
-    w4: float
-    """ln |wanted| of the term that R4 realises."""
-    w5: float
-    """ln |wanted| of the term that R5 realises."""
-    w8: float
-    """ln |wanted| of the term that R8 realises."""
-    w9: float
-    """ln |wanted| of the term that R9 realises."""
-    w10: float
-    """ln |wanted| of the term that R10 realises."""
-    w11: float
-    """ln |wanted| of the term that R11 realises."""
+    logs: Array
+    """(8,) ln |wanted| of the terms of R2, R3, R4, R5, R8, R9, R10, R11."""
 
     @classmethod
     def from_state_matrix(cls, A: Array) -> Targets:
         """From the dimensionless (4, 4) state matrix."""
         w = np.log(np.abs(np.where(A == 0.0, 1.0, A)))
-        return cls(w[1, 1], w[1, 3], w[1, 0], w[1, 2], w[3, 1], w[3, 3], w[3, 0], w[3, 2])
+        return cls(w[[1, 3]][:, [1, 3, 0, 2]].ravel())
 
-    @property
-    def logs(self) -> Array:
-        """(8,) in the order of the resistors' numbers."""
-        own = (self.w2, self.w3, self.w4, self.w5, self.w8, self.w9, self.w10, self.w11)
-        return np.array(own, dtype=float)
+
+@dataclass(frozen=True)
+class Bounds:
+    """Side conditions of the linear block; infinite or zero where switched off."""
+
+    seconds: tuple[float, float]
+    """Range of the time scale."""
+    level: float
+    """Largest ratio between the peaks of the state voltages of one mass, and between the two
+    velocities."""
+    share: float
+    """How much larger than x1's the peak voltage of another state may be."""
+    stop: float
+    """Least R4 [ohm] that leaves room for the stop's resistor."""
+    peaks: Array
+    """(4,) peaks of x1, x1', x2, x2' in model units."""
+    signal: tuple[float, float] = (0.0, np.inf)
+    """Range of the linear block's resistors [ohm]."""
+    stop_most: float = np.inf
+    """Largest R4 that is looked at [ohm]."""
 
 
 def residuals_of(r: Array, c: Array, w: Array) -> tuple[Array, Array]:
@@ -102,9 +107,9 @@ def residuals_of(r: Array, c: Array, w: Array) -> tuple[Array, Array]:
 
 
 def elementary(D: Array) -> tuple[Index, Array]:
-    """Elementary vectors y of D (m, 2), y D = 0: (k, 3) places and entries, each of unit 1-norm.
+    """Elementary vectors y of D (m, 2), y D = 0: (k, 3) rows of D and entries, each of unit 1-norm.
 
-    Where a vector has two entries only, the third stands at place 0 with the value 0.
+    Where a vector has two entries only, the third is that of row 0 with the value 0.
     """
     places, entries = [], []
     for size in (2, 3):
@@ -161,6 +166,55 @@ def _grouped(numbers: Array) -> tuple[Array, Index, Index]:
     fresh = np.diff(ordered, prepend=-np.inf) > SAME
     begins = np.flatnonzero(fresh).astype(np.int64)
     return ordered[begins], np.append(begins, len(order)).astype(np.int64), order
+
+
+def rules_of(values: Values, t: Targets, bounds: Bounds, spec: CircuitSpec) -> Rules:
+    """The side conditions, and the parts and values that ``spec`` asks for, for the compiled loops.
+
+    The conditions are stated on nominal scales, which need no solver: alpha is the mean of v0 to
+    v3, p half of v2 - v3, q1 = r4 + w4 - alpha, q3 = r11 + w11 + delta - alpha. At error eps they
+    are within 2 eps of those that make the error least.
+    """
+    places, entries = elementary(SCALES)
+
+    def vectors(which: Mask) -> tuple[Index, Array]:
+        return np.ascontiguousarray(places[which]), np.ascontiguousarray(entries[which])
+
+    def uses(*numbers: int) -> Mask:
+        return np.asarray((np.isin(places, numbers) & (entries != 0.0)).any(axis=1))
+
+    def among(logs: Array) -> Mask:
+        return np.asarray((np.abs(logs[:, None] - preferred[None, :]) < 1e-9).any(axis=1))
+
+    one, two = uses(6, 7), uses(8, 9)
+    preferred = np.log(np.array(sorted(v for v in spec.preferred if v > 0.0), dtype=float))
+    return Rules(
+        w=t.logs,
+        seconds=np.log(np.maximum(bounds.seconds, 1e-300)),
+        level=float(np.log(bounds.level)),
+        share=float(np.log(bounds.share)),
+        stop=np.log(np.array([max(bounds.stop, 1e-300), bounds.stop_most])),
+        peaks=np.log(bounds.peaks),
+        ties=_equal_parts(spec.matched),
+        free_r=among(values.r),
+        free_c=among(values.c),
+        most=min(len(PARTS) if spec.most_values is None else spec.most_values, len(PARTS)),
+        six=vectors(~one & ~two),
+        one=vectors(one & ~two),
+        two=vectors(two & ~one),
+        both=vectors(one & two),
+    )
+
+
+def _equal_parts(groups: Sequence[Sequence[str]]) -> Mask:
+    """(14, 14) which parts of the linear block must be equal; other names are not its business."""
+    equal = np.eye(len(PARTS), dtype=bool)
+    for group in groups:
+        own = [PARTS.index(name) for name in group if name in PARTS]
+        equal[np.ix_(own, own)] = True
+    for _ in PARTS:  # equal to equal is equal
+        equal = (equal.astype(int) @ equal.astype(int)) > 0
+    return np.asarray(equal & ~np.eye(len(PARTS), dtype=bool))
 
 
 @dataclass(frozen=True)

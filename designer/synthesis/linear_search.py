@@ -10,19 +10,27 @@ never by time; where it runs out, the last empty level is what the certificate s
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from designer.base.arrays import Array, Index
 from designer.base.progress import doing, part
 from designer.circuit.coefficients import EXACT
+from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.kernel_linear import Rules, Values, complete
-from designer.synthesis.linear_block import PARTS, Targets, catalogue, slice_from
-from designer.synthesis.linear_rules import Bounds, rules_of
-from designer.synthesis.preferences import NO_WISHES, Wishes
-from designer.synthesis.tie_break import ROOM, Shortfall, error_of, pool_of, select
+from designer.synthesis.linear_block import (
+    ANY,
+    PARTS,
+    Bounds,
+    Targets,
+    catalogue,
+    rules_of,
+    slice_from,
+)
+from designer.synthesis.tie_break import ROOM, Shortfall, error_of, fewest_values
 
 FIRST_LEVEL, GROWTH, LAST_LEVEL = 1e-9, 1.6, 0.1
 """Levels: the first, then 1e-6 and on by this factor, up to the last."""
@@ -33,26 +41,14 @@ THINNED = (8, 4, 2)
 
 
 @dataclass(frozen=True)
-class Cost:
-    """What a search took."""
-
-    seconds: float
-    """Wall time [s]."""
-    rows: int
-    """Ratio choices that were joined."""
-    steps: int
-    """Steps of the loops."""
-
-
-@dataclass(frozen=True)
 class LinearBlock:
     """The parts chosen, and what is known of them."""
 
     values: dict[str, float]
     """Chosen values by part name [ohm, F]."""
     error: float
-    """The least that the largest of the ten errors can be made by the scales; with ``Wishes.slack``
-    up to that much above ``least``."""
+    """The least that the largest of the ten errors can be made by the scales; with a slack up to
+    that much above ``least``."""
     least: float
     """The least error that was found."""
     bound: float
@@ -63,28 +59,53 @@ class LinearBlock:
     """How the bound is known, in words."""
     solver: str
     """The solver's word for the choice among equals."""
-    cost: Cost
-    """What the search took."""
 
 
 @dataclass(frozen=True)
-class LevelSearch:
-    """Where a search of levels ended."""
+class _Question:
+    """What is searched: values [ohm], [F], side conditions, and what the model file asks for."""
+
+    targets: Targets
+    resistors: Array
+    capacitors: Array
+    bounds: Bounds
+    spec: CircuitSpec
+
+    @cached_property
+    def values(self) -> Values:
+        return catalogue(self.resistors, self.capacitors)
+
+    @cached_property
+    def rules(self) -> Rules:
+        return rules_of(self.values, self.targets, self.bounds, self.spec)
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Where a search of levels ended: the least error with its (14,) indices of values, the highest
+    level at which nothing can be completed, whether nothing was left out, how far any row came (-1
+    without a row), the ratio choices that were joined and the steps of the loops."""
 
     error: float
-    """The least error that was found; infinite if nothing was."""
     parts: Index
-    """(14,) indices of the values with that error."""
     empty: float
-    """Highest level at which nothing can be completed."""
     whole: bool
-    """Whether nothing was left out."""
     reached: int
-    """How far any row came, -1 if there was none."""
     rows: int
-    """Ratio choices that were joined."""
     steps: int
-    """Steps of the loops."""
+
+    @property
+    def nothing(self) -> bool:
+        return not np.isfinite(self.error)
+
+    def after(self, before: _Levels) -> _Levels:
+        """This search with the work of the one before counted too."""
+        return replace(
+            self,
+            reached=max(before.reached, self.reached),
+            rows=before.rows + self.rows,
+            steps=before.steps + self.steps,
+        )
 
 
 def best(
@@ -93,19 +114,19 @@ def best(
     capacitors: Array,
     prices: Array,
     bounds: Bounds,
-    wishes: Wishes = NO_WISHES,
+    spec: CircuitSpec = ANY,
     level: float | None = None,
 ) -> LinearBlock | Shortfall:
     """The choice of least error, among those the fewest distinct values and the lowest price.
 
     resistors, capacitors : what can be bought [ohm], [F]. prices : (len(capacitors),) price class
-    of each; resistors of a grade cost the same. level : the one level of error that is searched;
-    without it they grow until something is found. A ``Shortfall`` names what leaves no choice:
-    "distinct values", "matched parts", "frequency", "signal level", "stop stiffness", "signal
-    resistors" or "side conditions" (together) if there is one without it, else "coefficients" or,
-    where ratios can be met but no level of them, "displacement integrators".
+    of each; resistors of a grade cost the same. spec : its matched, preferred, most_values and
+    slack count. level : the one level of error that is searched; without it they grow until
+    something is found. A ``Shortfall`` names what leaves no choice: "distinct values", "matched
+    parts", "frequency", "signal level", "stop stiffness", "signal resistors" or "side conditions"
+    (together) if there is one without it, else "coefficients" or, where ratios can be met but no
+    level of them, "displacement integrators".
     """
-    began = time.perf_counter()
     low, high = bounds.signal
     signal = np.sort(resistors[(resistors >= low) & (resistors <= high)])
     if len(signal) == 0:
@@ -114,70 +135,56 @@ def best(
         return Shortfall("stop stiffness", True)
     order = np.argsort(capacitors, kind="stable")
     capacitors, prices = capacitors[order], prices[order]
-    values = catalogue(signal, capacitors)
-    rules = rules_of(values, targets, bounds, wishes)
+    question = _Question(targets, signal, capacitors, bounds, spec)
     if level is None:
-        found = _levels(values, rules, MOST_STEPS)
+        found = _levels(question, MOST_STEPS)
     else:
-        found = _level(values, rules, level, MOST_STEPS)
-        if not np.isfinite(found.error):
+        found = _level(question, level, MOST_STEPS)
+        if found.nothing:
             return Shortfall("coefficients", found.whole)
-    if not np.isfinite(found.error) and not found.whole:
-        found = _thinned(found, targets, signal, capacitors, bounds, wishes)
-    if not np.isfinite(found.error):
-        return _why(found, targets, signal, resistors, capacitors, bounds, wishes)
-    limit = found.error + max(wishes.slack, 0.0)
-    doing("linear block, choices of least error")
-    pool, parts = pool_of(values, rules, found.parts, limit, prices, MOST_STEPS // 8)
-    doing(f"linear block, fewest values of {len(pool.parts1) + len(pool.parts2)} choices")
-    chosen = select(values, rules, pool, parts, limit, prices)
-    index = chosen.parts
+    if found.nothing and not found.whole:
+        found = _thinned(found, question)
+    if found.nothing:
+        return Shortfall(_what_binds(found, question, resistors), found.whole)
+    return _linear_block(found, question, prices)
+
+
+def _linear_block(found: _Levels, question: _Question, prices: Array) -> LinearBlock:
+    """Of the choices with the error that was found: the fewest distinct values, the least price."""
+    values, rules = question.values, question.rules
+    limit = found.error + max(question.spec.slack, 0.0)
+    index, solver = fewest_values(values, rules, found.parts, limit, prices, MOST_STEPS // 8)
     error = error_of(values, rules, index)
     least = min(error, found.error)  # with work left over, the second stage may find better
     bound = found.error if found.whole else min(found.empty, least)
+    chosen = [*question.resistors[index[:10]].tolist(), *question.capacitors[index[10:]].tolist()]
     return LinearBlock(
-        values={
-            name: float((signal if i < 10 else capacitors)[index[i]])
-            for i, name in enumerate(PARTS)
-        },
+        values=dict(zip(PARTS, chosen, strict=True)),
         error=error,
         least=least,
         bound=bound,
         proved=least <= bound + EXACT,
-        proof=_proof(found, len(signal), len(capacitors)),
-        solver=chosen.solver,
-        cost=Cost(time.perf_counter() - began, found.rows, found.steps),
+        proof=_proof(found, len(question.resistors), len(question.capacitors)),
+        solver=solver,
     )
 
 
-def lower_bound(targets: Targets, resistors: Array, capacitors: Array) -> float:
-    """What no choice from the whole catalogue can pass, whatever the side conditions."""
-    free = Bounds((0.0, np.inf), np.inf, np.inf, 0.0, np.ones(4))
-    values = catalogue(resistors, capacitors)
-    found = _levels(values, rules_of(values, targets, free, NO_WISHES), MOST_STEPS)
-    return found.error if found.whole else found.empty
-
-
-def _levels(values: Values, rules: Rules, patience: int, level: float = FIRST_LEVEL) -> LevelSearch:
+def _levels(question: _Question, patience: int, level: float = FIRST_LEVEL) -> _Levels:
     """Search level by level until something is found, the levels or the steps end."""
-    found = LevelSearch(np.inf, np.full(len(PARTS), -1), 0.0, False, -1, 0, 0)
+    found = _Levels(np.inf, np.full(len(PARTS), -1), 0.0, False, -1, 0, 0)
     while True:
         level = min(level, LAST_LEVEL)
-        at = _level(values, rules, level, patience - found.steps)
-        found = replace(
-            at,
-            empty=level if at.whole and not np.isfinite(at.error) else found.empty,
-            reached=max(found.reached, at.reached),
-            rows=found.rows + at.rows,
-            steps=found.steps + at.steps,
-        )
-        if np.isfinite(at.error) or not at.whole or level >= LAST_LEVEL:
+        at = _level(question, level, patience - found.steps)
+        empty = level if at.whole and at.nothing else found.empty
+        found = replace(at.after(found), empty=empty)
+        if not at.nothing or not at.whole or level >= LAST_LEVEL:
             return found
         level *= 1e3 if level < 1e-6 else GROWTH
 
 
-def _level(values: Values, rules: Rules, level: float, patience: int) -> LevelSearch:
+def _level(question: _Question, level: float, patience: int) -> _Levels:
     """The least error at most ``level``; each slice is searched below the best so far."""
+    values, rules = question.values, question.rules
     best, parts = np.inf, np.full(len(PARTS), -1)
     start, whole, reached, rows, steps = 0, True, -1, 0, 0
     slices = len(values.deltas) * len(values.r)
@@ -198,75 +205,61 @@ def _level(values: Values, rules: Rules, level: float, patience: int) -> LevelSe
         if steps >= patience:
             whole = whole and start == slices
             break
-    return LevelSearch(best, parts, 0.0, whole, reached, rows, steps)
+    return _Levels(best, parts, 0.0, whole, reached, rows, steps)
 
 
-def _thinned(
-    found: LevelSearch,
-    targets: Targets,
-    signal: Array,
-    capacitors: Array,
-    bounds: Bounds,
-    wishes: Wishes,
-) -> LevelSearch:
+def _thinned(found: _Levels, question: _Question) -> _Levels:
     """Something to offer where the work ran out: the best of a part of the resistors.
 
     Its bound stays that of the whole catalogue.
     """
     for every in THINNED:
         # The thinned values are a part of all values, so an index is found again in those.
-        kept = np.arange(0, len(signal), every)
-        values = catalogue(signal[kept], capacitors)
-        rules = rules_of(values, targets, bounds, wishes)
-        level = max(found.empty, FIRST_LEVEL)
+        taken = np.arange(0, len(question.resistors), every)
+        fewer = replace(question, resistors=question.resistors[taken])
         with part(f"every {every}th resistor"):
-            thin = _levels(values, rules, MOST_STEPS // 8, level)
-        found = replace(
-            found,
-            reached=max(found.reached, thin.reached),
-            rows=found.rows + thin.rows,
-            steps=found.steps + thin.steps,
-        )
-        if np.isfinite(thin.error) and thin.error < found.error:
+            thin = _levels(fewer, MOST_STEPS // 8, max(found.empty, FIRST_LEVEL))
+        found = replace(found.after(thin), whole=False)
+        if thin.error < found.error:
             parts = thin.parts.copy()
-            parts[:10] = kept[parts[:10]]
+            parts[:10] = taken[parts[:10]]
             found = replace(found, error=thin.error, parts=parts)
-    return replace(found, whole=False)
+    return found
 
 
-def _why(
-    found: LevelSearch,
-    targets: Targets,
-    signal: Array,
-    resistors: Array,
-    capacitors: Array,
-    bounds: Bounds,
-    wishes: Wishes,
-) -> Shortfall:
+def _what_binds(found: _Levels, question: _Question, resistors: Array) -> str:
     """What leaves no choice: the first wish or condition without which there is one."""
-    none = replace(bounds, seconds=(0.0, np.inf), level=np.inf, share=np.inf, stop=0.0)
-    relaxed = {
-        "distinct values": (signal, bounds, replace(wishes, most_values=None)),
-        "matched parts": (signal, bounds, replace(wishes, matched=())),
-        "frequency": (signal, replace(bounds, seconds=none.seconds), wishes),
-        "signal level": (signal, replace(bounds, level=np.inf, share=np.inf), wishes),
-        "stop stiffness": (signal, replace(bounds, stop=0.0), wishes),
-        "signal resistors": (resistors, bounds, wishes),
-        "side conditions": (resistors, none, wishes),
-    }
-    for name, (allowed, kept, wanted) in relaxed.items():
-        if len(allowed) == len(signal) and kept == bounds and wanted == wishes:
-            continue
-        values = catalogue(allowed, capacitors)
+    for name, relaxed in _relaxations(question, resistors):
         with part(f"without {name}"):
-            again = _levels(values, rules_of(values, targets, kept, wanted), MOST_STEPS // 8)
-        if np.isfinite(again.error):
-            return Shortfall(name, found.whole)
-    last = "displacement integrators" if found.reached >= 0 else "coefficients"
-    return Shortfall(last, found.whole)
+            again = _levels(relaxed, MOST_STEPS // 8)
+        if not again.nothing:
+            return name
+    return "displacement integrators" if found.reached >= 0 else "coefficients"
 
 
-def _proof(found: LevelSearch, resistors: int, capacitors: int) -> str:
+def _relaxations(question: _Question, resistors: Array) -> Iterator[tuple[str, _Question]]:
+    """The question without each condition that it has, by the condition's name."""
+    bounds, spec = question.bounds, question.spec
+    none = replace(bounds, seconds=(0.0, np.inf), level=np.inf, share=np.inf, stop=0.0)
+    if spec.most_values is not None:
+        yield "distinct values", replace(question, spec=replace(spec, most_values=None))
+    if spec.matched:
+        yield "matched parts", replace(question, spec=replace(spec, matched=()))
+    for name, relaxed in (
+        ("frequency", replace(bounds, seconds=none.seconds)),
+        ("signal level", replace(bounds, level=np.inf, share=np.inf)),
+        ("stop stiffness", replace(bounds, stop=0.0)),
+    ):
+        if relaxed != bounds:
+            yield name, replace(question, bounds=relaxed)
+    if len(resistors) > len(question.resistors):
+        yield "signal resistors", replace(question, resistors=resistors)
+        yield "side conditions", replace(question, resistors=resistors, bounds=none)
+    elif none != bounds:
+        yield "side conditions", replace(question, bounds=none)
+
+
+def _proof(found: _Levels, resistors: int, capacitors: int) -> str:
     """How the bound is known, in words."""
     scope = f"all {resistors} resistor and {capacitors} capacitor values"
     empty = (

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.synthesis.saturating_stage import bias, quiet, steep
-from designer.synthesis.saturating_tables import SaturatingTables
+from designer.synthesis.saturating_tables import (
+    SaturatingTables,
+    bias,
+    source_resistance,
+    steep_gain,
+)
 from designer.synthesis.value_program import Ranking, TableRows, ValueRule, choose, fewest
 from designer.synthesis.value_tables import (
     DIGITS,
@@ -28,9 +32,10 @@ GROWTH = 3.0
 
 def rows_within(
     t: SaturatingTables, level: float, sure: float, free: frozenset[float]
-) -> tuple[TableRows, TableRows]:
+) -> tuple[TableRows, TableRows] | None:
     """Rows of (R206, R207, R209, R210, R50) and of the rest, with a common u and errors inside
     ``level``; where there are more than the program can hold, those with the fewest new values.
+    None where there are none.
 
     sure : a u that is among them in any case.
     """
@@ -42,31 +47,25 @@ def rows_within(
         keys = [known, *(k for k in keys if k != known)]
     found: list[TableRows] = []
     for key in keys[:TRIES]:
-        rows = _null_rows(t, key, level, free)
+        rows, _ = null_rows(t, key, level, free, NULLS)
         if len(rows):
-            found.append(rows)
+            found.append(_fewest_and_best(rows, free))
         if len(found) == KEYS:
             break
-    names = _null_names(t)
     if not found:
-        none = ValueTable(names, np.zeros((0, len(names))))
-        return slopes, TableRows(none, np.zeros(0), np.zeros(0, dtype=np.intp))
-    nulls = TableRows(
-        ValueTable(names, np.concatenate([r.table.values for r in found])),
-        np.concatenate([r.error for r in found]),
-        np.concatenate([r.key for r in found]),
+        return None
+    slopes = TableRows.stacked(
+        [
+            _fewest_and_best(slopes.take(np.flatnonzero(slopes.key == r.key[0])), free)
+            for r in sorted(found, key=lambda r: int(r.key[0]))
+        ]
     )
-    kept = []
-    for key in np.unique(nulls.key):
-        own = np.flatnonzero(slopes.key == key)
-        least = own[np.argmin(slopes.error[own])]
-        kept.append(np.union1d(own[fewest(slopes.take(own), free, ROWS)], [least]))
-    return slopes.take(np.concatenate(kept)), nulls
+    return slopes, TableRows.stacked(found)
 
 
-def _null_names(t: SaturatingTables) -> tuple[str, ...]:
-    extra = () if t.shift is None else ("R211", "R212")
-    return ("R200", "R201", "R202", "R203", "R204", "R205", "R208", *extra)
+def _fewest_and_best(rows: TableRows, free: frozenset[float]) -> TableRows:
+    """The ``ROWS`` rows with the fewest new values, and the one of least error."""
+    return rows.take(np.union1d(fewest(rows, free, ROWS), [int(np.argmin(rows.error))]))
 
 
 def _slope_rows(
@@ -86,14 +85,6 @@ def _slope_rows(
     error = np.maximum(np.maximum(low - total, total - high), 0.0)
     table = t.left.take(i).beside(t.right.take(j))
     return TableRows(table, error, np.searchsorted(t.u, u[i] - 1e-12))
-
-
-def _null_rows(t: SaturatingTables, key: int, level: float, free: frozenset[float]) -> TableRows:
-    """The rows for one u, at most ``ROWS`` and the one of least error."""
-    rows, _ = null_rows(t, key, level, free, NULLS)
-    if len(rows) == 0:
-        return rows
-    return rows.take(np.union1d(fewest(rows, free, ROWS), [int(np.argmin(rows.error))]))
 
 
 def null_rows(
@@ -139,7 +130,7 @@ def _with_shift(
     row, hit = between(own["R200"], table["R200"] - 1e-6, table["R200"] + 1e-6)
     both = table.take(row).beside(ValueTable(("R211", "R212"), own.take(hit).values[:, 1:]))
     error = error[row]
-    shift = steep(both.columns) * t.target.supply * both["R200"] / both["R211"]
+    shift = steep_gain(both.columns) * t.target.supply * both["R200"] / both["R211"]
     # Only what lies in the range of c has a threshold at all.
     good = np.flatnonzero(inside(shift / t.target.saturation, t.box.shift))
     both, error = both.take(good), error[good]
@@ -156,7 +147,7 @@ def noise_rules(t: SaturatingTables, slopes: TableRows, nulls: TableRows) -> lis
     rest = t.box.noise_gain - 1.0 - s["R210"] / s["R209"]
     # Where R209 alone takes all of it, no row of the other table will do.
     need = np.where(rest > 0.0, np.log(s["R210"] / np.where(rest > 0.0, rest, 1.0)), 1e3)
-    have = np.log(quiet(n.columns))
+    have = np.log(source_resistance(n.columns))
     return [ValueRule((-need, have), -1e-9, np.inf)]
 
 
@@ -166,13 +157,11 @@ def pick(
     """Values that keep every rule, with the error as small as the program finds; and its word."""
     level = max(least, ranking.tolerance) + ranking.slack
     while level <= last * GROWTH:
-        slopes, nulls = rows_within(t, level * (1.0 + 1e-9) + 1e-10, u, ranking.free)
-        if len(nulls):
-            found = choose((slopes, nulls), noise_rules(t, slopes, nulls), ranking)
-            if found is not None:
-                i, j = found.rows
-                names = slopes.table.names + nulls.table.names
-                chosen = np.concatenate([slopes.table.values[i], nulls.table.values[j]])
-                return dict(zip(names, chosen.tolist(), strict=True)), found.solver
+        rows = rows_within(t, level * (1.0 + 1e-9) + 1e-10, u, ranking.free)
+        found = None if rows is None else choose(rows, noise_rules(t, *rows), ranking)
+        if rows is not None and found is not None:
+            (i, j), status = found
+            chosen = rows[0].table.take(np.array([i])).beside(rows[1].table.take(np.array([j])))
+            return dict(zip(chosen.names, chosen.values[0].tolist(), strict=True)), status
         level *= GROWTH
     return None

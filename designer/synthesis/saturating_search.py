@@ -14,17 +14,14 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT
-from designer.synthesis import saturating_rows, saturating_stage
+from designer.synthesis import saturating_rows, saturating_tables
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
-from designer.synthesis.equal_parts import Ties, tied_lists
+from designer.synthesis.equal_parts import EqualParts, with_equal_parts
 from designer.synthesis.saturating_tables import (
     MOST_SHIFT,
+    TABLES,
     SaturatingTables,
     SearchBox,
-    box,
-    free_box,
-    relaxed_errors,
-    slope_errors,
     tables,
 )
 from designer.synthesis.value_program import Ranking
@@ -44,45 +41,39 @@ HANDY = 8
 LEVEL_SETTERS = ("R200", "R202", "R206", "R208", "R209")
 LIGHT = ("R205", "R211", "R212")
 """Resistors that no output drives."""
-ATOMS = (
-    ("R206", "R207", "R209"),
-    ("R210", "R50"),
-    ("R200", "R201"),
-    ("R202", "R203"),
-    ("R204", "R205", "R208"),
-    ("R200", "R211", "R212"),
-)
-"""Parts that stand in one table of the saturating stage."""
 
 
 @dataclass(frozen=True)
-class SearchStage:
-    """One stage of the search: the values of each part and the ranges."""
+class _Stage:
+    """One stage of the search: values of each part [ohm] and ranges; whether the slope's tables, or
+    all, hold every value that the conditions leave; whether it is only for where the ones before
+    have no answer."""
 
     lists: Mapping[str, Array]
-    """Values of each part by name [ohm]."""
     box: SearchBox
-    """The ranges that are searched."""
     slope: bool = False
-    """Whether the slope's tables hold every value that the conditions leave."""
     whole: bool = False
-    """Whether all tables hold every value that the conditions leave."""
     rescue: bool = False
-    """Whether the stage is only for where the ones before have no answer."""
 
 
 @dataclass(frozen=True)
-class Search:
-    """What the stages found."""
+class _Least:
+    """The least largest error of some tables, the u = ln A-/R209 that has it, and what no row of
+    them passes, rules that tie the slope's tables to the others left out."""
 
-    best: tuple[SaturatingTables, Least] | None
-    """The tables with the least error, with that error; None where there is nothing."""
+    error: float
+    u: float
     bound: float
-    """No choice from the whole catalogue has a smaller error."""
-    looked_at: int
-    """Rows that were looked at."""
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What the stages found: the tables with the least error, a bound of the whole catalogue, and
+    where there is nothing the condition that binds."""
+
+    best: tuple[SaturatingTables, _Least] | None
+    bound: float
     binding: str
-    """Where there is nothing, the condition that binds."""
 
     @property
     def error(self) -> float:
@@ -90,17 +81,19 @@ class Search:
 
 
 def size(
-    target: DeadZoneTarget, resistors: Array, base: float, ranking: Ranking, ties: Ties
+    target: DeadZoneTarget, resistors: Array, base: float, ranking: Ranking, equal: EqualParts
 ) -> DeadZone | str:
+    """The stage, or the name of the condition that leaves none. base : the first value tried for
+    resistors that only set a level [ohm]."""
     if target.shift[0] >= MOST_SHIFT:
         return "dead-zone bias"
-    found = Search(None, 0.0, 0, "stop slope")
-    stages = _stages(target, resistors, base, ranking.free, ties)
+    found = _Found(None, 0.0, "stop slope")
+    stages = _stages(target, resistors, base, ranking.free, equal)
     for number, stage in enumerate(stages, start=1):
         doing(f"dead zone, tables {number}")
         if stage.rescue and found.best is not None:
             break
-        found = _search(target, stage, ties, ranking.free | {base}, found)
+        found = _search(target, stage, equal, ranking.free | {base}, found)
         if found.best is not None and found.error <= max(found.bound, 0.0) + EXACT:
             break
         if found.best is not None and stage.whole:
@@ -115,33 +108,35 @@ def size(
         free = saturating_rows.pick(t, least.error, least.u, without, LAST_LEVEL)
         rule = "noise gain" if np.isfinite(target.noise_gain) else "dead-zone bias"
         return rule if free is None else "distinct values"
-    values, word = picked
+    values, status = picked
     values = {name: values[name] for name in parts_of(target.kind, target.sides)}
-    return _answer(target, values, found, word)
+    return _answer(target, values, found.bound, status)
 
 
 def _search(
-    target: DeadZoneTarget, stage: SearchStage, ties: Ties, free: frozenset[float], so_far: Search
-) -> Search:
-    """One stage, for every value of the parts that are tied across tables."""
-    best, looked_at, binding = so_far.best, so_far.looked_at, so_far.binding
-    bound = np.inf
-    for lists in tied_lists(stage.lists, ties, ATOMS):
+    target: DeadZoneTarget,
+    stage: _Stage,
+    equal: EqualParts,
+    free: frozenset[float],
+    so_far: _Found,
+) -> _Found:
+    """One stage, for every value of the parts that are equal across tables."""
+    best, binding, bound = so_far.best, so_far.binding, np.inf
+    for lists in with_equal_parts(stage.lists, equal, TABLES):
         if lists is None:
             bound = 0.0
             break
         level = LAST_LEVEL if best is None else best[1].error
-        t = tables(target, lists, ties.tie, stage.box, free, level)
+        t = tables(target, lists, equal, stage.box, free, level)
         why = t.empty()
         if why is not None:
             binding = why if best is None else binding
             continue
-        slope = float(slope_errors(t).min())
-        if t.steep_count() > LARGEST:
+        slope = float(t.slope_errors.min())
+        if t.steep_count > LARGEST:
             bound = min(bound, slope)
             continue
-        least = least_error(t, EXACT, level)
-        looked_at += len(t.left) + len(t.right) + len(t.divider) + t.steep_count()
+        least = _least_error(t, level)
         bound = min(bound, least.bound if stage.whole else slope)
         # A wider range only where it is of use: the narrow one has the better threshold.
         margin = 0.0 if best is None or best[0].box == stage.box else EXACT
@@ -155,18 +150,15 @@ def _search(
         bound = min(bound, best[1].error)  # no row of the tables is better than the best known
     if not (stage.slope or stage.whole) or (best is not None and best[1].error <= EXACT):
         bound = 0.0
-    return Search(best, bound, looked_at, binding)
+    return _Found(best, bound, binding)
 
 
 def _answer(
-    target: DeadZoneTarget,
-    values: dict[str, float],
-    found: Search,
-    word: str,
+    target: DeadZoneTarget, values: dict[str, float], bound: float, status: str
 ) -> DeadZone:
-    errors = saturating_stage.errors(target, values)
+    errors = saturating_tables.errors(target, values)
     worst = max(abs(e) for e in errors.values())
-    bound = min(found.bound, worst)
+    bound = min(bound, worst)
     if worst <= EXACT:
         proof = "nothing to improve: every error of the dead zone is at most 1e-6"
     elif worst <= bound + EXACT:
@@ -179,43 +171,45 @@ def _answer(
     return DeadZone(
         values=values,
         errors=errors,
-        threshold=saturating_stage.threshold(target, values),
+        threshold=saturating_tables.threshold(target, values),
         bound=bound,
         proved=worst <= max(bound, 0.0) + EXACT,
         proof=proof,
-        solver=word,
-        looked_at=found.looked_at,
-        seconds=0.0,
+        solver=status,
     )
 
 
 def _stages(
-    target: DeadZoneTarget, resistors: Array, base: float, free: frozenset[float], ties: Ties
-) -> Iterator[SearchStage]:
-    near, far = (box(target, *room) for room in ROOMS)
+    target: DeadZoneTarget,
+    resistors: Array,
+    base: float,
+    free: frozenset[float],
+    equal: EqualParts,
+) -> Iterator[_Stage]:
+    near, far = (SearchBox.near(target, *room) for room in ROOMS)
     names = parts_of(target.kind, target.sides)
     heavy = resistors[resistors >= target.load]
     every = {name: resistors if name in LIGHT else heavy for name in names}
-    every |= {name: heavy[np.isclose(heavy, v, rtol=1e-9)] for name, v in ties.value.items()}
+    every |= {name: heavy[np.isclose(heavy, v, rtol=1e-9)] for name, v in equal.value.items()}
     handy = _handy(heavy, base, free)
     few = {name: np.intersect1d(every[name], handy[:1]) for name in LEVEL_SETTERS}
     some = {name: np.intersect1d(every[name], handy) for name in LEVEL_SETTERS}
-    given = {name: every[name] for name in ties.value}
+    given = {name: every[name] for name in equal.value}
     slopes = every | some | given | {name: every[name] for name in ("R206", "R209")}
     fits = len(resistors) ** 3 <= LARGEST
-    yield SearchStage(every | few | given, near)
-    yield SearchStage(every | few | given, far)
-    yield SearchStage(every | some | given, far)
-    yield SearchStage(slopes, far, slope=target.strict)
+    yield _Stage(every | few | given, near)
+    yield _Stage(every | few | given, far)
+    yield _Stage(every | some | given, far)
+    yield _Stage(slopes, far, slope=target.strict)
     if target.strict:
         if fits:
-            yield SearchStage(every, far, whole=True)
-        last = box(target, *OPEN)
+            yield _Stage(every, far, whole=True)
+        last = SearchBox.near(target, *OPEN)
     else:
-        last = free_box(target)
-        yield SearchStage(slopes, replace(last, steep=far.steep), slope=True)
+        last = SearchBox.unlimited(target)
+        yield _Stage(slopes, replace(last, steep=far.steep), slope=True)
     lists = every if fits else slopes
-    yield SearchStage(lists, last, slope=True, whole=fits, rescue=target.strict)
+    yield _Stage(lists, last, slope=True, whole=fits, rescue=target.strict)
 
 
 def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
@@ -229,31 +223,16 @@ def _handy(heavy: Array, base: float, free: frozenset[float]) -> Array:
     return np.array(list(dict.fromkeys(near))[:most])
 
 
-@dataclass(frozen=True)
-class Least:
-    """The least largest error of the tables."""
-
-    error: float
-    """The least largest error."""
-    u: float
-    """The u = ln A-/R209 that has it."""
-    bound: float
-    """No row of them has a smaller one, rules that tie the slope's tables to the others left
-    out."""
-    looked_at: int
-    """Values of u that were completed."""
-
-
-def least_error(t: SaturatingTables, tolerance: float, most: float) -> Least:
+def _least_error(t: SaturatingTables, most: float) -> _Least:
     """The minimum over every row of the tables, sought below ``most``."""
-    error = relaxed_errors(t)
+    error = t.relaxed_errors
     steep = distinct(t.steep_logs[0])
     divider = distinct(t.divider_logs)
-    best, where, looked_at, floor = np.inf, float("nan"), 0, np.inf
+    best, where, completed, floor = np.inf, float("nan"), 0, np.inf
     for k in np.argsort(error, kind="stable"):
-        if error[k] >= min(best, most) or best <= tolerance:
+        if error[k] >= min(best, most) or best <= EXACT:
             break
-        if t.shift is not None and looked_at >= JOINT:
+        if t.shift is not None and completed >= JOINT:
             floor = min(floor, float(error[k]))
             break
         wanted = steep - t.u[k]
@@ -261,16 +240,16 @@ def least_error(t: SaturatingTables, tolerance: float, most: float) -> Least:
         reached = max(float(error[k]), null)
         if reached >= min(best, most):
             continue
-        looked_at += 1
-        if looked_at % 16 == 0:
-            doing(f"dead zone, {looked_at} values of R206, R207, R209 looked at")
+        completed += 1
+        if completed % 16 == 0:
+            doing(f"dead zone, {completed} values of R206, R207, R209 looked at")
         if t.shift is not None:
             least, cut = _joint_error(t, int(k), reached, min(best, most))
             floor = min(floor, reached) if cut else floor
             reached = max(reached, least)
         if reached < best:
             best, where = reached, float(t.u[k])
-    return Least(best, where, min(best, floor), looked_at)
+    return _Least(best, where, min(best, floor))
 
 
 def _joint_error(t: SaturatingTables, key: int, start: float, most: float) -> tuple[float, bool]:
@@ -278,8 +257,8 @@ def _joint_error(t: SaturatingTables, key: int, start: float, most: float) -> tu
     rows were left out on the way."""
     level, cut = max(start, EXACT), False
     while True:
-        rows, part = saturating_rows.null_rows(t, key, min(level, most))
-        cut = cut or part
+        rows, shortened = saturating_rows.null_rows(t, key, min(level, most))
+        cut = cut or shortened
         if len(rows) or level >= most:
             return float(rows.error.min(initial=np.inf)), cut
         level *= 2.0

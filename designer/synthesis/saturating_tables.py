@@ -1,12 +1,17 @@
-"""The tables that the saturating stage is sized with: every combination that the ranges leave.
+"""The saturating dead zone (Fig. 5, Eq. (17)-(20)): its formulas, and the tables it is sized with.
 
-In logarithms, with u = ln A-/R209, the errors are
+    fv = -R210 (v11/R208 + v12/R209),  v12 = -A- v1,  A- = R207/R206,  A+ = R201 R203/(R200 R202)
+    v11/R208 = clip(A+ v1 + c, ± Esat)/Rt,  Rt = R204 + R208 + R204 R208/R205 (the loaded divider)
+
+One-sided, c = A+ (R200/R211) supply makes U3C reach its limit at the stop alone, and R212 takes
+c/Rt out again. In logarithms, with u = ln A-/R209, the errors are
 
     stop slope       u + ln R210/R50 - ln wanted           (wanted is an interval)
     dead-zone null   mu (ln A+ - ln Rt - u)
     dead-zone bias   mu c/(Esat - c) (ln R200 R212/R211 + u), one-sided only, to first order
 
-so for each value of u every error is the distance to the nearest entry of a sorted table.
+so for each value of u every error is the distance to the nearest entry of a sorted table of every
+combination that the ranges leave.
 """
 
 from __future__ import annotations
@@ -18,8 +23,8 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.synthesis.dead_zone_target import DeadZoneTarget
-from designer.synthesis.saturating_stage import quiet
+from designer.synthesis.dead_zone_target import DeadZoneTarget, outside
+from designer.synthesis.equal_parts import EqualParts
 from designer.synthesis.value_tables import (
     DIGITS,
     ValueTable,
@@ -40,6 +45,61 @@ LEAST_FIRST = 1.0
 """Least R201/R200: an amplifier that attenuates adds the offset of the one behind it."""
 LEAST_SECOND = 1.15
 """Least R203/R202, so that U3B is still linear where U3C reaches its limit."""
+TABLES = (
+    ("R206", "R207", "R209"),
+    ("R210", "R50"),
+    ("R200", "R201"),
+    ("R202", "R203"),
+    ("R204", "R205", "R208"),
+    ("R200", "R211", "R212"),
+)
+"""Parts of each table."""
+
+
+def errors(target: DeadZoneTarget, values: Mapping[str, float]) -> dict[str, float]:
+    """The errors of finished values: the stop slope's as a logarithm, the others in units of K1."""
+    v = {name: np.asarray(value) for name, value in values.items()}
+    per_ohm = v["R207"] / v["R206"] / v["R209"]
+    total = float(per_ohm * v["R210"] / v["R50"])
+    out = {
+        "stop slope": outside(total, target.slope),
+        "dead-zone null": float(target.mu * np.log(steep_gain(v) / divider(v) / per_ohm)),
+    }
+    if target.sides != "both":
+        out["dead-zone bias"] = float(bias(target, v, per_ohm))
+    return out
+
+
+def threshold(target: DeadZoneTarget, values: Mapping[str, float]) -> float:
+    """v1 at the stop [V]: (Esat - c)/A+."""
+    v = {name: np.asarray(value) for name, value in values.items()}
+    steep = steep_gain(v)
+    shift = steep * target.supply * v["R200"] / v["R211"] if target.sides != "both" else 0.0
+    return float((target.saturation - shift) / steep)
+
+
+def steep_gain(v: Mapping[str, Array]) -> Array:
+    """A+."""
+    return v["R201"] * v["R203"] / (v["R200"] * v["R202"])
+
+
+def divider(v: Mapping[str, Array]) -> Array:
+    """Rt [ohm]."""
+    return v["R204"] + v["R208"] + v["R204"] * v["R208"] / v["R205"]
+
+
+def bias(target: DeadZoneTarget, v: Mapping[str, Array], per_ohm: Array) -> Array:
+    """mu (leftover current)/(A-/R209 · threshold): the constant force in units of K1 times b."""
+    shift = steep_gain(v) * target.supply * v["R200"] / v["R211"]
+    threshold = (target.saturation - shift) / steep_gain(v)
+    left = shift / divider(v) - target.supply / v["R212"]
+    # A shift as large as the range leaves no threshold: such rows are no choice, whatever is left.
+    return np.asarray(target.mu * left / (per_ohm * np.maximum(threshold, 1e-12)))
+
+
+def source_resistance(v: Mapping[str, Array]) -> Array:
+    """What R208 and the divider behind it are from U3D's summing node to ground [ohm]."""
+    return np.asarray(v["R208"] + v["R204"] * v["R205"] / (v["R204"] + v["R205"]))
 
 
 @dataclass(frozen=True)
@@ -59,32 +119,29 @@ class SearchBox:
     noise_gain: float
     """Limit of the noise gain."""
 
+    @classmethod
+    def near(
+        cls, target: DeadZoneTarget, threshold: float, linear: float, output: float
+    ) -> SearchBox:
+        """Threshold, A- and fv slope within these factors of their largest."""
+        shift = target.shift[0], min(target.shift[1], MOST_SHIFT)
+        top = max(target.saturation * (1.0 - shift[0]) / target.threshold, LEAST_STEEP)
+        wanted = target.slope[1]
+        return cls(
+            steep=(top, top * threshold),
+            linear=(target.linear_gain / linear, target.linear_gain),
+            stop=(target.output_gain / wanted / output, target.output_gain / wanted),
+            shift=shift,
+            first=LEAST_FIRST if np.isfinite(threshold) else 0.0,
+            noise_gain=target.noise_gain,
+        )
 
-def box(target: DeadZoneTarget, threshold: float, linear: float, output: float) -> SearchBox:
-    """The ranges where threshold, A- and fv slope are within these factors of their largest."""
-    kappa = target.shift[0], min(target.shift[1], MOST_SHIFT)
-    top = target.saturation * (1.0 - kappa[0]) / target.threshold
-    wanted = target.slope[1]
-    return SearchBox(
-        steep=(max(top, LEAST_STEEP), max(top, LEAST_STEEP) * threshold),
-        linear=(target.linear_gain / linear, target.linear_gain),
-        stop=(target.output_gain / wanted / output, target.output_gain / wanted),
-        shift=kappa,
-        first=LEAST_FIRST if np.isfinite(threshold) else 0.0,
-        noise_gain=target.noise_gain,
-    )
-
-
-def free_box(target: DeadZoneTarget) -> SearchBox:
-    """No limits but those without which the stage is no dead zone."""
-    return SearchBox(
-        (LEAST_STEEP, np.inf),
-        (0.0, np.inf),
-        (0.0, np.inf),
-        (target.shift[0], MOST_SHIFT),
-        0.0,
-        np.inf,
-    )
+    @classmethod
+    def unlimited(cls, target: DeadZoneTarget) -> SearchBox:
+        """No limits but those without which the stage is no dead zone."""
+        any_size = (0.0, np.inf)
+        shift = (target.shift[0], MOST_SHIFT)
+        return cls((LEAST_STEEP, np.inf), any_size, any_size, shift, 0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -123,33 +180,36 @@ class SaturatingTables:
         return np.asarray(np.log(self.right["R210"] / self.right["R50"]))
 
     @cached_property
-    def steep_logs(self) -> tuple[Array, Index, Index]:
-        """ln A+ inside the box, and the rows of ``first`` and ``second`` that give it."""
-        a, order, low, high = self._steep_join()
-        row, hit = between(a[1][order], low, high)
-        second = order[hit]
-        return np.asarray(a[0][row] + a[1][second]), row, second
-
-    def steep_count(self) -> int:
-        a, order, low, high = self._steep_join()
-        return int(how_many_between(a[1][order], low, high).sum())
-
-    def _steep_join(self) -> tuple[tuple[Array, Array], Index, Array, Array]:
-        a1 = np.log(self.first["R201"] / self.first["R200"])
-        a2 = np.log(self.second["R203"] / self.second["R202"])
-        low, high = np.log(self.box.steep)
-        return (a1, a2), np.argsort(a2, kind="stable"), low - a1 - 1e-12, high - a1 + 1e-12
-
-    @cached_property
     def divider_logs(self) -> Array:
-        t = self.divider
-        return np.asarray(np.log(t["R204"] + t["R208"] + t["R204"] * t["R208"] / t["R205"]))
+        return np.asarray(np.log(divider(self.divider.columns)))
 
     @cached_property
     def shift_logs(self) -> Array:
         t = self.shift
         assert t is not None
         return np.asarray(np.log(t["R211"] / t["R212"] / t["R200"]))
+
+    @cached_property
+    def steep_logs(self) -> tuple[Array, Index, Index]:
+        """ln A+ inside the box, and the rows of ``first`` and ``second`` that give it."""
+        first, second, order, low, high = self._steep_join
+        row, hit = between(second[order], low, high)
+        return np.asarray(first[row] + second[order[hit]]), row, order[hit]
+
+    @cached_property
+    def steep_count(self) -> int:
+        """How many pairs of rows ``steep_logs`` has."""
+        _, second, order, low, high = self._steep_join
+        return int(how_many_between(second[order], low, high).sum())
+
+    @cached_property
+    def _steep_join(self) -> tuple[Array, Array, Index, Array, Array]:
+        """Logarithms of both gains, the order of the second, its range for each of the first."""
+        first = np.log(self.first["R201"] / self.first["R200"])
+        second = np.log(self.second["R203"] / self.second["R202"])
+        low, high = np.log(self.box.steep)
+        order = np.argsort(second, kind="stable")
+        return first, second, order, low - first - 1e-12, high - first + 1e-12
 
     @property
     def bias_weight(self) -> float:
@@ -166,98 +226,105 @@ class SaturatingTables:
         share = level / self.bias_weight
         return float(-np.log1p(-share)) if share < 1.0 else np.inf
 
+    @cached_property
+    def slope_errors(self) -> Array:
+        """(k,) for each u the least slope error."""
+        low, high = np.log(self.target.slope)
+        return distance(self.right_logs, low - self.u, high - self.u)
+
+    @property
+    def relaxed_errors(self) -> Array:
+        """(k,) for each u a lower bound of the largest of slope and bias error."""
+        if self.shift is None:
+            return self.slope_errors
+        x = distance(np.sort(self.shift_logs), self.u, self.u)
+        return np.asarray(np.maximum(self.slope_errors, self.bias_weight * -np.expm1(-x)))
+
     def empty(self) -> str | None:
         """Name of the condition that leaves a table without rows."""
         if not (len(self.left) and len(self.right)):
             return "stop slope"
         if not (len(self.first) and len(self.second) and len(self.divider)):
             return "dead-zone null"
-        if self.shift is not None and len(self.shift) == 0:
-            return "dead-zone bias"
-        return None
+        return "dead-zone bias" if self.shift is not None and len(self.shift) == 0 else None
 
 
 def tables(
     target: DeadZoneTarget,
     lists: Mapping[str, Array],
-    tie: Mapping[str, str],
-    limits: SearchBox,
+    equal: EqualParts,
+    box: SearchBox,
     free: frozenset[float],
     level: float = np.inf,
 ) -> SaturatingTables:
     """The tables of these lists. Of rows with the same logarithm, that with the fewest values that
     are not ``free`` stays; of R206, R207, R209 only rows with a slope error up to ``level``."""
-    gain = limits.noise_gain
-    noisy = bool(np.isfinite(gain))
-    right = combinations(("R210", "R50"), lists, tie)
-    right = right.take(inside(right["R50"], limits.stop))
+    noisy = bool(np.isfinite(box.noise_gain))
+    right = combinations(("R210", "R50"), lists, equal.group)
+    right = right.take(inside(right["R50"], box.stop))
     least_noise = -right["R210"] if noisy else None
     right = _fewest_of_each(right, np.log(right["R210"] / right["R50"]), free, least_noise)
-    left = _left(target, lists, tie, limits, free, right, level)
-    first = combinations(("R200", "R201"), lists, tie)
+    first = combinations(("R200", "R201"), lists, equal.group)
     ratio = first["R201"] / first["R200"]
-    first = first.take((ratio >= limits.first) & (1.0 + ratio <= gain))
-    second = combinations(("R202", "R203"), lists, tie)
+    first = first.take((ratio >= box.first) & (1.0 + ratio <= box.noise_gain))
+    second = combinations(("R202", "R203"), lists, equal.group)
     ratio = second["R203"] / second["R202"]
-    second = second.take((ratio >= LEAST_SECOND) & (1.0 + ratio <= gain))
-    divider = combinations(("R204", "R205", "R208"), lists, tie)
+    second = second.take((ratio >= LEAST_SECOND) & (1.0 + ratio <= box.noise_gain))
     shift = None
     if target.sides != "both":
-        shift = combinations(("R200", "R211", "R212"), lists, tie)
+        shift = combinations(("R200", "R211", "R212"), lists, equal.group)
         # c = A+ supply R200/R211, with both ends of A+.
         ratio = target.supply * shift["R200"] / shift["R211"] / target.saturation
-        shift = shift.take(
-            (ratio * limits.steep[1] >= limits.shift[0])
-            & (ratio * limits.steep[0] <= limits.shift[1])
-        )
-    out = SaturatingTables(target, limits, left, right, first, second, divider, shift)
-    if shift is None:  # otherwise R200 stands in the bias too: equal ratios are not the same
+        low, high = box.shift
+        shift = shift.take((ratio * box.steep[1] >= low) & (ratio * box.steep[0] <= high))
+    else:  # with a shift R200 stands in the bias too: equal ratios are not the same
         first = _fewest_of_each(first, np.log(first["R201"] / first["R200"]), free)
+    t = SaturatingTables(
+        target,
+        box,
+        _left(target, lists, equal, box, free, right, level),
+        right,
+        first,
+        _fewest_of_each(second, np.log(second["R203"] / second["R202"]), free),
+        combinations(("R204", "R205", "R208"), lists, equal.group),
+        shift,
+    )
+    loud = t.left["R209"] if noisy else None
+    light = source_resistance(t.divider.columns) if noisy else None
     return replace(
-        out,
-        left=_fewest_of_each(left, out.left_logs, free, left["R209"] if noisy else None),
-        first=first,
-        second=_fewest_of_each(second, np.log(second["R203"] / second["R202"]), free),
-        divider=_fewest_of_each(
-            divider, out.divider_logs, free, quiet(divider.columns) if noisy else None
-        ),
+        t,
+        left=_fewest_of_each(t.left, t.left_logs, free, loud),
+        divider=_fewest_of_each(t.divider, t.divider_logs, free, light),
     )
 
 
 def _left(
     target: DeadZoneTarget,
     lists: Mapping[str, Array],
-    tie: Mapping[str, str],
-    limits: SearchBox,
+    equal: EqualParts,
+    box: SearchBox,
     free: frozenset[float],
     right: ValueTable,
     level: float,
 ) -> ValueTable:
     """Rows of R206, R207, R209, one value of R209 after the other, so that memory stays bounded."""
-    pairs = combinations(("R206", "R207"), lists, tie)
+    pairs = combinations(("R206", "R207"), lists, equal.group)
     ratio = pairs["R207"] / pairs["R206"]
-    fine = inside(ratio, limits.linear) & (1.0 + ratio <= limits.noise_gain)
-    pairs = pairs.take(fine)
-    if tie.get("R209", "R209") not in (tie.get("R206", "R206"), tie.get("R207", "R207")):
+    pairs = pairs.take(inside(ratio, box.linear) & (1.0 + ratio <= box.noise_gain))
+    tied = [name for name in ("R206", "R207") if equal.of(name) == equal.of("R209")]
+    if not tied:
         pairs = _fewest_of_each(pairs, np.log(pairs["R207"] / pairs["R206"]), free)
     low, high = np.log(target.slope)
     q = np.log(right["R210"] / right["R50"])
-    kept = []
+    found = [ValueTable(("R206", "R207", "R209"), np.zeros((0, 3)))]
     for value in lists["R209"]:
-        own = {**lists, "R209": np.array([value])}
-        for name in ("R206", "R207"):
-            if tie.get(name, name) == tie.get("R209", "R209"):
-                own[name] = np.intersect1d(own[name], own["R209"])
-        rows = pairs.take(np.isin(pairs["R206"], own["R206"]) & np.isin(pairs["R207"], own["R207"]))
+        rows = pairs
+        for name in tied:
+            rows = rows.take(rows[name] == value)
         u = np.log(rows["R207"] / rows["R206"] / value)
-        near = distance(q, low - u, high - u) <= level
-        rows = rows.take(near)
-        third = ValueTable(("R209",), np.full((len(rows), 1), value))
-        kept.append(rows.beside(third))
-    names = ("R206", "R207", "R209")
-    if not kept:
-        return ValueTable(names, np.zeros((0, 3)))
-    return ValueTable(names, np.concatenate([rows.values for rows in kept]))
+        rows = rows.take(distance(q, low - u, high - u) <= level)
+        found.append(rows.with_column("R209", np.full(len(rows), value)))
+    return ValueTable.stacked(found)
 
 
 def _fewest_of_each(
@@ -274,18 +341,3 @@ def _fewest_of_each(
             kept.append(order[np.unique(np.round(logs[order], DIGITS), return_index=True)[1]])
     both = np.unique(np.concatenate(kept))
     return table.take(both[np.argsort(np.round(logs[both], DIGITS), kind="stable")])
-
-
-def slope_errors(t: SaturatingTables) -> Array:
-    """(k,) for each u the least slope error."""
-    low, high = np.log(t.target.slope)
-    return distance(t.right_logs, low - t.u, high - t.u)
-
-
-def relaxed_errors(t: SaturatingTables) -> Array:
-    """(k,) for each u a lower bound of the largest of slope and bias error."""
-    error = slope_errors(t)
-    if t.shift is None:
-        return error
-    x = distance(np.sort(t.shift_logs), t.u, t.u)
-    return np.asarray(np.maximum(error, t.bias_weight * -np.expm1(-x)))

@@ -7,16 +7,15 @@ is the least of the whole catalogue. Every answer is computed anew from its valu
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
-from dataclasses import replace
 
 from designer.base.arrays import Array
 from designer.circuit.coefficients import EXACT
+from designer.model.circuit_table import CircuitSpec
 from designer.synthesis import rectifier_stage, saturating_search
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
-from designer.synthesis.equal_parts import ties_of
-from designer.synthesis.preferences import NO_WISHES, Wishes
+from designer.synthesis.equal_parts import equal_parts
+from designer.synthesis.linear_block import ANY
 from designer.synthesis.value_program import Ranking
 
 
@@ -25,7 +24,7 @@ def size(
     resistors: Array,
     base: float,
     used: frozenset[float],
-    wishes: Wishes = NO_WISHES,
+    spec: CircuitSpec = ANY,
     fixed: Mapping[str, float] | None = None,
     price: Mapping[float, float] | None = None,
 ) -> DeadZone | str:
@@ -33,26 +32,21 @@ def size(
 
     resistors : values that may be used [ohm], ascending. base : the first value tried for resistors
     that only set a level. used : values that the rest of the circuit has; they cost nothing in the
-    second stage. fixed : values of parts outside the stage that matched groups may name. price :
-    price class by value.
+    second stage. spec : its matched, preferred, most_values and slack count. fixed : values of
+    parts outside the stage that matched groups may name. price : price class by value.
     """
-    began = time.perf_counter()
-    free = used | wishes.preferred
+    preferred = frozenset(spec.preferred)
     most = None
-    if wishes.most_values is not None:
-        most = wishes.most_values - len(used - wishes.preferred)
+    if spec.most_values is not None:
+        most = spec.most_values - len(used - preferred)
         if most < 0:
             return "distinct values"
-    ranking = Ranking(free, price or {}, EXACT, wishes.slack, most)
-    inherent = rectifier_stage.EQUAL if target.kind == "rectifier" else ()
-    groups = (*inherent, *wishes.matched)
-    ties = ties_of(parts_of(target.kind, target.sides), groups, fixed or {})
-    if ties is None:
+    ranking = Ranking(used | preferred, price or {}, EXACT, spec.slack, most)
+    rectifier = target.kind == "rectifier"
+    groups = (*(rectifier_stage.EQUAL if rectifier else ()), *spec.matched)
+    equal = equal_parts(parts_of(target.kind, target.sides), groups, fixed or {})
+    if equal is None:
         return "matched parts"
-    if target.kind == "rectifier":
-        found = rectifier_stage.size(target, resistors, ranking, ties.tie, ties.value)
-    else:
-        found = saturating_search.size(target, resistors, base, ranking, ties)
-    if isinstance(found, str):
-        return found
-    return replace(found, seconds=time.perf_counter() - began)
+    if rectifier:
+        return rectifier_stage.size(target, resistors, ranking, equal)
+    return saturating_search.size(target, resistors, base, ranking, equal)

@@ -8,6 +8,7 @@ is rebuilt from the values and its error computed afresh.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cvxpy as cp
@@ -18,30 +19,19 @@ from designer.base.progress import doing
 from designer.circuit.scale_fit import minimax
 from designer.synthesis.kernel_linear import Rules, Values, gather
 from designer.synthesis.linear_block import PARTS, residuals_of, slice_from
+from designer.synthesis.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 
 ROOM, GROUPS, COMPLETIONS = 1 << 13, 1 << 12, 1 << 14
 """Completions of one mass that are held for one group; groups and completions in all."""
 LARGEST = 300
 """Completions that the program holds; of more, those with the fewest values and least price."""
-SOLVER: dict[str, float | int] = {
-    "mip_rel_gap": 0.0,
-    "mip_abs_gap": 1e-9,
-    "mip_feasibility_tolerance": 1e-9,
-    "primal_feasibility_tolerance": 1e-9,
-    "random_seed": 0,
-    "threads": 1,
-}
-"""HiGHS options; they stand in the provenance. No time limit: it would make answers differ."""
-PRICE_WEIGHT = 1e-3
-"""Of one price class against one distinct value: price only breaks ties."""
 LEAST_UNIT = 1e-9
 """Errors are counted in units of the limit, and that is at least this."""
-
 
 OWN = [PARTS.index(name) for name in ("R2", "R9", "R3", "R8", "C2", "C4")]
 FIRST = [PARTS.index(name) for name in ("R4", "R10", "R1", "C1")]
 SECOND = [PARTS.index(name) for name in ("R5", "R11", "R7", "C3")]
-"""Places of a row's own parts, and of those that a completion of each mass brings."""
+"""Columns of a group's own parts, and of those that a completion of each mass brings."""
 
 
 @dataclass(frozen=True)
@@ -55,44 +45,57 @@ class Shortfall:
 
 
 @dataclass(frozen=True)
-class Pool:
-    """What the program chooses from: indices of values."""
+class _Side:
+    """Completions of one mass: (k, 14) indices of the values, the group's own parts among them and
+    -1 for the other mass; and (k,) the group of each."""
 
-    parts1: Index
-    """(k, 14) completions of the first mass with its group's own parts, -1 elsewhere."""
-    group1: Index
-    """(k,) group of each completion of the first mass."""
-    parts2: Index
-    """(k, 14) completions of the second mass with its group's own parts, -1 elsewhere."""
-    group2: Index
-    """(k,) group of each completion of the second mass."""
-    fewest: int
-    """Distinct values that can be reached."""
-    whole: bool
-    """Whether nothing that could have as few is missing."""
+    parts: Index
+    group: Index
 
 
 @dataclass(frozen=True)
-class Selection:
-    """What the program chose."""
+class _Pool:
+    """What the program chooses from, and the fewest distinct values of a choice."""
 
-    parts: Index
-    """(14,) indices of the values chosen."""
-    solver: str
-    """The solver's word."""
+    sides: tuple[_Side, _Side]
+    fewest: int
+
+    def __len__(self) -> int:
+        return sum(len(side.group) for side in self.sides)
 
 
-def pool_of(
+def fewest_values(
     values: Values, rules: Rules, parts: Index, limit: float, prices: Array, patience: int
-) -> tuple[Pool, Index]:
-    """The completions that can belong to a choice of the fewest values, and one such choice.
+) -> tuple[Index, str]:
+    """The choice (14,) with the fewest distinct values, then the lowest price; and HiGHS' word.
 
-    parts : (14,) a choice with an error of at most ``limit``. patience : steps to take.
+    parts : (14,) a choice with an error of at most ``limit``. prices : price class of each
+    capacitor. patience : steps of the loops.
     """
+    doing("linear block, choices of least error")
+    pool, known = _pool(values, rules, parts, limit, prices, patience)
+    doing(f"linear block, fewest values of {len(pool)} choices")
+    status, chosen = _solve(values, rules, pool, limit, prices)
+    # The solver is not believed: its choice stands only if it is as good as the one that is known.
+    if chosen is None or not (
+        error_of(values, rules, chosen) <= limit + 2e-9
+        and kinds_of(rules, chosen[None, :])[0] <= pool.fewest
+        and prices[chosen[10:]].sum() <= prices[known[10:]].sum()
+        and not any(chosen[i] != chosen[j] for i, j in np.argwhere(rules.ties))
+    ):
+        chosen = known
+    return chosen, f"HiGHS: {status}"
+
+
+def _pool(
+    values: Values, rules: Rules, parts: Index, limit: float, prices: Array, patience: int
+) -> tuple[_Pool, Index]:
+    """The completions that can belong to a choice of the fewest values, and one such choice."""
     best, fewest = parts.copy(), int(kinds_of(rules, parts[None, :])[0])
-    first, second, label = [_rows_of(best, FIRST)], [_rows_of(best, SECOND)], 1
-    labels1, labels2 = [np.zeros(1, dtype=np.int64)], [np.zeros(1, dtype=np.int64)]
-    start, whole, slices = 0, True, len(values.deltas) * len(values.r)
+    columns = (FIRST, SECOND)
+    rows = [[np.where(np.isin(np.arange(14), [*OWN, *own]), best, -1)[None, :]] for own in columns]
+    labels = [[np.zeros(1, dtype=np.int64)] for _ in columns]
+    start, label, slices = 0, 1, len(values.deltas) * len(values.r)
     while start < slices and patience > 0:
         doing(f"choices of least error, {start / slices:.0%}")
         fewer = rules._replace(most=min(rules.most, fewest))
@@ -101,96 +104,52 @@ def pool_of(
         own1 = np.zeros((COMPLETIONS, 5), dtype=np.int64)
         own2 = np.zeros((COMPLETIONS, 5), dtype=np.int64)
         now = best.copy()
-        count, n, n1, n2, full, taken = gather(
+        count, n, n1, n2, _, taken = gather(
             values, fewer, piece.rows, limit, patience, ROOM, fewest, groups, own1, own2, now
         )
         if count < fewest:
             best, fewest = now, count
-        own1, own2, rows = own1[:n1], own2[:n2], piece.rows[groups[:n, 0]]
+        shared = piece.rows[groups[:n, 0]]
         group = np.full((n, 14), -1, dtype=np.int64)
         group[:, OWN] = np.column_stack(
-            [rows[:, 1:5], values.delta_c2[groups[:n, 1]], values.delta_c4[groups[:n, 1]]]
+            [shared[:, 1:5], values.delta_c2[groups[:n, 1]], values.delta_c4[groups[:n, 1]]]
         )
-        for own, places, into, labels in (
-            (own1, FIRST, first, labels1),
-            (own2, SECOND, second, labels2),
-        ):
+        for side, own in enumerate((own1[:n1], own2[:n2])):
             filled = group[own[:, 0]]
-            filled[:, places] = own[:, 1:]
-            into.append(filled)
-            labels.append(own[:, 0] + label)
+            filled[:, columns[side]] = own[:, 1:]
+            rows[side].append(filled)
+            labels[side].append(own[:, 0] + label)
         label, start = label + n, piece.following
-        whole = whole and full and not piece.cut
         patience -= piece.steps + taken
-    whole = whole and start == slices
-    pool = Pool(
-        np.concatenate(first),
-        np.concatenate(labels1),
-        np.concatenate(second),
-        np.concatenate(labels2),
-        fewest,
-        whole,
-    )
-    return _largest(rules, pool, prices), best
+    sides = [_Side(np.concatenate(r), np.concatenate(g)) for r, g in zip(rows, labels, strict=True)]
+    return _largest(rules, sides, fewest, prices), best
 
 
-def _rows_of(parts: Index, places: list[int]) -> Index:
-    """(1, 14) the group's own parts and those of one mass."""
-    kept = np.isin(np.arange(14), [*OWN, *places])
-    return np.where(kept, parts, -1)[None, :]
-
-
-def _largest(rules: Rules, pool: Pool, prices: Array) -> Pool:
+def _largest(rules: Rules, sides: Sequence[_Side], fewest: int, prices: Array) -> _Pool:
     """Without the rows that have too many values by themselves, and no larger than the program
     can be: groups and rows with the fewest values and the lowest price first, and always the
     choice that is known."""
-    sides = []
-    for parts, group in ((pool.parts1, pool.group1), (pool.parts2, pool.group2)):
-        kinds = kinds_of(rules, parts)
-        price = np.where(parts[:, 10:] >= 0, prices[np.maximum(parts[:, 10:], 0)], 0.0).sum(axis=1)
-        order = np.lexsort((np.arange(len(parts)), price, kinds))
-        order = order[kinds[order] <= pool.fewest]
-        sides.append((parts[order], group[order], kinds[order]))
-    (parts1, group1, kinds1), (parts2, group2, kinds2) = sides
-    both = np.intersect1d(group1, group2)
-    least = [kinds1[group1 == g].min() + kinds2[group2 == g].min() for g in both]
-    taken1, taken2 = np.zeros(len(parts1), dtype=bool), np.zeros(len(parts2), dtype=bool)
-    room, cut = LARGEST, False
-    for g in [0, *both[np.argsort(least, kind="stable")].tolist()]:
-        for group, taken in ((group1, taken1), (group2, taken2)):
-            own = np.flatnonzero((group == g) & ~taken)
-            share = max(room // 2, 0)
-            taken[own[:share]] = True
-            cut = cut or len(own) > share
-        room = LARGEST - int(taken1.sum() + taken2.sum())
-    return Pool(
-        parts1[taken1],
-        group1[taken1],
-        parts2[taken2],
-        group2[taken2],
-        pool.fewest,
-        pool.whole and not cut,
-    )
-
-
-def select(
-    values: Values, rules: Rules, pool: Pool, parts: Index, limit: float, prices: Array
-) -> Selection:
-    """The choice of the pool with the fewest distinct values, then the lowest price.
-
-    parts : (14,) a choice with an error of at most ``limit`` and ``pool.fewest`` values, which
-    stands where the program has none. prices : price class of each capacitor.
-    """
-    status, found = _solve(values, rules, pool, limit, prices)
-    if found is None:
-        return Selection(parts, f"HiGHS: {status}")
-    kept = (
-        error_of(values, rules, found) <= limit + 2e-9
-        and kinds_of(rules, found[None, :])[0] <= pool.fewest
-        and _price(found, prices) <= _price(parts, prices)
-        and not any(found[i] != found[j] for i, j in np.argwhere(rules.ties))
-    )
-    return Selection(found if kept else parts, f"HiGHS: {status}")
+    ranked, least = [], []
+    for side in sides:
+        kinds = kinds_of(rules, side.parts)
+        bought = side.parts[:, 10:]
+        price = np.where(bought >= 0, prices[np.maximum(bought, 0)], 0.0).sum(axis=1)
+        order = np.lexsort((np.arange(len(kinds)), price, kinds))
+        order = order[kinds[order] <= fewest]
+        ranked.append(_Side(side.parts[order], side.group[order]))
+        worst_first = order[::-1]
+        least.append(dict(zip(side.group[worst_first], kinds[worst_first], strict=True)))
+    both = sorted(least[0].keys() & least[1].keys())
+    both.sort(key=lambda g: int(least[0][g] + least[1][g]))
+    taken = [np.zeros(len(side.group), dtype=bool) for side in ranked]
+    room = LARGEST
+    for g in [0, *both]:
+        for side, own in zip(ranked, taken, strict=True):
+            rows = np.flatnonzero((side.group == g) & ~own)
+            own[rows[: max(room // 2, 0)]] = True
+        room = LARGEST - int(sum(own.sum() for own in taken))
+    first, second = (_Side(s.parts[t], s.group[t]) for s, t in zip(ranked, taken, strict=True))
+    return _Pool((first, second), fewest)
 
 
 def residuals(values: Values, rules: Rules, parts: Index) -> tuple[Array, Array]:
@@ -217,10 +176,6 @@ def kinds_of(rules: Rules, parts: Index) -> Index:
     return np.asarray(fresh.sum(axis=1))
 
 
-def _price(parts: Index, prices: Array) -> float:
-    return float(prices[parts[10:]].sum())
-
-
 def _nominal(values: Values, rules: Rules, parts: Index) -> Array:
     """(k, 4) scales that make the errors small; q1 of first rows, q3 of second ones."""
     whole = np.maximum(parts, 0)
@@ -231,26 +186,33 @@ def _nominal(values: Values, rules: Rules, parts: Index) -> Array:
 
 
 def _solve(
-    values: Values, rules: Rules, pool: Pool, limit: float, prices: Array
+    values: Values, rules: Rules, pool: _Pool, limit: float, prices: Array
 ) -> tuple[str, Index | None]:
     """The solver's status and the parts it chose, if it chose any."""
     unit = max(limit, LEAST_UNIT)
-    z1 = cp.Variable(len(pool.parts1), boolean=True)
-    z2 = cp.Variable(len(pool.parts2), boolean=True)
+    first, second = pool.sides
+    z1 = cp.Variable(len(first.group), boolean=True)
+    z2 = cp.Variable(len(second.group), boolean=True)
     shift = cp.Variable(4, bounds=[-100.0, 100.0])
     # Errors relative to each row's nominal scales, in units of the limit: small numbers only.
     offsets, scales = [], []
-    for parts in (pool.parts1, pool.parts2):
-        h, D = residuals(values, rules, np.maximum(parts, 0))
-        own = _nominal(values, rules, parts)
+    for side in pool.sides:
+        h, D = residuals(values, rules, np.maximum(side.parts, 0))
+        own = _nominal(values, rules, side.parts)
         offsets.append((h + own @ D.T) / unit)
         scales.append(own)
-    second = np.isin(np.arange(10), (6, 7, 9))
-    offsets[0][:, second] = 0.0
-    offsets[1][:, ~second] = 0.0
-    groups = np.unique(pool.group1)
-    member = [(g[None, :] == groups[:, None]).astype(float) for g in (pool.group1, pool.group2)]
-    kinds, rest = _kinds(rules, pool, z1, z2)
+    of_second = np.isin(np.arange(10), (6, 7, 9))
+    offsets[0][:, of_second] = 0.0
+    offsets[1][:, ~of_second] = 0.0
+    groups = np.unique(first.group)
+    member = [(side.group[None, :] == groups[:, None]).astype(float) for side in pool.sides]
+    # Resistors and capacitors are counted together: the latter's indices follow the former's.
+    shifted = np.where(np.arange(14) < 10, 0, len(rules.free_r))
+    uses = [(z1, first.parts[:, k] + shifted[k]) for k in range(14) if k not in SECOND]
+    uses += [(z2, second.parts[:, k] + shifted[k]) for k in SECOND]
+    free = np.flatnonzero(np.concatenate([rules.free_r, rules.free_c]))
+    used, rest = distinct_values(uses, free)
+    kinds = cp.sum(used)
     rest += [
         cp.sum(z1) == 1,
         cp.sum(z2) == 1,
@@ -260,45 +222,20 @@ def _solve(
     ]
     if np.isfinite(rules.share):
         # ln of x2's peak voltage over x1's: p - q1 + q3.
-        first = scales[0][:, 1] - scales[0][:, 2]
+        above = scales[0][:, 1] - scales[0][:, 2]
         room = rules.share - rules.peaks[2] + rules.peaks[0] + 1e-9
-        rest.append(first @ z1 + scales[1][:, 3] @ z2 <= room)
+        rest.append(above @ z1 + scales[1][:, 3] @ z2 <= room)
     for i, j in np.argwhere(rules.ties):
         if i not in SECOND and j in SECOND:
-            rest.append(pool.parts1[:, i] @ z1 == pool.parts2[:, j] @ z2)
-    price1 = prices[pool.parts1[:, [10, 11, 13]]].sum(axis=1)
-    price2 = prices[pool.parts2[:, 12]]
+            rest.append(first.parts[:, i] @ z1 == second.parts[:, j] @ z2)
+    price1 = prices[first.parts[:, [10, 11, 13]]].sum(axis=1)
+    price2 = prices[second.parts[:, 12]]
     objective = kinds + PRICE_WEIGHT * (price1 @ z1 + price2 @ z2)
     problem = cp.Problem(cp.Minimize(objective), rest)
     problem.solve(solver=cp.HIGHS, **SOLVER)
-    status = str(problem.status)
-    for z in (z1, z2):
-        if z.value is None or abs(z.value.sum() - 1.0) > 1e-6 or abs(z.value.max() - 1.0) > 1e-6:
-            return status, None
-    parts = pool.parts1[int(np.argmax(z1.value))].copy()
-    parts[SECOND] = pool.parts2[int(np.argmax(z2.value))][SECOND]
-    return status, parts
-
-
-def _kinds(
-    rules: Rules, pool: Pool, z1: cp.Variable, z2: cp.Variable
-) -> tuple[cp.Expression, list[cp.Constraint]]:
-    """The number of distinct values, at least as large as the use that any position makes."""
-    many = len(rules.free_r)
-    free = np.concatenate([rules.free_r, rules.free_c])
-    uses = []
-    for z, parts, places in (
-        (z1, pool.parts1, [k for k in range(14) if k not in SECOND]),
-        (z2, pool.parts2, SECOND),
-    ):
-        uses += [(z, parts[:, k] + (0 if k < 10 else many)) for k in places]
-    every = np.unique(np.concatenate([code for _, code in uses]))
-    every = every[~free[every]]
-    used = cp.Variable(max(len(every), 1), nonneg=True)
-    constraints: list[cp.Constraint] = []
-    for z, code in uses:
-        own = every[np.isin(every, code)]
-        if len(own):
-            member = (code[None, :] == own[:, None]).astype(float)
-            constraints.append(member @ z <= used[np.searchsorted(every, own)])
-    return cp.sum(used), constraints
+    row1, row2 = chosen_row(z1), chosen_row(z2)
+    if row1 is None or row2 is None:
+        return str(problem.status), None
+    parts = first.parts[row1].copy()
+    parts[SECOND] = second.parts[row2][SECOND]
+    return str(problem.status), parts

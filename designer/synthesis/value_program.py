@@ -7,18 +7,17 @@ the program is small; cvxpy states it and HiGHS solves it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.synthesis.tie_break import SOLVER
+from designer.synthesis.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.synthesis.value_tables import ValueTable, new_values
 
-PRICE_WEIGHT = 1e-3
-"""Of one price class against one distinct value: price only breaks ties."""
 ERROR_WEIGHT = 1e-4
 """Of the error over its limit: it decides where values and price are the same."""
 
@@ -40,6 +39,12 @@ class TableRows:
     def take(self, which: Index) -> TableRows:
         """The rows of an index array."""
         return TableRows(self.table.take(which), self.error[which], self.key[which])
+
+    @classmethod
+    def stacked(cls, rows: Sequence[TableRows]) -> TableRows:
+        """The rows of all of them."""
+        error, key = (np.concatenate([getattr(r, n) for r in rows]) for n in ("error", "key"))
+        return cls(ValueTable.stacked([r.table for r in rows]), error, key)
 
 
 @dataclass(frozen=True)
@@ -70,58 +75,46 @@ class Ranking:
     """Limit on new values."""
 
 
-@dataclass(frozen=True)
-class Pick:
-    """What was chosen."""
-
-    rows: tuple[int, ...]
-    """The chosen row of each table."""
-    error: float
-    """The largest error."""
-    solver: str
-    """The solver's word."""
-
-
 def choose(
     tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking
-) -> Pick | None:
-    """Rows with the same key that keep every rule; None where there are none."""
-    tables, kept = _shared_keys(tables)
+) -> tuple[tuple[int, ...], str] | None:
+    """Rows with the same key that keep every rule, and HiGHS' word; None where there are none."""
+    common = reduce(np.intersect1d, [t.key for t in tables])
+    places = [np.flatnonzero(np.isin(t.key, common)) for t in tables]
+    tables, rules = _restricted(tables, rules, places)
     if any(len(t) == 0 for t in tables):
         return None
-    rules = [_of_rows(rule, kept) for rule in rules]
     # With a limit on the values, only rows that stand in a choice inside it.
     near = [np.arange(len(t)) for t in tables]
     if ranking.most is not None:
         near = _few_enough(tables, rules, ranking)
         if any(len(k) == 0 for k in near):
             return None
-    first = _solve(
-        [t.take(k) for t, k in zip(tables, near, strict=True)],
-        [_of_rows(rule, near) for rule in rules],
-        ranking,
-        None,
-    )
+    first = _solve(*_restricted(tables, rules, near), ranking, None)
     if first is None:
         return None
-    rows, word = tuple(int(k[i]) for k, i in zip(near, first[0], strict=True)), first[1]
+    rows, status = _in_full(near, first[0]), first[1]
     reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
     limit = (max(reached, ranking.tolerance) + ranking.slack) * (1.0 + 1e-9) + 1e-12
     useful = _promising(tables, rules, ranking, limit)
-    fewer = [t.take(k) for t, k in zip(tables, useful, strict=True)]
-    second = _solve(fewer, [_of_rows(rule, useful) for rule in rules], ranking, limit)
+    second = _solve(*_restricted(tables, rules, useful), ranking, limit)
     if second is not None:
-        rows = tuple(int(k[i]) for k, i in zip(useful, second[0], strict=True))
-        reached = max(float(t.error[i]) for t, i in zip(tables, rows, strict=True))
-    found = tuple(int(k[i]) for k, i in zip(kept, rows, strict=True))
-    return Pick(found, reached, f"HiGHS: {word}")
+        rows = _in_full(useful, second[0])
+    return _in_full(places, rows), f"HiGHS: {status}"
 
 
-def _of_rows(rule: ValueRule, kept: Sequence[Index]) -> ValueRule:
-    """The rule for the rows that are kept of each table."""
-    return ValueRule(
-        tuple(w[k] for w, k in zip(rule.weights, kept, strict=True)), rule.low, rule.high
-    )
+def _in_full(places: Sequence[Index], rows: Sequence[int]) -> tuple[int, ...]:
+    """Rows of restricted tables as rows of the whole ones."""
+    return tuple(int(place[row]) for place, row in zip(places, rows, strict=True))
+
+
+def _restricted(
+    tables: Sequence[TableRows], rules: Sequence[ValueRule], places: Sequence[Index]
+) -> tuple[list[TableRows], list[ValueRule]]:
+    """The tables with these rows alone, and the rules for them."""
+    fewer = [t.take(k) for t, k in zip(tables, places, strict=True)]
+    weights = [tuple(w[k] for w, k in zip(rule.weights, places, strict=True)) for rule in rules]
+    return fewer, [replace(rule, weights=w) for rule, w in zip(rules, weights, strict=True)]
 
 
 def _promising(
@@ -189,36 +182,6 @@ def _joined(kept: Sequence[Sequence[Index]], without: list[Index]) -> list[Index
     return [np.unique(np.concatenate(places)) for places in zip(*kept, strict=True)]
 
 
-def _shared_keys(tables: Sequence[TableRows]) -> tuple[list[TableRows], list[Index]]:
-    """The rows whose key every table has, and their places."""
-    common = tables[0].key
-    for t in tables[1:]:
-        common = np.intersect1d(common, t.key)
-    kept = [np.flatnonzero(np.isin(t.key, common)) for t in tables]
-    return [t.take(k) for t, k in zip(tables, kept, strict=True)], kept
-
-
-def _kinds(
-    tables: Sequence[TableRows], picks: Sequence[cp.Variable], ranking: Ranking
-) -> tuple[cp.Variable, Any, list[object]]:
-    """One variable per value that is not free, at least as large as the use made of it."""
-    every = np.unique(np.concatenate([t.table.values.ravel() for t in tables]))
-    every = every[~np.isin(every, np.array(sorted(ranking.free), dtype=float))]
-    kinds = cp.Variable(max(len(every), 1), nonneg=True)
-    uses: list[object] = []
-    price: Any = 0.0
-    for t, z in zip(tables, picks, strict=True):
-        for column in t.table.values.T:
-            own = np.intersect1d(column, every)
-            if len(own):
-                member = (column[None, :] == own[:, None]).astype(float)
-                uses.append(member @ z <= kinds[np.searchsorted(every, own)])
-            cost = np.array([ranking.price.get(float(v), 0.0) for v in column])
-            if cost.any():
-                price = price + cost @ z
-    return kinds, price, uses
-
-
 def _solve(
     tables: Sequence[TableRows], rules: Sequence[ValueRule], ranking: Ranking, limit: float | None
 ) -> tuple[tuple[int, ...], str] | None:
@@ -238,20 +201,23 @@ def _solve(
     held += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
     objective: Any = error
     if limit is not None or ranking.most is not None:
-        kinds, price, uses = _kinds(tables, picks, ranking)
-        held += uses
+        uses = [(z, c) for t, z in zip(tables, picks, strict=True) for c in t.table.values.T]
+        kinds, at_least = distinct_values(uses, np.array(sorted(ranking.free), dtype=float))
+        held += at_least
     if ranking.most is not None:
         held.append(cp.sum(kinds) <= ranking.most)
     if limit is not None:
+        price: Any = 0.0
+        for z, column in uses:
+            cost = np.array([ranking.price.get(float(v), 0.0) for v in column])
+            price = price + cost @ z if cost.any() else price
         objective = cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / limit * error
         held.append(error <= limit)
     problem = cp.Problem(cp.Minimize(objective), held)
     problem.solve(solver=cp.HIGHS, **SOLVER)
-    for z in picks:
-        # An infeasible or interrupted program may leave zeros behind: rows count only if whole.
-        if z.value is None or abs(z.value.sum() - 1.0) > 1e-6 or abs(z.value.max() - 1.0) > 1e-6:
-            return None
-    return tuple(int(np.argmax(z.value)) for z in picks), str(problem.status)
+    chosen = [chosen_row(z) for z in picks]
+    rows = tuple(row for row in chosen if row is not None)
+    return (rows, str(problem.status)) if len(rows) == len(chosen) else None
 
 
 def fewest(rows: TableRows, free: frozenset[float], most: int) -> Index:

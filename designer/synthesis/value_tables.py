@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -46,29 +47,30 @@ class ValueTable:
         """The columns of both, row by row."""
         return ValueTable(self.names + other.names, np.hstack([self.values, other.values]))
 
+    def with_column(self, name: str, values: Array) -> ValueTable:
+        """The values (rows,) of one more part."""
+        return self.beside(ValueTable((name,), values[:, None]))
+
+    @classmethod
+    def stacked(cls, tables: Sequence[ValueTable]) -> ValueTable:
+        """The rows of all tables; their names are the same."""
+        return cls(tables[0].names, np.concatenate([t.values for t in tables]))
+
 
 def combinations(
-    names: Sequence[str], lists: Mapping[str, Array], tie: Mapping[str, str]
+    names: Sequence[str], lists: Mapping[str, Array], group: Mapping[str, str]
 ) -> ValueTable:
-    """Every combination of the lists; parts that ``tie`` maps to the same name are equal.
+    """Every combination of the lists; parts of the same group are equal.
 
-    lists : ascending values by part. tie : part to the name of its group; absent: a group of its
-    own.
+    lists : ascending values by part. group : by part; absent: a group of its own.
     """
-    groups = list(dict.fromkeys(tie.get(name, name) for name in names))
-    own = [
-        _common([lists[name] for name in names if tie.get(name, name) == group]) for group in groups
-    ]
-    grid = [a.ravel() for a in np.meshgrid(*own, indexing="ij")]
-    columns = [grid[groups.index(tie.get(name, name))] for name in names]
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(group.get(name, name), []).append(name)
+    own = [reduce(np.intersect1d, [lists[name] for name in same]) for same in groups.values()]
+    grid = dict(zip(groups, np.meshgrid(*own, indexing="ij"), strict=True))
+    columns = [grid[group.get(name, name)].ravel() for name in names]
     return ValueTable(tuple(names), np.stack(columns, axis=1))
-
-
-def _common(lists: Sequence[Array]) -> Array:
-    shared = lists[0]
-    for other in lists[1:]:
-        shared = np.intersect1d(shared, other)
-    return shared
 
 
 def distinct(logs: Array) -> Array:
@@ -111,7 +113,7 @@ def how_many_between(table: Array, low: Array, high: Array) -> Index:
 def new_values(values: Array, free: frozenset[float]) -> Index:
     """(rows,) how many different values each row has that are not free."""
     known = np.isin(values, np.array(sorted(free), dtype=float))
-    # Free values become one common value, which is then not counted.
+    # Free values become one common value, which is not counted.
     ordered = np.sort(np.where(known, 0.0, values), axis=-1)
     kinds = 1 + (np.diff(ordered, axis=-1) > 0.0).sum(axis=-1)
     return np.asarray(kinds - known.any(axis=-1))

@@ -22,7 +22,7 @@ from designer.board.board_parts import board_circuit
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.netlist import Circuit, Resistor, nominal_board
-from designer.circuit.rest_point import at_rest
+from designer.circuit.working_modes import at_rest
 from designer.spread.spread import draw_many
 from designer.yields import exact_rung
 from designer.yields.bench_procedure import BITS, READINGS

@@ -8,7 +8,7 @@ import pytest
 
 from designer.board.bom import Line, bill, bill_csv
 from designer.board.component import components
-from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Circuit
 from designer.model.board_table import BoardChoice
 from designer.model.circuit_table import CircuitSpec

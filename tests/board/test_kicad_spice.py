@@ -12,7 +12,7 @@ from designer.board.kicad_project import files
 from designer.catalog.entries import Mounting
 from designer.check.first_responses import FirstRun
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle

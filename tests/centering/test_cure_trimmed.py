@@ -14,7 +14,7 @@ from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways, witho
 from designer.centering.cure_ways import Looker, ResponseWay
 from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import nominal_board
-from designer.circuit.rest_point import at_rest
+from designer.circuit.working_modes import at_rest
 from designer.spread.board_quantities import quantities
 from designer.spread.spread import draw_many
 from designer.yields import margins

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle

@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings, strategies as st
 
 from designer.base.errors import InputError
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.dead_zone_parts import Sides, dead_zone_stage
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.circuit.resistors import composites_of
@@ -20,6 +20,7 @@ from designer.dynamics.attractors import describe, settle, shoot_symmetric, twin
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.circuit_table import CircuitSpec
 from tests.shared.stages import CATALOG, PAPER, SATURATION, VREF, model, rectifier, stage
 
 NOMINAL = rectifier()
@@ -398,9 +399,8 @@ def test_composites_of_nothing_are_refused(composites: dict[str, str], field: st
 
 
 def test_an_unknown_diode_or_reference_is_refused() -> None:
-    from designer.circuit.dead_zone_kind import zone_of
-
+    spec = CircuitSpec(dead_zone="rectifier")
     with pytest.raises(InputError, match="1N4148"):
-        zone_of("rectifier", "both", CATALOG, diode="1N4184")
+        dead_zone_stage(model(), replace(spec, diode="1N4184"), CATALOG)
     with pytest.raises(InputError, match="LM4040"):
-        zone_of("rectifier", "both", CATALOG, reference="LM4041")
+        dead_zone_stage(model(), replace(spec, reference="LM4041"), CATALOG)

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.errors import InputError
 from designer.catalog.catalog import load_catalog
-from designer.circuit import build, terms
+from designer.circuit import build
 from designer.circuit.netlist import (
     Board,
     Capacitor,
@@ -50,16 +50,8 @@ def circuit_of(
     values: Mapping[str, float], *, stops: bool = True, f20: float = 0.0, saturation: float = 13.0
 ) -> Circuit:
     """The two-mass circuit with these values."""
-    system = Dimensionless(0.5, 0.5, 0.95 if stops else 0.0, 0.5, 0.1, f20, 0.25).second_order()
-    found = terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist())
-    return build.build(
-        found,
-        values,
-        OPAMP,
-        supply=15.0,
-        saturation=saturation,
-        clearance="A" if stops else None,
-    )
+    model = Dimensionless(0.5, 0.5, 0.95 if stops else 0.0, 0.5, 0.1, f20, 0.25)
+    return build.circuit_of(model, values, OPAMP, supply=15.0, saturation=saturation)
 
 
 def small(parts: list[Part], states: tuple[str, ...] = ()) -> Circuit:

@@ -11,7 +11,7 @@ import pytest
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fields import Figure
-from designer.circuit.dead_zone_kind import Kind, Sides
+from designer.circuit.dead_zone_parts import Kind, Sides
 from designer.circuit.netlist import GROUND, Capacitor, Diode, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules

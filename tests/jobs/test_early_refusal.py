@@ -19,7 +19,7 @@ from designer.cli import entry
 from designer.jobs import search_stage, study_stage
 from designer.model.model_file import ModelFile, parse_model_file
 from designer.synthesis import parts_choice
-from designer.synthesis.parts_choice import check_choices
+from designer.synthesis.part_checks import check_choices
 from tests.catalog.test_catalog import SHIPPED
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.stages import CATALOG, PAPER
@@ -171,7 +171,7 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("work before the refusal")
 
     for module, name in (
-        (synthesis_result, "synthesise"), (design_search, "stretches"), (parts_choice, "_reach"),
+        (synthesis_result, "synthesise"), (design_search, "stretches"), (parts_choice, "_Search"),
         (study_stage.StudyHelp, "of"), (search_stage, "SpicePool"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, fail)

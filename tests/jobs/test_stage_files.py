@@ -13,7 +13,7 @@ from designer.base.plain_json import dumps
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import Kind, Sides
+from designer.circuit.dead_zone_parts import Kind, Sides
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit
 from designer.jobs import design_files

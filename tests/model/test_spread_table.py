@@ -253,15 +253,13 @@ def test_the_command_line_refuses_and_writes_nothing(
 def test_halves_of_a_composite_may_come_to_be() -> None:
     """Before a design is sought, R203A is known where composites are allowed; not otherwise."""
     from designer.spread.part_rules import check_names
-    from designer.synthesis.attempt import zone_of_spec
-    from designer.synthesis.part_names import parts_of
+    from designer.synthesis.part_checks import unit_circuit
 
     text = PAPER.replace("composites = false", "composites = true")
     part = '\n[spread]\n[[spread.part]]\nnames = "R203A"\n'
     for source, known in ((text, True), (PAPER, False)):
         modelfile = parse_model_file(source + part)
-        choice = modelfile.model, modelfile.circuit, CATALOG
-        circuit = parts_of(*choice, zone_of_spec(*choice))
+        circuit = unit_circuit(modelfile.model, modelfile.circuit, CATALOG)
         if known:
             check_names(modelfile, circuit, CATALOG)
         else:

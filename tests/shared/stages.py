@@ -7,10 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from designer.catalog.catalog import load_catalog
-from designer.circuit import build, terms
-from designer.circuit.dead_zone_kind import Kind, Sides, zone_of
+from designer.circuit import build
+from designer.circuit.dead_zone_parts import Kind, Sides, dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
+from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
 from tests.circuit.test_reduction import EXACT
 
@@ -64,15 +65,14 @@ def stage(
     opamp: str = "TL074C",
 ) -> Circuit:
     """The paper's circuit around one of the stages."""
-    system = model(sides, f20).second_order()
-    return build.build(
-        terms.terms(system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()),
+    wanted = model(sides, f20)
+    return build.circuit_of(
+        wanted,
         values,
         CATALOG.opamp(opamp),
         supply=SUPPLY,
         saturation=SATURATION,
-        clearance="A",
-        zone=zone_of(kind, sides, CATALOG),
+        stage=dead_zone_stage(wanted, CircuitSpec(dead_zone=kind), CATALOG),
         composites=composites or {},
     )
 

@@ -14,7 +14,7 @@ import pytest
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
 from designer.cli import tables

@@ -7,7 +7,7 @@ import pytest
 
 from designer.base.netlist_guard import check_netlist
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_kind import Sides
+from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Board, Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle

@@ -16,10 +16,9 @@ from designer.model.find_responses import Peaks, find, peaks
 from designer.model.model import Dimensionless
 from designer.model.model_file import read_model_file
 from designer.synthesis import parts_choice
-from designer.synthesis.attempt import Attempt, attempt, linear_block, order
+from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import limits
-from designer.synthesis.linear_alternatives import _beside, best_beside
-from designer.synthesis.preferences import NO_WISHES
+from designer.synthesis.parts_choice import _beside, best_beside
 from designer.synthesis.tie_break import Shortfall
 
 # What each side condition costs is asked where a test is about it: it doubles the time.
@@ -33,18 +32,16 @@ RECTIFIER = CircuitSpec(dead_zone="rectifier")
 
 
 def test_what_an_interval_leaves_has_no_gap_and_no_overlap() -> None:
-    wanted = order(PAPER, RECTIFIER, CATALOG, PEAKS, 1.0)
+    wanted = Order.of(PAPER, RECTIFIER, CATALOG, PEAKS)
     within = limits(RECTIFIER, RECTIFIER.kept, wanted.opamp, 13.0, PEAKS.fastest)
-    block = linear_block(wanted, within, NO_WISHES)
+    block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
     (above, top), (bottom, below) = _beside(block, (1e3, 1e6))
     others = wanted.resistors[(wanted.resistors >= 1e3) & (wanted.resistors <= 1e6)]
     covered = [(above <= v <= top) + (bottom <= v <= below) for v in others]
     assert covered == [int(v != block.values["R4"]) for v in others]
     for between in ((above, top), (bottom, below)):
-        other = linear_block(
-            wanted, within, NO_WISHES, between=between, level=max(block.least, 1e-9)
-        )
+        other = linear_block(wanted, within, between=between, level=max(block.least, 1e-9))
         if not isinstance(other, Shortfall):
             assert between[0] <= other.values["R4"] <= between[1]
             assert other.least >= block.bound - EXACT
@@ -53,23 +50,23 @@ def test_what_an_interval_leaves_has_no_gap_and_no_overlap() -> None:
 def test_the_best_of_those_tried_is_taken() -> None:
     """Against the first choice, and against every level of R4 tried one by one."""
     spec = replace(RECTIFIER, resistors=("E24",))
-    wanted = order(PAPER, spec, CATALOG, PEAKS, 1.0)
+    wanted = Order.of(PAPER, spec, CATALOG, PEAKS)
     within = limits(spec, spec.kept, wanted.opamp, 13.0, PEAKS.fastest)
-    block = linear_block(wanted, within, NO_WISHES)
+    block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
-    first = attempt(wanted, within, NO_WISHES, block)
-    best = best_beside(wanted, within, NO_WISHES, block, first)
+    first = attempt(wanted, within, block)
+    best = best_beside(wanted, within, block, first)
     assert isinstance(first, Attempt)
     assert isinstance(best, Attempt)
     assert best.errors.max_error <= first.errors.max_error
     errors = [first.errors.max_error]
     for r4 in wanted.resistors:
         other = linear_block(
-            wanted, within, NO_WISHES, between=(r4 - 1e-6, r4 + 1e-6), level=max(block.least, 1e-9)
+            wanted, within, between=(r4 - 1e-6, r4 + 1e-6), level=max(block.least, 1e-9)
         )
         if isinstance(other, Shortfall) or other.least > block.least + EXACT:
             continue
-        made = attempt(wanted, within, NO_WISHES, other)
+        made = attempt(wanted, within, other)
         if isinstance(made, Attempt):
             errors.append(made.errors.max_error)
     assert any(best.errors.max_error == pytest.approx(e, abs=1e-12) for e in errors)

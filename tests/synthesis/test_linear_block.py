@@ -14,15 +14,16 @@ from designer.model.model import Dimensionless
 from designer.synthesis import linear_block
 from designer.synthesis.kernel_linear import Rules, Values
 from designer.synthesis.linear_block import (
+    ANY,
     PARTS,
     SCALES,
+    Bounds,
     Targets,
     catalogue,
     elementary,
+    rules_of,
     slice_from,
 )
-from designer.synthesis.linear_rules import Bounds, rules_of
-from designer.synthesis.preferences import NO_WISHES
 from designer.synthesis.tie_break import error_of, residuals
 from tests.shared import oracles
 from tests.shared.linear_enumeration import CAPACITOR
@@ -43,8 +44,8 @@ def targets_of(model: Dimensionless) -> Targets:
 
 
 def wanted_of(t: Targets) -> dict[str, float]:
-    logs = {"R2": t.w2, "R3": t.w3, "R4": t.w4, "R5": t.w5, "R8": t.w8, "R9": t.w9}
-    logs |= {"R10": t.w10, "R11": t.w11, "R1": 0.0, "R7": 0.0}
+    names = ("R2", "R3", "R4", "R5", "R8", "R9", "R10", "R11")
+    logs = dict(zip(names, t.logs, strict=True)) | {"R1": 0.0, "R7": 0.0}
     return {name: float(np.exp(v)) for name, v in logs.items()}
 
 
@@ -54,15 +55,16 @@ def random_catalogue(rng: np.random.Generator, n: int, m: int) -> Values:
 
 def numbers_of(values: Values, t: Targets, parts: Array) -> Array:
     """The ten numbers of one choice, written out from the module's table."""
+    w2, w3, w4, w5, w8, w9, w10, w11 = t.logs
     r1, r2, r3, r4, r5, r7, r8, r9, r10, r11 = values.r[parts[:10]]
     c1, c2, c3, c4 = values.c[parts[10:]]
     d, s1, s3 = c4 - c2, r1 + c1, r7 + c3
     return np.array(
         [
-            r2 + t.w2, r9 + d + t.w9, r3 + t.w3, r8 + d + t.w8,
-            (r4 - r10 - d + t.w4 - t.w10) / 2, (r5 - r11 - d + t.w5 - t.w11) / 2,
-            (r4 + t.w4 + s1 - c2) / 2, (r10 + t.w10 + d + s1 - c2) / 2,
-            (r5 + t.w5 + s3 - c2) / 2, (r11 + t.w11 + d + s3 - c2) / 2,
+            r2 + w2, r9 + d + w9, r3 + w3, r8 + d + w8,
+            (r4 - r10 - d + w4 - w10) / 2, (r5 - r11 - d + w5 - w11) / 2,
+            (r4 + w4 + s1 - c2) / 2, (r10 + w10 + d + s1 - c2) / 2,
+            (r5 + w5 + s3 - c2) / 2, (r11 + w11 + d + s3 - c2) / 2,
         ]
     )  # fmt: skip
 
@@ -92,7 +94,7 @@ def test_ten_numbers_stand_for_ten_errors_and_four_scales(seed: int) -> None:
     rng = np.random.default_rng(seed)
     t = targets_of(random_model(rng))
     values = random_catalogue(rng, 5, 3)
-    rules = rules_of(values, t, OPEN, NO_WISHES)
+    rules = rules_of(values, t, OPEN, ANY)
     parts = np.concatenate([rng.integers(0, 5, 10), rng.integers(0, 3, 4)])
     ohms = dict(zip(PARTS, np.exp([*values.r[parts[:10]], *values.c[parts[10:]]]), strict=True))
     wanted = wanted_of(t)
@@ -106,7 +108,7 @@ def test_ten_numbers_stand_for_ten_errors_and_four_scales(seed: int) -> None:
 def test_minimax_leaves_no_larger_error_than_linear_programming(seed: int) -> None:
     rng = np.random.default_rng(seed)
     values = random_catalogue(rng, 4, 2)
-    rules = rules_of(values, targets_of(random_model(rng)), OPEN, NO_WISHES)
+    rules = rules_of(values, targets_of(random_model(rng)), OPEN, ANY)
     parts = np.concatenate([rng.integers(0, 4, 10), rng.integers(0, 2, 4)])
     h, D = residuals(values, rules, parts[None, :])
     reached = np.abs(h[0] + D @ minimax(h[0], D)).max()
@@ -128,6 +130,7 @@ def test_catalogue_tables_say_what_they_are() -> None:
 
 def brute_errors(values: Values, t: Targets) -> Array:
     """Eight-term errors of every (delta, R2, R3, R8, R9, R4/R10, R5/R11)."""
+    w2, w3, w4, w5, w8, w9, w10, w11 = t.logs
     six = oracles.elementary_vectors(-SCALES[:6])
     h4, h5 = (a.ravel() for a in np.meshgrid(values.ratios, values.ratios))
     one, out = np.ones(len(h4)), []
@@ -135,8 +138,8 @@ def brute_errors(values: Values, t: Targets) -> Array:
         for r2, r3, r8, r9 in itertools.product(values.r, repeat=4):
             v = np.stack(
                 [
-                    (r2 + t.w2) * one, (r9 + d + t.w9) * one, (r3 + t.w3) * one,
-                    (r8 + d + t.w8) * one, (h4 - d + t.w4 - t.w10) / 2, (h5 - d + t.w5 - t.w11) / 2,
+                    (r2 + w2) * one, (r9 + d + w9) * one, (r3 + w3) * one,
+                    (r8 + d + w8) * one, (h4 - d + w4 - w10) / 2, (h5 - d + w5 - w11) / 2,
                 ]
             )  # fmt: skip
             out.append(np.abs(six @ v).max(axis=0))
@@ -165,7 +168,7 @@ def test_the_join_is_complete_at_its_level(
     t = targets_of(random_model(rng))
     # Displacement integrators of any time constant: the join leaves out rows that have none.
     values = random_catalogue(rng, 5, 2)._replace(sums=np.array([-1e3, 1e3]))
-    rules = rules_of(values, t, OPEN, NO_WISHES)
+    rules = rules_of(values, t, OPEN, ANY)
     truth = brute_errors(values, t)
     for rank in (0, 3, 100):
         level = float(truth[rank]) * (1 + 1e-9)
@@ -177,6 +180,6 @@ def test_the_join_is_complete_at_its_level(
 def test_a_join_without_patience_says_that_rows_are_missing() -> None:
     rng = np.random.default_rng(0)
     values = random_catalogue(rng, 5, 2)
-    rules = rules_of(values, targets_of(random_model(rng)), OPEN, NO_WISHES)
+    rules = rules_of(values, targets_of(random_model(rng)), OPEN, ANY)
     piece = slice_from(values, rules, 0.5, 0, 10)
     assert piece.following < len(values.deltas) * len(values.r)

@@ -12,21 +12,33 @@ import numpy as np
 import pytest
 
 from designer.base.eseries import series_values
+from designer.catalog.catalog import load_catalog
+from designer.circuit.dead_zone_parts import dead_zone_stage
+from designer.model.circuit_table import CircuitSpec
+from designer.model.find_responses import Peaks
 from designer.model.model import Dimensionless
 from designer.synthesis import linear_search, rectifier_stage, saturating_search, size_dead_zone
-from designer.synthesis.advice import FREES
+from designer.synthesis.dead_zone_target import DeadZoneTarget, slope_interval, target_of
+from designer.synthesis.limits import limits
 from designer.synthesis.linear_block import Targets
-from designer.synthesis.nonlinear_block import StageRoom, slope_interval, target_of
+from designer.synthesis.parts_choice import FREES
 from designer.synthesis.size_dead_zone import size
 from tests.shared.oracles import Plain, coefficient_error
 
 MODEL = Dimensionless(m=0.45, k=0.55, k0=0.95, c=0.4, zeta=0.1, f20=0.0, b=0.25)
 TARGETS = Targets.from_state_matrix(MODEL.second_order().state_matrix())
 PLAIN = Plain(MODEL.m, MODEL.k, MODEL.k0, MODEL.c, MODEL.zeta, MODEL.f20, MODEL.b)
-ROOM = StageRoom(
-    saturation=13.0, swing=11.0, supply=15.0, peaks=np.array([0.65, 0.55, 0.65, 0.6]),
-    penetration=0.4, load=2e3,
-)  # fmt: skip
+PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), 0.4)
+CATALOG = load_catalog()
+
+
+def target(values: dict[str, float], kind: Literal["saturation", "rectifier"]) -> DeadZoneTarget:
+    """Of the stage beside this linear block, with 11 V of swing."""
+    spec = CircuitSpec(dead_zone=kind)
+    within = limits(spec, frozenset({"swing", "load"}), CATALOG.opamp(spec.opamp), 13.0, 1.0)
+    stage = dead_zone_stage(MODEL, spec, CATALOG)
+    within = replace(within, swing=11.0)
+    return target_of(MODEL, values, stage, within, PEAKS, saturation=13.0, supply=15.0)
 
 
 def linear_block(spread: float, seed: int) -> dict[str, float]:
@@ -67,10 +79,9 @@ def test_inside_the_interval_the_stop_costs_nothing(seed: int) -> None:
 @pytest.mark.parametrize("kind", ["saturation", "rectifier"])
 def test_the_stage_fits_its_linear_block(kind: Literal["saturation", "rectifier"]) -> None:
     values = linear_block(1e-4, 1)
-    room = replace(ROOM, kind=kind, drop=0.7, reference_current=(2e-4, 1e-2))
     resistors = series_values(["E24", "E96"], 1e3, 1e6)
     used = frozenset(values.values())
-    found = size(target_of(MODEL, values, room), resistors, 10e3, used)
+    found = size(target(values, kind), resistors, 10e3, used)
     assert not isinstance(found, str)
     assert found.error <= 1e-5
     if kind == "saturation":
@@ -82,8 +93,8 @@ def test_the_stage_fits_its_linear_block(kind: Literal["saturation", "rectifier"
 
 def test_what_binds_is_named_and_has_a_cure() -> None:
     values = linear_block(1e-4, 1)
-    target = target_of(MODEL, values, ROOM)
-    found = size(target, series_values(["E24"], 1e5, 1e6), 1e5, frozenset(values.values()))
+    sold, used = series_values(["E24"], 1e5, 1e6), frozenset(values.values())
+    found = size(target(values, "saturation"), sold, 1e5, used)
     assert found == "stop slope"
     assert "resistor_range" in FREES[found]
 
@@ -92,7 +103,7 @@ def test_what_binds_is_named_and_has_a_cure() -> None:
     "module", [linear_search, size_dead_zone, rectifier_stage, saturating_search]
 )
 def test_whatever_a_search_names_has_a_cure(module: ModuleType) -> None:
-    said = re.compile(r'(?:Shortfall\(|return |binding = |rule = )"([a-z][a-z -]+)"')
+    said = re.compile(r'(?:Shortfall\(|return |yield |binding = |rule = )"([a-z][a-z -]+)"')
     named = set(said.findall(inspect.getsource(module)))
     assert named <= set(FREES), named - set(FREES)
     assert named or module is size_dead_zone

@@ -13,8 +13,7 @@ from designer.base.errors import Unreachable
 from designer.catalog.catalog import load_catalog
 from designer.check.checked_design import design_for
 from designer.circuit import build
-from designer.circuit.dead_zone_kind import zone_of
-from designer.circuit.dead_zone_parts import idle_limits
+from designer.circuit.dead_zone_parts import dead_zone_stage, idle_limits
 from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.circuit.noise_gains import stages
@@ -31,7 +30,6 @@ from designer.model.response_table import Response
 from designer.synthesis import limits, parts_choice, side_conditions
 from designer.synthesis.limits import GENERATOR_PEAK, LOAD, bandwidth_limit, output_gain
 from designer.synthesis.output_loads import Load, Loads
-from designer.synthesis.part_names import terms_of
 
 # What each side condition costs is asked where a test is about it: it doubles the time.
 synthesise = partial(parts_choice.synthesise, binding=False)
@@ -48,14 +46,13 @@ def circuit(kind: str, **changed: float) -> Circuit:
     names = [f"R{i}" for i in (*range(1, 13), 50, *range(100, 108), *range(200, 211))]
     values = {name: 5e3 + 1.3e3 * i for i, name in enumerate(names)}
     values |= {"C1": 1e-8, "C2": 2.2e-8, "C3": 3.3e-8, "C4": 4.7e-8}
-    return build.build(
-        terms_of(PAPER),
+    return build.circuit_of(
+        PAPER,
         values | changed,
         TL074C,
         supply=15.0,
         saturation=13.0,
-        clearance="A",
-        zone=zone_of(kind, "both", CATALOG),  # type: ignore[arg-type]
+        stage=dead_zone_stage(PAPER, CircuitSpec(dead_zone=kind), CATALOG),  # type: ignore[arg-type]
     )
 
 
@@ -104,13 +101,12 @@ def test_loads_count_every_resistor_at_an_output() -> None:
 
 def test_series_composites_count_as_one_resistor() -> None:
     plain = {s.section.name: s for s in stages(circuit("saturation", R50=3e4))}
-    made = build.build(
-        terms_of(PAPER),
+    made = build.circuit_of(
+        PAPER,
         circuit("saturation").values | {"R50A": 1e4, "R50B": 2e4},
         TL074C,
         supply=15.0,
         saturation=13.0,
-        clearance="A",
         composites={"R50": "series"},
     )
     for stage in stages(made):

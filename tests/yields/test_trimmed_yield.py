@@ -19,7 +19,7 @@ from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Board, Resistor, nominal_board
 from designer.circuit.reduction import Reduction
-from designer.circuit.rest_point import at_rest
+from designer.circuit.working_modes import at_rest
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.jobs.study_json import study_json

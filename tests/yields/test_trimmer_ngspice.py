@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from designer.circuit.reduction import Reduction
-from designer.circuit.rest_point import at_rest
+from designer.circuit.working_modes import at_rest
 from designer.dynamics import attractors
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus

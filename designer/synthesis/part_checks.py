@@ -1,0 +1,224 @@
+"""What a model file asks of the parts, checked against the catalogue before any part is chosen.
+
+A refusal names the parts or values of the catalogue that would do.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError, Unreachable
+from designer.base.schema import did_you_mean
+from designer.catalog.catalog import Catalog
+from designer.catalog.diode_curve import diode_model
+from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
+from designer.circuit import build
+from designer.circuit.dead_zone_parts import dead_zone_stage
+from designer.circuit.netlist import Circuit
+from designer.model.circuit_table import CircuitSpec
+from designer.model.model import Dimensionless
+
+DRIVE = ("R6", "R12")
+"""Resistors from the generator to the driven masses."""
+_SECTION = re.compile("[A-OQ-Z]")
+"""Names that sections may have: U1P is the supply of U1."""
+Refusal = InputError | None
+
+
+def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> None:
+    """Refuse what cannot be built before anything is computed.
+
+    Raises
+    ------
+    InputError : a part of the catalogue that is not known or cannot be used, a part that the
+        circuit does not have, or a choice of the contract that this version does not build.
+    Unreachable : no value of the series can be bought in the range.
+    """
+    opamp_of(spec, catalog)
+    if spec.saturation is not None and not 0.0 < spec.saturation <= spec.supply:
+        expected = f"above 0 and up to {spec.supply:g} V"
+        raise InputError(None, "circuit.saturation", spec.saturation, expected)
+    if spec.dead_zone == "rectifier" and model.k0 > 0.0:
+        diode_of(spec.diode, catalog)
+        _reference_of(spec, catalog)
+    if spec.objective != "match":
+        raise InputError(
+            None,
+            "circuit.objective",
+            spec.objective,
+            '"match": a design for the yield comes from search, run or synthesise with --out',
+        )
+    circuit = unit_circuit(model, spec, catalog)
+    for group in spec.matched:
+        _check_names("circuit.matched", group, tuple(circuit.values))
+    if not isinstance(spec.composites, bool):
+        _check_names("circuit.composites", spec.composites, matching_resistors(circuit))
+    resistors = buyable("resistor", spec, catalog)
+    capacitors = buyable("capacitor", spec, catalog)
+    for value in spec.preferred:
+        values = resistors if value >= 1.0 else capacitors
+        if not np.isclose(values, value, rtol=1e-9).any():
+            near = nearest(values, value)
+            expected = f"values of the series that can be bought in the range, such as {near:g}"
+            raise InputError(None, "circuit.preferred", value, expected)
+
+
+def buyable(kind: Kind, spec: CircuitSpec, catalog: Catalog) -> Array:
+    """Values of the circuit's resistors [ohm] or capacitors [F] that can be bought, ascending.
+
+    Raises
+    ------
+    Unreachable : there is none.
+    """
+    if kind == "resistor":
+        return catalog.values(kind, spec.resistors, *spec.resistor_range, spec.resistor_grade)
+    return catalog.values(kind, spec.capacitors, *spec.capacitor_range, spec.capacitor_grade)
+
+
+def nearest(values: Array, wanted: float) -> float:
+    """The value nearest in ratio."""
+    return float(values[int(np.argmin(np.abs(np.log(values / wanted))))])
+
+
+def unit_circuit(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> Circuit:
+    """The circuit of this model with every value 1: the names of its parts are what counts."""
+    opamp = catalog.opamp(spec.opamp)
+    return build.circuit_of(
+        model,
+        defaultdict(lambda: 1.0),
+        opamp,
+        supply=spec.supply,
+        saturation=spec.saturation or opamp.saturation_at(spec.supply),
+        stage=dead_zone_stage(model, spec, catalog),
+    )
+
+
+def inverter_resistors(circuit: Circuit) -> frozenset[str]:
+    """Resistors of the inverters, which only set a level."""
+    return frozenset(n for n in circuit.values if n[:2] == "R1" and len(n) == 4)
+
+
+def matching_resistors(circuit: Circuit) -> tuple[str, ...]:
+    """Resistors that the coefficients depend on: not those of the inverters, of the drive, or from
+    a supply to a reference. Only these can gain from a second part."""
+    held = {net for ref in circuit.references for net in ref.nets}
+    rails = {supply.net for supply in circuit.supplies}
+    others = inverter_resistors(circuit) | set(DRIVE)
+    return tuple(
+        r.name
+        for r in circuit.resistors
+        if r.name not in others and not (held & set(r.nets) and rails & set(r.nets))
+    )
+
+
+def opamp_of(
+    spec: CircuitSpec, catalog: Catalog, fits: Callable[[OpAmp], Refusal] = lambda _: None
+) -> OpAmp:
+    """The op-amp that a model file names.
+
+    fits : a further condition: why an op-amp does not fit, or None.
+
+    Raises
+    ------
+    InputError : there is none of this name, or it cannot be used; which ones could.
+    """
+
+    def refusal(name: str) -> Refusal:
+        why = _opamp_refusal(name, spec, catalog)
+        return why if why is not None else fits(catalog.opamp(name))
+
+    _refuse(spec.opamp, "op-amps", [o.name for o in catalog.opamps], refusal)
+    return catalog.opamp(spec.opamp)
+
+
+def diode_of(name: str, catalog: Catalog) -> DiodeEntry:
+    """The diode of this name, with the figures of a diode, in a case that the board takes.
+
+    Raises
+    ------
+    InputError : there is none; which ones could be used.
+    """
+
+    def refusal(other: str) -> Refusal:
+        return _caught(lambda: diode_model(catalog.diode(other)))
+
+    _refuse(name, "diodes", [d.name for d in catalog.diodes], refusal)
+    return catalog.diode(name)
+
+
+def _reference_of(spec: CircuitSpec, catalog: Catalog) -> ReferenceEntry:
+    """The reference that a model file names: one that its rails can feed.
+
+    Raises
+    ------
+    InputError : there is none in a case that the board takes; which ones could be used.
+    Unreachable : the rails cannot feed it; which ones they could.
+    """
+
+    def refusal(name: str) -> Refusal:
+        why = _caught(lambda: catalog.reference(name))
+        if why is not None or catalog.reference(name).voltage < spec.supply:
+            return why
+        found = f"{name}, of {catalog.reference(name).voltage:g} V"
+        expected = f"a reference below the rails of {spec.supply:g} V"
+        return Unreachable(None, "circuit.reference", found, expected)
+
+    _refuse(spec.reference, "references", [r.name for r in catalog.references], refusal)
+    return catalog.reference(spec.reference)
+
+
+def _opamp_refusal(name: str, spec: CircuitSpec, catalog: Catalog) -> Refusal:
+    """Why no circuit of this specification can be built with an op-amp; None if it can."""
+    why = _caught(lambda: catalog.opamp(name, spec.supply))
+    if why is not None:
+        return why
+    opamp = catalog.opamp(name)
+    low, high = opamp.supply.min or 0.0, opamp.supply.max or np.inf
+    if not opamp.takes(spec.supply):
+        expected = f"{low:g} to {high:g} V, the rails of {name}"
+        return InputError(None, "circuit.supply", spec.supply, expected)
+    limit = opamp.saturation_at(spec.supply)
+    if spec.saturation is None and not 0.0 < limit <= spec.supply:
+        expected = f"an op-amp whose outputs reach something between 0 and {spec.supply:g} V"
+        return InputError(None, "circuit.opamp", f"{name}, which limits at {limit:g} V", expected)
+    for section in opamp.pins:
+        if not _SECTION.fullmatch(section.name):
+            found = f"{name}, with a section {section.name}"
+            expected = "an op-amp with sections named by one capital letter each, but not P"
+            return InputError(None, "circuit.opamp", found, expected)
+    return None
+
+
+def _refuse(name: str, kind: str, names: Iterable[str], refusal: Callable[[str], Refusal]) -> None:
+    """Raise why a part is refused, and which of the catalogue's are not."""
+    why = refusal(name)
+    if why is None:
+        return
+    if name not in names or why.field == "board.mounting":
+        raise why  # which names the known ones, or those that have a case
+    good = [other for other in names if refusal(other) is None]
+    instead = f"{kind} of the catalogue that would do: {', '.join(good) or 'none'}"
+    raise type(why)(why.file, why.field, why.found, f"{why.expected}; {instead}")
+
+
+def _caught(look_up: Callable[[], object]) -> Refusal:
+    """The error of a look-up, or None."""
+    try:
+        look_up()
+    except InputError as error:
+        return error
+    return None
+
+
+def _check_names(field: str, names: Iterable[str], known: tuple[str, ...]) -> None:
+    """InputError of the first name that is unknown, with the known ones."""
+    for name in names:
+        if name not in known:
+            hint = did_you_mean(name, known)
+            listed = "parts of this model's circuit: " + ", ".join(known)
+            raise InputError(None, field, name, listed + (f"; {hint}" if hint else ""))
