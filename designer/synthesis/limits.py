@@ -123,9 +123,9 @@ class ConditionLimits:
 
     def _lighter(self, design: Design, section: str) -> ConditionLimits:
         """Without the resistor that loads this section's output most, and any as small."""
-        output = next(s.output for s in design.circuit.sections if s.name == section)
+        outputs = next(s.outputs for s in stages(design.circuit) if s.section.name == section)
         values = effective(design.circuit.values, design.composites)
-        loads = [r for r in design.circuit.resistors if output in r.nets]
+        loads = [r for r in design.circuit.resistors if outputs & set(r.nets)]
         heaviest = min(loads, key=lambda r: r.value)
         floor = values.get(heaviest.name, heaviest.value) * (1.0 + MARGIN)
         low = max(floor, self.signal[0]) if heaviest.name in SIGNAL_RESISTORS else self.signal[0]

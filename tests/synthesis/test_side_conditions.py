@@ -174,7 +174,7 @@ def test_each_condition_limits_its_own_quantities_alone(name: str) -> None:
         limits.limits(CircuitSpec(), kept, TL074C, 13.0, 400.0) for kept in (every, every - {name})
     )
     differ = {f.name for f in fields(on) if getattr(on, f.name) != getattr(off, f.name)}
-    assert differ == CHANGES[name] | {"kept"}
+    assert differ == CHANGES[name] | {"conditions"}
 
 
 # Each binds somewhere, is named there, and leaving it out frees what it held.
@@ -357,3 +357,20 @@ def test_a_rectifier_on_high_rails_is_scaled_down(monkeypatch: pytest.MonkeyPatc
     )
     with pytest.raises(Unreachable, match="swing"):
         fv()
+
+
+def test_what_hangs_behind_a_diode_loads_a_section() -> None:
+    """No resistor stands on the output of a rectifier with one stop; R50 does, behind the diode."""
+    model, spec = replace(PAPER, sides="upper"), CircuitSpec(dead_zone="rectifier")
+    made = build.circuit_of(
+        model,
+        circuit("rectifier").values,
+        TL074C,
+        supply=15.0,
+        saturation=13.0,
+        stage=dead_zone_stage(model, spec, CATALOG),
+    )
+    within = limits.limits(spec, frozenset({"load"}), TL074C, 13.0, 400.0)
+    broken = ConditionCheck("load", "load_ohm", 2e3, 1e3, "U3A", least=True)
+    tighter = within.tightened([broken], replace(design(), circuit=made), slower=False)
+    assert tighter.load == pytest.approx(made.values["R50"], rel=2e-3)
