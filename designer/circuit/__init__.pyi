@@ -21,6 +21,8 @@ from .coefficients import (
 from .dead_zone_parts import (
     OUTPUT as OUTPUT,
     DeadZoneStage as DeadZoneStage,
+    Kind as Kind,
+    Sides as Sides,
     dead_zone_stage as dead_zone_stage,
     idle_limits as idle_limits,
 )
