@@ -137,6 +137,7 @@ from .page import (
     bullets as bullets,
     markdown as markdown,
     table as table,
+    table_of as table_of,
 )
 from .parquet_entry import (
     ParquetForm as ParquetForm,

@@ -6,11 +6,13 @@ Text is plain and is escaped. ``Markup`` is Markdown already: pages that are nev
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 from markupsafe import Markup
+
+T = TypeVar("T")
 
 PHRASE = 60
 """Characters of a cell that may stand in lines of a few words each."""
@@ -139,6 +141,15 @@ def table(
         return None
     end = len(columns) if any(row[-1] for row in cells) else len(columns) - 1
     return Table(tuple(columns[:end]), tuple(row[:end] for row in cells), tuple(numeric))
+
+
+def table_of(
+    items: Iterable[T], columns: Mapping[str, Callable[[T], str]], numeric: Collection[str] = ()
+) -> Table | None:
+    """The same with a row for each item. columns : what each says of an item, by heading. numeric :
+    headings of those that are set flush right."""
+    rows = [[cell(item) for cell in columns.values()] for item in items]
+    return table(list(columns), rows, [i for i, name in enumerate(columns) if name in numeric])
 
 
 def markdown(page: Page) -> str:

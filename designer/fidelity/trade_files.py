@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from markupsafe import Markup
@@ -20,7 +20,7 @@ from designer.base.figure_style import (
     plain_numbers,
     styled,
 )
-from designer.base.page import Block, Page, PageSection, Table, bullets, markdown, table
+from designer.base.page import Block, Page, PageSection, Table, bullets, markdown, table, table_of
 from designer.base.plain_json import FORMAT, plain
 from designer.fidelity.rung_errors import BOARD, EQUATIONS, RungError, Truth
 from designer.fidelity.rungs import RUNGS
@@ -202,26 +202,22 @@ def _by_response(answer: Mapping[str, Any]) -> list[Block]:
 
 
 def _board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
-    keys = ("boards", "ok", "lost", "gained", "undecided")
-    rows = [
-        (
-            name(b),
-            *(str(b[key]) for key in keys),
-            _percent(b["difference"]),
-            f"{_percent(b['low'])} to {_percent(b['high'])}",
-        )
-        for b in boards
-    ]
-    columns = (
-        "response", "boards", "ok", "only exact", "only ngspice", "undecided", "difference",
-        "interval",
-    )  # fmt: skip
+    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        "response": name,
+        "boards": lambda b: str(b["boards"]),
+        "ok": lambda b: str(b["ok"]),
+        "only exact": lambda b: str(b["lost"]),
+        "only ngspice": lambda b: str(b["gained"]),
+        "undecided": lambda b: str(b["undecided"]),
+        "difference": lambda b: _percent(b["difference"]),
+        "interval": lambda b: f"{_percent(b['low'])} to {_percent(b['high'])}",
+    }
     return [
         "Yield of the exact circuit less that of ngspice with ideal op-amps on the boards that "
         "both decided, with its 95 % interval. The interval holds for all boards that were "
         "asked: those that one of them left undecided count as ok on the exact circuit alone "
         "for its upper end, and in ngspice alone for its lower end.",
-        table(columns, rows),
+        table_of(boards, columns),
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,17 @@ from designer.base.figure_style import (
     shade_stops,
     styled,
 )
-from designer.base.page import Block, Items, Page, PageSection, Picture, SmallPrint, bullets, table
+from designer.base.page import (
+    Block,
+    Items,
+    Page,
+    PageSection,
+    Picture,
+    SmallPrint,
+    bullets,
+    table,
+    table_of,
+)
 from designer.circuit.coefficients import EXACT
 from designer.circuit.paper_values import MODEL
 from designer.paper.circuit_clock import BASE, CLAIM, PERIODS
@@ -98,12 +108,15 @@ def _short(
 
 
 def _dc(circuits: Sequence[Piece]) -> list[Block]:
-    rows = []
-    for one in circuits:
-        dc = one["dc"]
-        inside = f"{100.0 * dc['slope_inside'] / dc['slope_contact']:.3g} %"
-        threshold, slope = f"{1e3 * one['threshold']:.4g} mV", f"{dc['slope_contact']:.5g}"
-        rows.append((one["title"], threshold, slope, inside, f"{dc['difference']:.1e} V"))
+    columns: dict[str, Callable[[Piece], str]] = {
+        "circuit": lambda one: one["title"],
+        "threshold": lambda one: f"{1e3 * one['threshold']:.4g} mV",
+        "slope in contact": lambda one: f"{one['dc']['slope_contact']:.5g}",
+        "inside / in contact": lambda one: (
+            f"{100.0 * one['dc']['slope_inside'] / one['dc']['slope_contact']:.3g} %"
+        ),
+        "ngspice less exact": lambda one: f"{one['dc']['difference']:.1e} V",
+    }
     return [
         Picture(
             "DC curves of the nonlinear stages",
@@ -111,11 +124,8 @@ def _dc(circuits: Sequence[Piece]) -> list[Block]:
             "twice the threshold.",
             "fig7.png",
         ),
-        table(
-            ("circuit", "threshold", "slope in contact", "inside / in contact",
-             "ngspice less exact"), rows
-        ),
-    ]  # fmt: skip
+        table_of(circuits, columns),
+    ]
 
 
 def _portraits(circuits: Sequence[Piece]) -> list[Block]:
@@ -182,6 +192,13 @@ def _offsets(offsets: Sequence[Piece]) -> list[Block]:
 
 
 def _times(clock: Piece) -> list[Block]:
+    columns: dict[str, Callable[[Piece], str]] = {
+        "method": lambda m: m["name"],
+        "setting": lambda m: m["setting"],
+        "seconds": lambda m: _two_figures(m["seconds"]),
+        f"over {BASE}": lambda m: _two_figures(m["ratio"]),
+        "RMS error": lambda m: "exact" if m["error"] == 0.0 else _two_figures(m["error"]),
+    }
     out: list[Block] = [
         "CPU time of a drive period on one core, all methods taking turns in "
         f"{clock['rounds']} rounds; ratios are taken within a round and their median is shown. "
@@ -191,18 +208,8 @@ def _times(clock: Piece) -> list[Block]:
         Picture("Error over time", file="times.png"),
     ]
     for row in clock["responses"]:
-        rows = [
-            (
-                m["name"],
-                m["setting"],
-                _two_figures(m["seconds"]),
-                _two_figures(m["ratio"]),
-                "exact" if m["error"] == 0.0 else _two_figures(m["error"]),
-            )
-            for m in row["methods"]
-        ]
         out.append(SmallPrint(f"ω = {row['omega']:g}, 1-{row['p']}-{row['p']}:"))
-        out.append(table(("method", "setting", "seconds", f"over {BASE}", "RMS error"), rows))
+        out.append(table_of(row["methods"], columns))
     return out
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,11 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from designer.base.figure_style import INK, MUTED, new_figure, styled
-from designer.base.page import Block, Page, PageSection, Picture, Table, table
+from designer.base.page import Block, Page, PageSection, Picture, Table, table, table_of
 
 Case = Mapping[str, Any]
+Columns = dict[str, Callable[[Mapping[str, Any]], str]]
+"""What each column of a table says of a row of the data."""
 COLOURS = ("#b0b0b0", "#e69f00", "#56b4e9", "#009e73", "#0072b2")
 KINDS = ("as built", "tuned", "reached")
 GOAL = 0.99
@@ -144,51 +146,59 @@ def _ngspice(case: Case) -> PageSection:
 
 
 def _places(case: Case) -> Table | None:
-    rows = [
-        (
-            row["expect"],
-            f"{place['omega']:.5g}",
-            f"{place['b']:.4g}",
-            NONE if place["distance"] is None else f"{place['distance']:.2f} σ",
-            row["limited_by"],
-        )
-        for place, row in zip(case["search"]["final"]["responses"], case["responses"], strict=True)
-    ]
-    return table(("response", "ω", "b", "distance", "limited by"), rows)
+    found = case["search"]["final"]["responses"]
+    rows = [{**row, **place} for place, row in zip(found, case["responses"], strict=True)]
+    columns: Columns = {
+        "response": lambda row: row["expect"],
+        "ω": lambda row: f"{row['omega']:.5g}",
+        "b": lambda row: f"{row['b']:.4g}",
+        "distance": lambda row: NONE if row["distance"] is None else f"{row['distance']:.2f} σ",
+        "limited by": lambda row: row["limited_by"],
+    }
+    return table_of(rows, columns)
 
 
 def _blame(cases: Sequence[Case]) -> Table | None:
-    rows = [
-        (case["name"], row["expect"], _cell(row["as built"]), row["blame"])
-        for case in cases
-        for row in case["responses"]
-        if row["as built"]["rate"] < 1.0
-    ]
-    return table(("circuit", "response", "yield as built", "what limits it"), rows)
+    rows = [{**row, "name": case["name"]} for case in cases for row in case["responses"]]
+    columns: Columns = {
+        "circuit": lambda row: row["name"],
+        "response": lambda row: row["expect"],
+        "yield as built": lambda row: _cell(row["as built"]),
+        "what limits it": lambda row: row["blame"],
+    }
+    return table_of([row for row in rows if row["as built"]["rate"] < 1.0], columns)
 
 
 def _bills(cases: Sequence[Case]) -> Table | None:
-    rows = []
-    for case in cases:
-        b = case["bill"]
-        counts = (str(b[key]) for key in ("parts", "packages", "distinct"))
-        unsold = ", ".join(b["unsold"]) or "none"
-        rows.append((case["name"], *counts, f"{b['price']:.2f} €", unsold))
-    columns = (
-        "circuit", "pieces", "op-amp packages", "distinct values", "price, at most", "not sold",
-    )  # fmt: skip
-    return table(columns, rows)
+    columns: Columns = {
+        "circuit": lambda case: case["name"],
+        "pieces": lambda case: str(case["bill"]["parts"]),
+        "op-amp packages": lambda case: str(case["bill"]["packages"]),
+        "distinct values": lambda case: str(case["bill"]["distinct"]),
+        "price, at most": lambda case: f"{case['bill']['price']:.2f} €",
+        "not sold": lambda case: ", ".join(case["bill"]["unsold"]) or "none",
+    }
+    return table_of(cases, columns)
 
 
 def _levers(levers: Sequence[Mapping[str, Any]]) -> Table | None:
-    rows = []
-    for lever in levers:
-        ends = [lever[k]["smallest_distance"] for k in ("alone", "without")]
-        # A lever that ngspice moved costs distance on the exact circuit, if anything.
+    def sigma(end: Mapping[str, Any]) -> str:
+        distance = end["smallest_distance"]
+        return "no such design" if distance is None else f"{distance:.2f} σ"
+
+    def name(lever: Mapping[str, Any]) -> str:
+        """A lever that ngspice moved costs distance on the exact circuit, if anything."""
         note = " (for ngspice)" if lever.get("by") == "ngspice" else ""
-        cells = ("no such design" if d is None else f"{d:.2f} σ" for d in ends)
-        rows.append((f"{lever['lever']}{note}", str(lever["from"]), str(lever["to"]), *cells))
-    return table(("lever", "from", "to", "alone", "without"), rows)
+        return f"{lever['lever']}{note}"
+
+    columns: Columns = {
+        "lever": name,
+        "from": lambda x: str(x["from"]),
+        "to": lambda x: str(x["to"]),
+        "alone": lambda x: sigma(x["alone"]),
+        "without": lambda x: sigma(x["without"]),
+    }
+    return table_of(levers, columns)
 
 
 def _by_response(case: Case) -> dict[str, Mapping[str, Any]]:

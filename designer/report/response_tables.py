@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from designer.base.defaults import DRAWN_STARTS
 from designer.base.design_folder import TOLERANCE
-from designer.base.page import Table, table
+from designer.base.page import Table, table, table_of
 from designer.check.checked_design import CheckedResponse
 from designer.check.coexistence import beside
 from designer.circuit.nominal import nominal_reduction
 from designer.report import words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
-from designer.spice.equation_check import EquationCheck
+from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import shortest_contact
 from designer.yields.ngspice_sampling import Hearing, NgspiceVerdict, StartKind
 from designer.yields.verdict import Answer, Verdict, Yield
@@ -26,29 +27,25 @@ from designer.yields.verdict import Answer, Verdict, Yield
 REASONS_SHOWN = 5
 """Kinds of loss that are named; the rest is counted."""
 
+Columns = dict[str, Callable[[CheckedResponse], str]]
+"""What each column of a table says of a response."""
+NOT_WANTED = " (not what is wanted)"
 STARTED = {StartKind.OWN: "its own orbit", StartKind.NOMINAL: "the nominal orbit"}
 
 
 def response_table(data: ReportData) -> Table | None:
-    columns = (
-        "ω", "mechanism", "expected", "model", "exact circuit", "ngspice", "agree",
-        "symmetric (model)", "coexisting (model)",
-    )  # fmt: skip
-    rows = [
-        (
-            words.number(c.model.omega),
-            _hertz(data, c),
-            _expected(c),
-            c.model.orbit.response + ("" if c.model.found else " (not what is wanted)"),
-            c.circuit.response,
-            "not asked" if c.ngspice is None else c.ngspice.response,
-            "yes" if c.agrees else "no",
-            words.yes(c.model.orbit.symmetric),
-            _coexisting(data, c),
-        )
-        for c in data.checked
-    ]
-    return _of_mechanism(data, columns, rows, (0, 1))
+    columns: Columns = {
+        "ω": _omega,
+        **_mechanism(data),
+        "expected": _expected,
+        "model": lambda c: c.model.orbit.response + ("" if c.model.found else NOT_WANTED),
+        "exact circuit": lambda c: c.circuit.response,
+        "ngspice": lambda c: "not asked" if c.ngspice is None else c.ngspice.response,
+        "agree": lambda c: words.yes(c.agrees),
+        "symmetric (model)": lambda c: words.yes(c.model.orbit.symmetric),
+        "coexisting (model)": partial(_coexisting, data),
+    }
+    return table_of(data.checked, columns, ("ω", "mechanism"))
 
 
 def _coexisting(data: ReportData, checked: CheckedResponse) -> str:
@@ -63,62 +60,57 @@ def _coexisting(data: ReportData, checked: CheckedResponse) -> str:
 
 def settings_table(data: ReportData) -> Table | None:
     system = nominal_reduction(data.design).system()
-    columns: tuple[str, ...] = (
-        "ω", "mechanism", "b", "frequency", "amplitude (peak)", "shortest contact",
-        "nearest grazing", "ngspice steps per period", "method", "largest difference",
-    )  # fmt: skip
-    rows: list[tuple[str, ...]] = []
-    for c in data.checked:
-        contact = math.nan
-        if len(c.circuit.impact_times):
-            contact = shortest_contact(c.circuit, system, c.excitation)
-        rows.append(
-            (
-                words.number(c.model.omega),
-                _hertz(data, c),
-                words.number(c.model.b),
-                words.quantity(c.excitation.frequency, "Hz"),
-                words.quantity(c.excitation.amplitude, "V"),
-                words.quantity(contact, "s", 3),
-                words.quantity(min(c.circuit.penetration, c.circuit.miss), "V", 3),
-                *_gate_cells(c),
-            )
-        )
-    if not any(c.gate is not None for c in data.checked):
-        columns, rows = columns[:-3], [row[:-3] for row in rows]
-    return _of_mechanism(data, columns, rows, (*range(min(8, len(columns))), 9)[: len(columns)])
+
+    def contact(c: CheckedResponse) -> str:
+        if not len(c.circuit.impact_times):
+            return words.NONE
+        return words.quantity(shortest_contact(c.circuit, system, c.excitation), "s", 3)
+
+    columns: Columns = {
+        "ω": _omega,
+        **_mechanism(data),
+        "b": lambda c: words.number(c.model.b),
+        "frequency": lambda c: words.quantity(c.excitation.frequency, "Hz"),
+        "amplitude (peak)": lambda c: words.quantity(c.excitation.amplitude, "V"),
+        "shortest contact": contact,
+        "nearest grazing": lambda c: words.quantity(
+            min(c.circuit.penetration, c.circuit.miss), "V", 3
+        ),
+    }
+    if any(c.gate is not None for c in data.checked):
+        columns |= {"ngspice steps per period": _steps, "method": _method, "largest difference":
+                    _difference}  # fmt: skip
+    return table_of(data.checked, columns, {*columns} - {"method"})
 
 
-def _gate_cells(c: CheckedResponse) -> tuple[str, str, str]:
-    """Steps of a period, method, and the largest difference of ngspice's runs."""
+def _steps(c: CheckedResponse) -> str:
     if c.gate is None:
-        return (words.NONE, words.NONE, words.NONE)
-    settings = c.gate.settings
-    return (
-        f"{1.0 / (c.excitation.frequency * settings.max_step):.0f}",
-        settings.method + ("" if c.gate.passed else " (not passed)"),
-        f"{100 * c.gate.difference:.2g} %" if math.isfinite(c.gate.difference) else words.NONE,
-    )
-
-
-def _of_mechanism(
-    data: ReportData,
-    columns: Sequence[str],
-    rows: Sequence[tuple[str, ...]],
-    numeric: Sequence[int],
-) -> Table | None:
-    """A table of responses; its column 1, the mechanism's frequency, only where there is one."""
-    if data.mechanical is not None:
-        return table(columns, rows, numeric)
-    shifted = [0, *(i - 1 for i in numeric if i > 1)]
-    return table([columns[0], *columns[2:]], [(row[0], *row[2:]) for row in rows], shifted)
-
-
-def _hertz(data: ReportData, c: CheckedResponse) -> str:
-    """The frequency that the mechanism has, where it has SI values."""
-    if data.mechanical is None:
         return words.NONE
-    return words.quantity(data.mechanical.hertz(c.model.omega), "Hz")
+    return f"{1.0 / (c.excitation.frequency * c.gate.settings.max_step):.0f}"
+
+
+def _method(c: CheckedResponse) -> str:
+    if c.gate is None:
+        return words.NONE
+    return c.gate.settings.method + ("" if c.gate.passed else " (not passed)")
+
+
+def _difference(c: CheckedResponse) -> str:
+    if c.gate is None or not math.isfinite(c.gate.difference):
+        return words.NONE
+    return f"{100 * c.gate.difference:.2g} %"
+
+
+def _omega(c: CheckedResponse) -> str:
+    return words.number(c.model.omega)
+
+
+def _mechanism(data: ReportData) -> Columns:
+    """The frequency that the mechanism has, where it has SI values."""
+    mechanical = data.mechanical
+    if mechanical is None:
+        return {}
+    return {"mechanism": lambda c: words.quantity(mechanical.hertz(c.model.omega), "Hz")}
 
 
 def _expected(c: CheckedResponse) -> str:
@@ -204,11 +196,13 @@ def _ngspice_cells(answers: Sequence[Answer], asked: Sequence[Hearing]) -> tuple
 
 def equation_table(check: EquationCheck) -> Table | None:
     """What ngspice says of the circuit's equation: .ac and .dc against the model."""
-    rows = [
-        (f.name, f.reason or words.error(f.deviation), words.error(f.bound), words.yes(f.passed))
-        for f in check.findings
-    ]
-    return table(("compared", "largest deviation", "bound", "within"), rows, (1, 2))
+    columns: dict[str, Callable[[EquationFinding], str]] = {
+        "compared": lambda f: f.name,
+        "largest deviation": lambda f: f.reason or words.deviation(f.deviation),
+        "bound": lambda f: words.deviation(f.bound),
+        "within": lambda f: words.yes(f.passed),
+    }
+    return table_of(check.findings, columns, ("largest deviation", "bound"))
 
 
 def provenance_table(data: ReportData) -> Table | None:

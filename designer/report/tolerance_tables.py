@@ -7,13 +7,14 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from designer.base.page import Table, table
+from designer.base.page import Table, table, table_of
 from designer.report import words
 from designer.report.data import ReportData
 from designer.report.measured_table import table as measured_boards
 from designer.report.response_tables import STARTED
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
+from designer.yields.corners import Corner
 from designer.yields.joint_yield import all_on_one
 from designer.yields.two_engine_yield import Combined
 from designer.yields.verdict import Yield, count
@@ -184,32 +185,28 @@ def _saved(subject: BlamedPart) -> str:
 
 def corners(data: ReportData) -> Table | None:
     """The worst corner of each response."""
-    rows = []
-    for name, blame in _blamed(data):
-        k = blame.corner
-        if k is not None:
-            worst = ", ".join(f"{n} {end}" for n, end in zip(k.coordinates, k.worst, strict=True))
-            board = f"{k.verdict}: {k.response}"
-            rows.append((name, worst, board, f"{k.survived} of {k.corners}"))
-    columns = (
-        "response", "worst corner, all else in the middle", "the board there", "corners survived",
-    )  # fmt: skip
-    return table(columns, rows, (3,))
+    rows = [(name, blame.corner) for name, blame in _blamed(data) if blame.corner is not None]
+    columns: dict[str, Callable[[tuple[str, Corner]], str]] = {
+        "response": lambda row: row[0],
+        "worst corner, all else in the middle": lambda row: ", ".join(
+            f"{name} {end}" for name, end in zip(row[1].coordinates, row[1].worst, strict=True)
+        ),
+        "the board there": lambda row: f"{row[1].verdict}: {row[1].response}",
+        "corners survived": lambda row: f"{row[1].survived} of {row[1].corners}",
+    }
+    return table_of(rows, columns, ("corners survived",))
 
 
 def maps(data: ReportData) -> Table | None:
     """Window, setting in use and recommended setting of each yield map."""
-    rows = [
-        (
-            words.name(data.checked[data.study.asked[one.question]]),
-            " × ".join("ω" if axis.name == "omega" else axis.name for axis in one.axes),
-            _window(one),
-            _in_use(one),
-            _recommended(one),
-        )
-        for one in data.study.maps
-    ]
-    return table(("response", "over", "nominal window", "in use", "recommended"), rows)
+    columns: dict[str, Callable[[YieldMap], str]] = {
+        "response": lambda one: words.name(data.checked[data.study.asked[one.question]]),
+        "over": lambda one: " × ".join("ω" if a.name == "omega" else a.name for a in one.axes),
+        "nominal window": _window,
+        "in use": _in_use,
+        "recommended": _recommended,
+    }
+    return table_of(data.study.maps, columns)
 
 
 def _window(one: YieldMap) -> str:

@@ -112,6 +112,13 @@ def error(value: float) -> str:
     return f"{100 * value:.3g} %" if abs(value) > EXACT else "exact (up to 1e-6)"
 
 
+def deviation(value: float) -> str:
+    """A measured deviation in per cent; a very small one has no digits of its own."""
+    if not math.isfinite(value):
+        return NONE
+    return f"{100 * value:.3g} %" if abs(value) > EXACT else f"< {100 * EXACT:.4f} %"
+
+
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     if not math.isfinite(value):
         return NONE

@@ -23,6 +23,9 @@ from .blame_status import (
     BlameStage as BlameStage,
     BlameStatus as BlameStatus,
 )
+from .corners import (
+    Corner as Corner,
+)
 from .dask_runner import (
     Cluster as Cluster,
 )

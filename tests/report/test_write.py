@@ -252,7 +252,7 @@ def test_every_response_appears_with_its_facts(whole: ReportData, html: str, kin
         "3-3-3",  # met beside 1-1-1 at 1.55
         "TL074C",
         "RC0603FR-0710KL",
-        "exact (&lt; 1e-12)",
+        "exact (up to 1e-6)",
         "Proved optimal",
         "4 simulated boards",
         "all on one board",
