@@ -7,11 +7,10 @@ a message:
     class Rails(FileTable):
         supply: Annotated[float, number("V", "a number > 0", lambda x: x > 0)] = 15.0
 
-``validated`` makes such a record from the tables of a TOML file: pydantic walks them (missing keys,
-unknown keys, nesting), and each thing that it refuses becomes an ``InputError``; ``checked`` raises
-the first of them. Nothing is converted silently: a text is no number where the field has no unit, 1
-is not true, and a key that nobody reads is an error. Records that the code makes itself are not
-checked.
+``validated`` makes such a record of a TOML file: pydantic walks its tables, and each thing that it
+refuses becomes an ``InputError``; ``checked`` raises the first. Nothing is converted silently: a
+text is no number where the field has no unit, 1 is not true, and a key that nobody reads is an
+error. What the code makes itself is not checked, but by ``check_values``.
 """
 
 from __future__ import annotations
@@ -59,8 +58,8 @@ class FieldProblems(ValueError):
 class Accepts:
     """What a field accepts: in words, and as a function that returns the value or raises.
 
-    ``check`` raises ValueError for what it does not accept; a message there says more than
-    ``expected`` does and is added to it. FieldProblems stand for themselves.
+    ``check`` raises ValueError for what it does not accept; its message is added to ``expected``.
+    FieldProblems stand for themselves.
     """
 
     expected: str
@@ -89,11 +88,26 @@ class Accepts:
             raise ValueError(self.expected + detail) from None
 
 
+def such(expected: str, fits: Callable[[Any], bool]) -> Accepts:
+    """A value for which ``fits`` holds, as it is."""
+
+    def check(value: object) -> object:
+        if not fits(value):
+            raise ValueError
+        return value
+
+    return Accepts(expected, check)
+
+
 def number(unit: str, expected: str, fine: Callable[[float], bool] = math.isfinite) -> Accepts:
     """A finite number for which ``fine`` holds; with a unit also as text ("22.1k", "100nF")."""
 
     def check(value: object) -> float:
-        result = _quantity(value, unit)
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError
+        if isinstance(value, str) and not unit:
+            raise ValueError("without quotes")
+        result = parse_quantity(value, unit)
         if not fine(result):
             raise ValueError
         return result
@@ -113,24 +127,17 @@ def fraction(example: str, *, zero: bool = False) -> Accepts:
 
 def whole(expected: str, least: float, most: float = math.inf) -> Accepts:
     """A whole number from ``least`` to ``most``."""
-
-    def check(value: object) -> int:
-        if type(value) is not int or not least <= value <= most:
-            raise ValueError
-        return value
-
-    return Accepts(expected, check)
+    return such(expected, lambda value: type(value) is int and least <= value <= most)
 
 
 def span(unit: str, expected: str, fine: Callable[[float], bool]) -> Accepts:
     """Two numbers [low, high], low <= high, ``fine`` for both."""
+    end = number(unit, expected, fine)
 
     def check(value: object) -> tuple[float, float]:
         if not isinstance(value, list | tuple) or len(value) != 2:
             raise ValueError
-        low, high = (_quantity(end, unit) for end in value)
-        if not (fine(low) and fine(high)):
-            raise ValueError
+        low, high = map(end.check, value)
         if low > high:
             raise ValueError("the range is reversed")
         return low, high
@@ -183,24 +190,7 @@ def choice(*names: str) -> Accepts:
 
 def flag() -> Accepts:
     """true or false, and no number in their place."""
-
-    def check(value: object) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError
-        return value
-
-    return Accepts("true or false", check)
-
-
-def any_table(expected: str) -> Accepts:
-    """A table of any keys."""
-
-    def check(value: object) -> dict[str, Any]:
-        if not isinstance(value, dict):
-            raise ValueError
-        return value
-
-    return Accepts(expected, check)
+    return such("true or false", lambda value: isinstance(value, bool))
 
 
 def line(expected: str, longest: int = 200) -> Accepts:
@@ -220,13 +210,10 @@ def line(expected: str, longest: int = 200) -> Accepts:
 
 def text(pattern: str, expected: str) -> Accepts:
     """Text that a regular expression matches as a whole."""
-
-    def check(value: object) -> str:
-        if not isinstance(value, str) or not re.fullmatch(pattern, value, re.ASCII):
-            raise ValueError
-        return value
-
-    return Accepts(expected, check)
+    fitting = re.compile(pattern, re.ASCII)
+    return such(
+        expected, lambda value: isinstance(value, str) and fitting.fullmatch(value) is not None
+    )
 
 
 def several(
@@ -338,8 +325,7 @@ def validated(
     return None, out
 
 
-_UNKNOWN = "unexpected_keyword_argument"
-"""pydantic's name of an unknown key."""
+_UNKNOWN = "unexpected_keyword_argument"  # pydantic's name of an unknown key
 
 
 _adapter: Callable[[Any], TypeAdapter[Any]] = cache(TypeAdapter)
@@ -372,14 +358,6 @@ def shown(value: object) -> str:
         return "a very large integer"
 
 
-def _quantity(value: object, unit: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError
-    if isinstance(value, str) and not unit:
-        raise ValueError("without quotes")
-    return parse_quantity(value, unit)
-
-
 def check_values(record: FileTable, where: str) -> None:
     """Hold a record that was made in code to what the keys of its table accept.
 
@@ -387,7 +365,7 @@ def check_values(record: FileTable, where: str) -> None:
     ------
     InputError : names ``where`` and the first field that is not what its key would be read as.
     """
-    for name, accepts in _accepted(type(record)).items():
+    for name, accepts in _accepted(type(record)):
         value = getattr(record, name)
         try:
             same = accepts.check(value) == value
@@ -397,12 +375,13 @@ def check_values(record: FileTable, where: str) -> None:
             raise InputError(None, f"{where}.{name}", value, accepts.expected)
 
 
-def _accepts_by_key(table: type[FileTable]) -> dict[str, Accepts]:
-    annotations = {key: get_args(annotation)[1:] for key, annotation in keys_of(table).items()}
-    return {k: a for k, metadata in annotations.items() for a in metadata if isinstance(a, Accepts)}
+def _find_accepted(table: type[FileTable]) -> tuple[tuple[str, Accepts], ...]:
+    """The fields that state what they accept."""
+    kinds = {key: get_args(annotation)[1:] for key, annotation in keys_of(table).items()}
+    return tuple((key, a) for key, kind in kinds.items() for a in kind if isinstance(a, Accepts))
 
 
-_accepted: Callable[[Any], dict[str, Accepts]] = cache(_accepts_by_key)
+_accepted: Callable[[Any], tuple[tuple[str, Accepts], ...]] = cache(_find_accepted)
 
 
 def _dotted(place: tuple[int | str, ...]) -> str:
@@ -468,5 +447,4 @@ def _expected(table: type[FileTable], place: tuple[int | str, ...]) -> str:
     return f"{what.replace('tables', 'a list of tables')} of {', '.join(keys_of(nested))}"
 
 
-_MOST_KEYS = 5
-"""Keys that a message lists of a table; one with more is named by its header."""
+_MOST_KEYS = 5  # a table of more is named by its header

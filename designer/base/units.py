@@ -38,7 +38,7 @@ def parse_quantity(value: str | float, unit: str) -> float:
     value : a number is taken as it is; a text may carry a prefix, the unit, or both.
     unit : what the quantity is measured in, such as "Ω", "F", "N/m"; "" for a bare number.
         A text that ends in the unit is read with it first: for metres "5m" is 5 m, "5mm" 5e-3 m.
-        What a unit is per may carry a prefix too: for V/s "9 V/µs" is 9e6 V/s.
+        The unit after the slash may carry a prefix too: for V/s "9 V/µs" is 9e6 V/s.
 
     Raises
     ------

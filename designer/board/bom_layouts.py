@@ -16,7 +16,6 @@ from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import read_text
 from designer.base.schema import (
     FIRST_FORMAT,
-    Accepts,
     FileTable,
     checked,
     choice,
@@ -24,6 +23,7 @@ from designer.base.schema import (
     lines,
     one_of,
     parse_toml,
+    such,
 )
 from designer.board.bom import COLUMNS, Line
 from designer.catalog.read import LAYOUTS
@@ -31,18 +31,10 @@ from designer.catalog.read import LAYOUTS
 FIELDS = (*COLUMNS, "package", "comment")
 """What a column may show: a field of the bill; the footprint's name; value, grade and number."""
 _MAX_BYTES = 100_000
-
-
-def _text() -> Accepts:
-    def check(value: object) -> str:
-        if not isinstance(value, str) or not value.isprintable() or len(value) > 200:
-            raise ValueError
-        return value
-
-    return Accepts("text of one line, possibly empty", check)
-
-
-_TEXT = _text()
+_TEXT = such(
+    "text of one line, possibly empty",
+    lambda value: isinstance(value, str) and value.isprintable() and len(value) <= 200,
+)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Annotated
@@ -202,8 +202,8 @@ def _check(s: _Statement, path: Path) -> None:
 
 
 def _blocks(statements: Sequence[_Statement], path: Path) -> dict[str, _Block]:
-    """Subcircuits by lower-case name, each with what stands outside all of them."""
-    common = [s for s in _outside(statements) if s.word in (".model", ".param", ".func")]
+    """Subcircuits by lower-case name, each with what stands outside all of them in front."""
+    common: list[_Statement] = []
     blocks: dict[str, _Block] = {}
     head: _Statement | None = None
     inside: list[_Statement] = []
@@ -211,7 +211,7 @@ def _blocks(statements: Sequence[_Statement], path: Path) -> dict[str, _Block]:
         if s.word == ".subckt":
             if head is not None:
                 raise _refused(path, s.line, s.text, "a subcircuit inside another")
-            head, inside = s, list(common)
+            head, inside = s, []
         elif s.word == ".ends":
             if head is None:
                 raise _refused(path, s.line, s.text, "an end without a beginning")
@@ -222,20 +222,13 @@ def _blocks(statements: Sequence[_Statement], path: Path) -> dict[str, _Block]:
             head = None
         elif head is not None:
             inside.append(s)
-        elif s not in common:
+        elif s.word in (".model", ".param", ".func"):
+            common.append(s)
+        else:
             raise _refused(path, s.line, s.text, "an element outside a subcircuit")
     if head is not None:
         raise _refused(path, head.line, head.text, "a subcircuit without an end")
-    return blocks
-
-
-def _outside(statements: Sequence[_Statement]) -> list[_Statement]:
-    depth, found = 0, []
-    for s in statements:
-        depth += (s.word == ".subckt") - (s.word == ".ends")
-        if depth == 0 and s.word != ".ends":
-            found.append(s)
-    return found
+    return {name: replace(b, inside=(*common, *b.inside)) for name, b in blocks.items()}
 
 
 def _headed(head: _Statement, inside: tuple[_Statement, ...], path: Path) -> _Block:

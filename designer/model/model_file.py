@@ -25,7 +25,7 @@ from typing import Annotated, Any
 
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
-from designer.base.schema import FIRST_FORMAT, FileTable, any_table, checked, line, parse_toml
+from designer.base.schema import FIRST_FORMAT, FileTable, checked, line, parse_toml, such
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
@@ -164,6 +164,9 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     )
 
 
+_RULES = such("tables [rules.<id>]", lambda value: isinstance(value, dict))
+
+
 @dataclass(frozen=True)
 class _File(FileTable):
     """The tables of a file."""
@@ -176,7 +179,7 @@ class _File(FileTable):
     circuit: CircuitSpec = field(default_factory=CircuitSpec)
     tuning: Bands = field(default_factory=Bands)
     board: BoardSpec = field(default_factory=BoardSpec)
-    rules: Annotated[dict[str, Any], any_table("tables [rules.<id>]")] = field(default_factory=dict)
+    rules: Annotated[dict[str, Any], _RULES] = field(default_factory=dict)
     search: SearchSpec = field(default_factory=SearchSpec)
     spread: SpreadSpec = BENCH_1
 

@@ -78,9 +78,9 @@ composites = false              # true or ["R50", …]: resistors of two parts, 
 side_conditions = true          # false: the match alone; or a list of those to keep:
 # side_conditions = ["swing", "level", "load", "noise_gain", "bandwidth", "resistors", "generator"]
 # matched = [["R1", "R7"]]      # groups of parts with equal values
-# preferred = ["10k", "10n"]    # values that do not count as further ones
+# preferred = ["10k", "10n"]    # values that do not count among the distinct ones
 # most_values = 12              # at most so many distinct values
-# slack = 1e-4                  # what the error may exceed its least, for fewer distinct values
+# slack = 1e-4                  # how much the error may exceed its least for fewer distinct values
 
 # How the boards of a tolerance study differ; without it as the reference spread says. More keys:
 # docs/spread.md
