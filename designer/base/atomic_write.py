@@ -19,24 +19,32 @@ def partial_of(path: Path) -> Path:
 
 
 @contextlib.contextmanager
-def appearing(path: Path, field: str = "--out", expected: str = WRITABLE) -> Iterator[Path]:
-    """Where to write what stands at ``path`` once the block has ended; nothing is left of a block
-    that fails.
+def writing(path: Path, field: str = "--out", expected: str = WRITABLE) -> Iterator[None]:
+    """A block that writes at this place.
 
     Raises
     ------
     InputError : an OSError in the block; field, expected : what it then says.
     """
-    partial = partial_of(path)
     try:
-        yield partial
-        os.replace(partial, path)
+        yield
     except OSError as error:
-        said = os.strerror(error.errno) if error.errno else str(error)
-        raise InputError(path, field, said, expected) from None
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise InputError(path, field, reason, expected) from None
+
+
+@contextlib.contextmanager
+def appearing(path: Path, field: str = "--out", expected: str = WRITABLE) -> Iterator[Path]:
+    """Where to write what stands at ``path`` once the block has ended; nothing is left of a block
+    that fails. Raises as ``writing``."""
+    partial = partial_of(path)
+    with writing(path, field, expected):
+        try:
+            yield partial
+            os.replace(partial, path)
+        finally:
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
 
 
 def write(path: Path, content: str | bytes) -> None:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from designer.base.atomic_write import partial_of
+from designer.base.atomic_write import appearing, partial_of, writing
 from designer.base.errors import InputError
 from designer.base.manifest import (
     MANIFEST as MANIFEST,
@@ -158,7 +158,7 @@ class Folder:
         anew is forgotten; its files stay listed until ``finish`` removes them.
         """
         manifest = self.manifest or Manifest()
-        with _writing(self.path):
+        with writing(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
         if "design" in wanted:
             for stage in OF_DESIGN:
@@ -200,11 +200,9 @@ class Folder:
         stage, _ = self.manifest.files[name]
         data = content.encode("utf-8") if isinstance(content, str) else content
         path = self / name
-        with _writing(path):
+        with appearing(path) as partial:
             path.parent.mkdir(parents=True, exist_ok=True)
-            partial = partial_of(path)
             partial.write_bytes(data)
-            os.replace(partial, path)
         self.manifest.files[name] = (stage, file_hash(name, data))
 
     def rewrite(self, name: str, content: str | bytes) -> None:
@@ -330,14 +328,13 @@ class Folder:
 
     def _save(self) -> None:
         assert self.manifest is not None
-        path = self / MANIFEST
-        with _writing(path):
-            partial = partial_of(path)
-            with partial.open("w", encoding="ascii") as stream:
-                stream.write(dumps(self.manifest.as_dict()))
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(partial, path)
+        with (
+            appearing(self / MANIFEST) as partial,
+            partial.open("w", encoding="ascii") as stream,
+        ):
+            stream.write(dumps(self.manifest.as_dict()))
+            stream.flush()
+            os.fsync(stream.fileno())
 
     def _refuse(self, stage: StageName, inputs: Mapping[str, Any]) -> None:
         assert self.manifest is not None
@@ -361,10 +358,8 @@ def is_design_folder(path: Path) -> bool:
 def _check_free(path: Path) -> None:
     """InputError unless a folder can be made here, or an empty one is here."""
     if path.is_dir():
-        try:
+        with writing(path):
             taken = any(p.name != partial_of(path / MANIFEST).name for p in path.iterdir())
-        except OSError as error:
-            raise _cannot_write(path, error) from None
         if taken:
             raise InputError(
                 path,
@@ -393,24 +388,6 @@ def _exists(path: Path) -> bool:
         return path.exists() or path.is_symlink()
     except OSError:
         return False
-
-
-class _writing:  # noqa: N801 - reads as a word in a with statement
-    """Turns a failure to write into an InputError that names the place."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, OSError):
-            raise _cannot_write(self._path, error) from None
-
-
-def _cannot_write(path: Path, error: OSError) -> InputError:
-    return InputError(path, "--out", error.strerror or str(error), "a place that can be written")
 
 
 def _short(value: object) -> str:

@@ -13,7 +13,7 @@ from designer.board.bom import bill_of_materials
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.jobs.design_source import read_design
-from designer.jobs.study_stage import read_study
+from designer.jobs.study_stage import RANDOM, Place, read_study
 from designer.yields.run_result import RunResult
 from designer.yields.study import Study
 
@@ -40,6 +40,8 @@ class JobOutcome:
     """The design, where it was made or read; ``synthesis`` has it always."""
     result: RunResult | None = None
     """The study with all that went into it, where it was made now."""
+    place: Place = RANDOM
+    """Where in the folder the study is."""
     shown: bool = False
     """Whether what stands in the answer beside blame and maps was shown before they were worked
     out."""
@@ -69,7 +71,7 @@ class JobOutcome:
             return self.result.study
         if self.folder is None:
             raise InputError(None, "the study", MISSING, "a verb that makes one, such as tolerance")
-        return read_study(self.folder, self.synthesis)
+        return read_study(self.folder, self.synthesis, self.place)
 
     def bom(self) -> pd.DataFrame:
         """The bill of materials: a row for each part to buy, as in ``bom.csv``."""

@@ -53,9 +53,11 @@ def choose(folder: Folder) -> RungChoice:
     """
     stages = folder.manifest.stages if folder.manifest else {}
     if "trade" in stages and stages["trade"].complete:
-        return _read(folder, TRADE, "cheapest", _choice)
+        return _read(folder, TRADE, "cheapest", _of_trade)
     if "search" in stages and stages["search"].complete and "design" in stages:
-        return _read(folder, SEARCH, "trade", partial(_kept, stages["design"].inputs.get("model")))
+        return _read(
+            folder, SEARCH, "trade", partial(_of_search, stages["design"].inputs.get("model"))
+        )
     return RungChoice("auto", "")
 
 
@@ -73,8 +75,8 @@ def before_search(folder: Folder, model: str) -> RungChoice | None:
 
 
 def for_search(folder: Folder, options: Options, progress: Progress) -> RungName:
-    """The rung of the study at the end of a search, which is said. ``exact`` stands for "as usual":
-    the search's confirmation asks ngspice about `LEAST` boards of each response."""
+    """The rung of the study at the end of a search, and a note of why. ``exact`` stands for "as
+    usual": the search's confirmation asks ngspice about `LEAST` boards of each response."""
     if options.rung != "auto":
         return options.rung
     choice = choose(folder)
@@ -87,7 +89,8 @@ def for_search(folder: Folder, options: Options, progress: Progress) -> RungName
 
 
 def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
-    """The options with the rung that was chosen, which is said; one that was asked for stands."""
+    """The options with the rung that was chosen, and a note of why; one that was asked for
+    stands."""
     if options.rung != "auto":
         return options
     choice = choose(folder)
@@ -99,63 +102,62 @@ def chosen(folder: Folder, options: Options, progress: Progress) -> Options:
 def _read(
     folder: Folder, name: str, key: str, choice: Callable[[Mapping[str, Any]], RungChoice]
 ) -> RungChoice:
-    said = folder.json(name)
+    document = folder.json(name)
     with reading(folder / name, f"what {name.removesuffix('.json')} wrote", key):
-        return choice(said)
+        return choice(document)
 
 
-def _kept(model: object, said: Mapping[str, Any]) -> RungChoice:
+def _of_search(model: object, search: Mapping[str, Any]) -> RungChoice:
     """model : hash of the design's model file, which is another where somebody replaced it."""
-    kept = said.get("trade")
-    if kept is None or kept["model"] != model:
+    trade = search.get("trade")
+    if trade is None or trade["model"] != model:
         return RungChoice("auto", "")
-    if kept["rung"] not in RUNGS:
-        raise ValueError(kept["rung"])
-    reason = str(kept["reason"]).removesuffix(EARLIER)
-    return RungChoice(kept["rung"], f"{reason}{EARLIER}")
+    if trade["rung"] not in RUNGS:
+        raise ValueError(trade["rung"])
+    reason = str(trade["reason"]).removesuffix(EARLIER)
+    return RungChoice(trade["rung"], f"{reason}{EARLIER}")
 
 
-def _choice(said: Mapping[str, Any]) -> RungChoice:
-    found = [c for c in said["cheapest"] if c["question"] == SHARE]
-    if not found:
-        reasons = dict.fromkeys(f"{_place(r)}: {r['reason']}" for r in said["left_out"])
+def _of_trade(trade: Mapping[str, Any]) -> RungChoice:
+    shares = [c for c in trade["cheapest"] if c["question"] == SHARE]
+    if not shares:
+        reasons = dict.fromkeys(f"{_response(r)}: {r['reason']}" for r in trade["left_out"])
         why = f" ({'; '.join(reasons)})" if reasons else ""
-        said_ = f"rung by trade.json: it asked no boards{why}, so as usual"
-        return RungChoice("auto", said_ + _warning(said, CIRCUIT))
-    overall = found[-1]  # of all responses, or of the only one
+        reason = f"rung by trade.json: it asked no boards{why}, so as usual"
+        return RungChoice("auto", reason + _warning(trade, CIRCUIT))
+    overall = shares[-1]  # of all responses, or of the only one
     if overall["rung"] == CIRCUIT:
         note = f"; {overall['note']}" if overall.get("note") else ""
-        kept = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %{note})"
+        error = f"within {100.0 * overall['measured']:.2g} % of ngspice's yield (95 %{note})"
         return RungChoice(
             "auto",
-            f"rung by trade.json: the exact circuit decides, {kept}; ngspice is asked about "
-            f"{LEAST} boards of each response at least{_warning(said, CIRCUIT)}",
+            f"rung by trade.json: the exact circuit decides, {error}; ngspice is asked about "
+            f"{LEAST} boards of each response at least{_warning(trade, CIRCUIT)}",
         )
     return RungChoice(
         "ngspice",
         "rung by trade.json: every board in ngspice, for the exact circuit's yield is off by more "
-        f"than {100.0 * overall['bound']:g} %{_warning(said, 'ideal')}",
+        f"than {100.0 * overall['bound']:g} %{_warning(trade, 'ideal')}",
     )
 
 
-def _warning(said: Mapping[str, Any], decides: str) -> str:
+def _warning(trade: Mapping[str, Any], decides: str) -> str:
     """Where the rung that decides is not shown to have the nominal board's n-p-q."""
     wrong = []
-    for truth in said["truths"]:
-        rows = [
-            row
-            for row in said["rungs"]
+    for truth in trade["truths"]:
+        right = any(
+            row["right"][BOARD] and row["gate"] is not False
+            for row in trade["rungs"]
             if row["number"] == truth["number"] and row["rung"] == decides
-        ]
-        right = any(row["right"][BOARD] and row["gate"] is not False for row in rows)
+        )
         if not (truth["sure"] and right):
-            wrong.append(_place(truth))
+            wrong.append(_response(truth))
     if not wrong:
         return ""
     name = "the exact circuit" if decides == CIRCUIT else "ngspice with ideal op-amps"
     return f"; at {'; '.join(wrong)} {name} is not shown to have the nominal board's n-p-q"
 
 
-def _place(said: Mapping[str, Any]) -> str:
-    b = f", b = {said['b']:g}" if "b" in said else ""  # trades before they said b
-    return f"ω = {said['omega']:g}{b}"
+def _response(row: Mapping[str, Any]) -> str:
+    b = f", b = {row['b']:g}" if "b" in row else ""  # earlier trades have no b
+    return f"ω = {row['omega']:g}{b}"

@@ -29,8 +29,8 @@ from designer.jobs.origin import provenance
 from designer.jobs.rung_choice import LEAST, SEARCH
 from designer.jobs.search_stage import RULES as RULES, searched_into
 from designer.jobs.study_folder import FolderStores
-from designer.jobs.study_job import RANDOM, run_into
-from designer.jobs.study_stage import SPICE_TIMEOUT, StudyHelp, study_of
+from designer.jobs.study_job import run_into
+from designer.jobs.study_stage import RANDOM, SPICE_TIMEOUT, StudyHelp, study_of
 from designer.model.model_file import ModelFile
 from designer.spice import numerics_gate
 from designer.spice.batch_backend import program_version

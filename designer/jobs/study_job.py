@@ -25,6 +25,8 @@ from designer.jobs.options import Options, given
 from designer.jobs.stage_runner import StageRunner
 from designer.jobs.study_folder import merged
 from designer.jobs.study_stage import (
+    BUILT,
+    RANDOM,
     Place,
     Shown,
     StudyHelp,
@@ -41,8 +43,6 @@ from designer.spread.part_rules import spread_of
 from designer.yields.study_layers import RungName
 from designer.yields.yield_maps import Over
 
-RANDOM, BUILT = Place(), Place("measured", "measured/")
-"""Of the study of random boards, and of that of the boards in a list."""
 THE_BOARD = "board"
 """Name of the only board of a list that names none."""
 
@@ -229,8 +229,7 @@ def run_into(
     census = len(labels) == options.samples
     stages = RANDOM.stages(inputs, options, len(modelfile.responses), census=census)
     if not runner.decide(stages):
-        answer = RANDOM.answer(folder)
-        return JobOutcome(answer, satisfied(answer), out, reused=True)
+        return _outcome(folder, RANDOM, reused=True)
     began = time.perf_counter()
     with StudyHelp.of(options, progress) as help_:
         made = runner.design()
@@ -244,8 +243,7 @@ def run_into(
                 kicad_files.settle(folder, made, first)
 
         result = stage.work(help_, time.perf_counter() - began, checked)
-    answer = RANDOM.answer(folder)
-    return JobOutcome(answer, satisfied(answer), out, made=made, result=result, shown=stage.early)
+    return _outcome(folder, RANDOM, made=made, result=result, shown=stage.early)
 
 
 def measured_into(
@@ -293,12 +291,16 @@ def measured_into(
     list_file = BUILT.prefix + MEASURED
     stages[BUILT.stage][1].append(list_file)
     if not folder.decide(stages, overwrite=options.overwrite, resume=options.resume):
-        answer = BUILT.answer(folder)
-        return JobOutcome(answer, satisfied(answer), path, True)
+        return _outcome(folder, BUILT, made=made, reused=True)
     with StudyHelp.of(options, progress) as help_:
         folder.begin(stages)
         folder.write(list_file, boards.content)
         stage = StudyStage(folder, BUILT, made, options, command(options), progress, shown)
         result = stage.work(help_)
-    answer = BUILT.answer(folder)
-    return JobOutcome(answer, satisfied(answer), path, made=made, result=result, shown=stage.early)
+    return _outcome(folder, BUILT, made=made, result=result, shown=stage.early)
+
+
+def _outcome(folder: Folder, place: Place, **more: Any) -> JobOutcome:
+    """What stands in the folder."""
+    answer = place.answer(folder)
+    return JobOutcome(answer, satisfied(answer), folder.path, place=place, **more)

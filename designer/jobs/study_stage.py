@@ -92,6 +92,10 @@ class Place:
         return Kept(folder / (self.prefix + name), write, note, vouch)
 
 
+RANDOM, BUILT = Place(), Place("measured", "measured/")
+"""Of the study of random boards, and of that of the boards in a list."""
+
+
 @dataclass(frozen=True)
 class StudyHelp:
     """Who computes a study."""
@@ -262,20 +266,21 @@ def study_of(
     )
 
 
-def read_study(folder: Path, made: Synthesis) -> Study:
-    """The study of random boards in a folder, as the exact circuit has it: every board and its
-    verdict, without the further layers.
+def read_study(path: Path, made: Synthesis, place: Place) -> Study:
+    """The study at a place of a folder, as the exact circuit has it: every board and its verdict,
+    without the further layers.
 
     Raises
     ------
     InputError : there is no finished one.
     """
-    place = Folder(folder)
-    stage = None if place.manifest is None else place.manifest.stages.get("study")
+    folder = Folder(path)
+    stage = None if folder.manifest is None else folder.manifest.stages.get(place.stage)
     if stage is None or not stage.complete:
-        raise InputError(folder, "stages.study", MISSING, "a finished study (designer tolerance)")
-    samples = place.json(TOLERANCE)["samples"]
-    stores = FolderStores(folder, lambda: None, vouch=place.vouches)
+        expected = "a finished study (designer tolerance)"
+        raise InputError(path, f"stages.{place.stage}", MISSING, expected)
+    samples = folder.json(place.prefix + TOLERANCE)["samples"]
+    stores = FolderStores(path, lambda: None, prefix=place.prefix, vouch=folder.vouches)
     options = Options(stage.inputs["seed"], samples=samples, rung="exact", blamed=False)
     help_ = StudyHelp(options.workers, None, Here(options.workers))
     return study_of(made, options, help_, check(made, None), stores)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import designer
 from designer.cli import entry
 from designer.jobs.design_source import read_design
 from designer.jobs.folder_numbers import of_study
@@ -105,6 +106,11 @@ def test_all_the_boards_there_are_have_no_interval(
     assert "all 3" in said
     assert "=B02" in said
     assert "All 3 boards" in said
+    outcome = designer.tolerance(studied, measured=listed)
+    assert outcome.reused
+    assert list(outcome.boards().board) == [*GOOD, BAD]
+    assert list(outcome.boards().verdict) == ["ok", "ok", "lost"]
+    assert len(designer.tolerance(studied).boards()) == 4
 
 
 def test_another_list_is_other_boards(
