@@ -86,62 +86,53 @@ def coefficient_errors(
     ArithmeticError : a coefficient has the wrong sign, so no scale makes it right; or an op-amp
         clips or a diode switches inside the clearance, so its stiffness is not one number.
     """
-    board = nominal_board(circuit, ideal=True) if board is None else board
-    reduction = Reduction(circuit, board)
-    system = reduction.system()
-    open_mode = system.mode(system.start)
-    zone = _dead_zone(reduction) if circuit.stops else None
-    A_lin = open_mode.A if zone is None else zone.A
+    reduction = Reduction(circuit, board or nominal_board(circuit, ideal=True))
+    rest = reduction.system().mode(circuit.rest)
+    dead_zone = _dead_zone(reduction) if circuit.stops else None
+    realised = rest.A if dead_zone is None else dead_zone.A
     wanted = model.state_matrix()
     n = len(wanted)
-    rows, targets, names = [], [], []
-
-    def add(name: str, i: int, j: int, realised: float, want: float) -> None:
-        # ln realised + ln seconds + ln volts_j - ln volts_i - ln wanted
-        row = np.zeros(1 + n)
-        row[0] = 1.0
-        row[1 + j] += 1.0
-        row[1 + i] -= 1.0
-        rows.append(row)
-        ratio = realised / want
-        targets.append(np.log(ratio) if ratio > 0.0 else np.inf)
-        names.append(name)
-
-    for i in range(n):
-        for j in range(n):
-            if wanted[i, j] != 0.0:
-                add(f"{_equation(i)} {_state(j)}", i, j, A_lin[i, j], wanted[i, j])
-    if zone is not None:
+    pairs = {
+        f"{_state(i)}' {_state(j)}": (i, j, realised[i, j], wanted[i, j])
+        for i, j in np.argwhere(wanted != 0.0).tolist()
+    }
+    if dead_zone is not None:
         stop = model.clearances[0]
-        for name, slope in zone.slopes.items():
-            add(name, 1, 0, slope, -stop.stiffness / model.mass[stop.mass])
-    h, D = np.array(targets), np.array(rows)
+        stiffness = -stop.stiffness / model.mass[stop.mass]
+        pairs |= {name: (1, 0, slope, stiffness) for name, slope in dead_zone.slopes.items()}
+    # The error is ln realised + ln seconds + ln volts_j - ln volts_i - ln wanted.
+    h, D = np.zeros(len(pairs)), np.zeros((len(pairs), 1 + n))
+    for row, (i, j, value, want) in enumerate(pairs.values()):
+        h[row] = np.log(value / want) if value / want > 0.0 else np.inf
+        D[row, 0] = 1.0
+        D[row, 1 + j] += 1.0
+        D[row, 1 + i] -= 1.0
     if not np.all(np.isfinite(h)):
-        wrong = [name for name, value in zip(names, h, strict=True) if not np.isfinite(value)]
+        wrong = [name for name, value in zip(pairs, h, strict=True) if not np.isfinite(value)]
         raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
-    free = minimax(h, D[:, [0, *range(2, 1 + n)]])  # volts of x1 is the amplitude, set below
-    residual = h + D[:, [0, *range(2, 1 + n)]] @ free
-    errors = dict(zip(names, (float(e) for e in residual), strict=True))
+    D = D[:, [0, *range(2, 1 + n)]]  # volts of x1 is the amplitude, set below
+    free = minimax(h, D)
+    errors = dict(zip(pairs, (h + D @ free).tolist(), strict=True))
     relative = np.exp(np.concatenate([[0.0], free[1:]]))
     amplitude = 1.0
     if swing is not None:
         amplitude = swing[0] / float((swing[1] * relative).max())
-    thresholds = {1: float("nan"), -1: float("nan")}
-    if zone is not None:
-        thresholds |= zone.thresholds
-        amplitude = next(iter(zone.thresholds.values())) / model.clearances[0].gap
+    thresholds: dict[int, float] = {}
+    if dead_zone is not None:
+        thresholds = dead_zone.thresholds
+        amplitude = next(iter(thresholds.values())) / model.clearances[0].gap
         mu = model.clearances[0].stiffness / -wanted[1, 0] / model.mass[0]
-        errors["dead-zone null"] = float(mu * zone.null)
-        if len(zone.thresholds) == 1:
-            errors["dead-zone bias"] = zone.bias
-    upper, lower = thresholds[1], thresholds[-1]
+        errors["dead-zone null"] = float(mu * dead_zone.null)
+        if len(thresholds) == 1:
+            errors["dead-zone bias"] = dead_zone.bias
+    lower = thresholds.get(-1, float("nan"))
     scales = Scales(
         seconds=float(np.exp(free[0])),
         volts=amplitude * relative,
-        threshold=upper if np.isfinite(upper) else lower,
+        threshold=thresholds.get(1, lower),
         threshold_lower=lower,
     )
-    drive = -open_mode.B * scales.seconds / scales.volts
+    drive = -rest.B * scales.seconds / scales.volts
     return CoefficientErrors(
         errors=errors,
         max_error=max(abs(e) for e in errors.values()),
@@ -151,7 +142,7 @@ def coefficient_errors(
 
 
 @dataclass(frozen=True)
-class _Zone:
+class _DeadZone:
     """A : the state matrix without the stop. slopes : the stop's entry in A, by error name.
 
     null : ln of the null's gain ratio, at the side where it is worst. bias : constant force inside
@@ -165,7 +156,7 @@ class _Zone:
     thresholds: dict[int, float]
 
 
-def _dead_zone(reduction: Reduction) -> _Zone:
+def _dead_zone(reduction: Reduction) -> _DeadZone:
     c = reduction.circuit
     stop = c.stops[0]
     system = reduction.system()
@@ -191,11 +182,11 @@ def _dead_zone(reduction: Reduction) -> _Zone:
             bias = force / abs(float(A[row, state]) * threshold)
         thresholds[side] = threshold
         nulls.append(float(np.log1p(-flat / steep)))
-        name = {1: "upper stop slope", -1: "lower stop slope"}[side]
+        name = "upper stop slope" if side > 0 else "lower stop slope"
         if stop.shared or len(stop.contacts) == 1:
             name = "stop slope"
         slopes.setdefault(name, float(steep * per_gain[row, state]))
-    return _Zone(A, slopes, max(nulls, key=abs), bias, thresholds)
+    return _DeadZone(A, slopes, max(nulls, key=abs), bias, thresholds)
 
 
 def _stays_linear(reduction: Reduction, state: int, end: float, ends: str) -> None:
@@ -209,10 +200,5 @@ def _stays_linear(reduction: Reduction, state: int, end: float, ends: str) -> No
             raise CutShort(f"{switch} changes inside the clearance, before v1 = {end:.4g} V")
 
 
-def _state(j: int) -> str:
-    return f"x{j // 2 + 1}" + ("'" if j % 2 else "")
-
-
-def _equation(i: int) -> str:
-    """The left-hand side of state equation i."""
-    return f"x{i // 2 + 1}''" if i % 2 else f"x{i // 2 + 1}'"
+def _state(i: int) -> str:
+    return f"x{i // 2 + 1}" + ("'" if i % 2 else "")

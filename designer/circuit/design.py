@@ -101,8 +101,8 @@ class Design:
     @property
     def distinct_values(self) -> int:
         """How many different values the resistors and capacitors have."""
-        kinds = {(r.value, "R") for r in self.circuit.resistors}
-        return len(kinds | {(c.value, "C") for c in self.circuit.capacitors})
+        resistors, capacitors = self.circuit.resistors, self.circuit.capacitors
+        return len({r.value for r in resistors}) + len({c.value for c in capacitors})
 
     def amplitude(self, b: float | None = None) -> float:
         """Generator amplitude [V peak] that makes the clearance ``b`` (default: the model's)."""
@@ -149,10 +149,10 @@ class GeneratorSetting:
     """DC offset [V]."""
 
 
-def settings(design: Design, found: Sequence[ModelResponse]) -> tuple[GeneratorSetting, ...]:
+def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[GeneratorSetting, ...]:
     """The generator's settings, in the order of the responses."""
     scales = design.errors.scales
     return tuple(
         GeneratorSetting(r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b))
-        for r in found
+        for r in responses
     )

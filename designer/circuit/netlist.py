@@ -256,9 +256,9 @@ class Circuit:
         for wanted, parts in ((True, self.parts), (False, self.fittings)):
             lost = [p.name for p in parts if (View.SIMULATION in p.views) is not wanted]
             if lost:
-                place = "parts" if wanted else "fittings"
-                said = "simulated parts" if wanted else "parts that are not simulated"
-                raise InputError(None, f"circuit.{place}", ", ".join(lost), said)
+                field_ = "circuit.parts" if wanted else "circuit.fittings"
+                expected = "simulated parts" if wanted else "parts that are not simulated"
+                raise InputError(None, field_, ", ".join(lost), expected)
 
     def view(self, view: View) -> tuple[Fitting, ...]:
         """The parts that stand in a view, simulated ones first."""
@@ -335,8 +335,8 @@ class Circuit:
     @property
     def nets(self) -> tuple[str, ...]:
         """Every net but ground, sorted."""
-        found = {self.generator.net}.union(*(p.nets for p in self.parts))
-        return tuple(sorted(found - {GROUND}))
+        nets = {self.generator.net}.union(*(p.nets for p in self.parts))
+        return tuple(sorted(nets - {GROUND}))
 
     @property
     def values(self) -> dict[str, float]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from designer.catalog.entries import OpAmp
-from designer.circuit.netlist import Circuit, Contact, Part, Section, Stop
+from designer.circuit.netlist import Circuit, Contact, Section
 
 QUAD = "ABCD"
 """Sections of the packages that the paper's names speak of."""
@@ -27,8 +27,14 @@ def packed(circuit: Circuit, opamp: OpAmp) -> Circuit:
         return circuit
     return replace(
         circuit,
-        parts=tuple(_renamed(part, names) for part in circuit.parts),
-        stops=tuple(_switched(stop, names) for stop in circuit.stops),
+        parts=tuple(
+            replace(part, name=names[part.name]) if isinstance(part, Section) else part
+            for part in circuit.parts
+        ),
+        stops=tuple(
+            replace(stop, upper=_moved(stop.upper, names), lower=_moved(stop.lower, names))
+            for stop in circuit.stops
+        ),
     )
 
 
@@ -71,14 +77,6 @@ def _related(circuit: Circuit) -> Iterator[list[str]]:
 
 def _chunks(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
     return (names[i : i + size] for i in range(0, len(names), size))
-
-
-def _renamed(part: Part, names: Mapping[str, str]) -> Part:
-    return replace(part, name=names[part.name]) if isinstance(part, Section) else part
-
-
-def _switched(stop: Stop, names: Mapping[str, str]) -> Stop:
-    return replace(stop, upper=_moved(stop.upper, names), lower=_moved(stop.lower, names))
 
 
 def _moved(contact: Contact | None, names: Mapping[str, str]) -> Contact | None:

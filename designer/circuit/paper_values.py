@@ -15,7 +15,6 @@ of 1.28 V and f = 357.419 ω. Where the print is inconsistent or silent:
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -85,18 +84,8 @@ class ComparedCircuit:
 def is_the_papers(model: Dimensionless) -> bool:
     """Whether the model is the paper's case, up to the rounding of a conversion from SI."""
     numbers = ("m", "k", "k0", "c", "zeta", "f20", "b")
-    near = all(
-        math.isclose(getattr(model, n), getattr(MODEL, n), rel_tol=1e-9, abs_tol=1e-12)
-        for n in numbers
-    )
-    return near and model.sides == MODEL.sides
-
-
-def can_build(model: Dimensionless) -> str | None:
-    """Why the paper's circuit cannot follow this model; None where it can."""
-    if model.k0 > 0.0 and model.sides != "both":
-        return "the paper's dead zone is two-sided"
-    return None
+    own, paper = ([getattr(one, name) for name in numbers] for one in (model, MODEL))
+    return model.sides == MODEL.sides and np.allclose(own, paper, rtol=1e-9, atol=1e-12)
 
 
 def candidates(
@@ -108,8 +97,8 @@ def candidates(
     the model file's series. Another model: the paper's way, exact and rounded. All with the paper's
     op-amp, rails and limit.
     """
-    if can_build(model) is not None:
-        return ()
+    if model.k0 > 0.0 and model.sides != "both":
+        return ()  # the paper's dead zone is two-sided
     opamp = catalog.opamp(OPAMP)
     if is_the_papers(model):
         exact, name = corrected(), "paper, corrected"

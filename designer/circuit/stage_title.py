@@ -68,6 +68,5 @@ def _owners(circuit: Circuit) -> dict[str, str]:
 def _between(circuit: Circuit, part: Fitting, sections: Mapping[str, str]) -> str:
     """The stage of a part between outputs: a diode, or what loads an output."""
     drivers = {s.output: sections[s.name] for s in circuit.sections}
-    fitted = part in circuit.fittings
-    found = [drivers[net] for net in part.nets if net in drivers]
-    return INTERFACE if fitted or not found else found[0]
+    driven = [drivers[net] for net in part.nets if net in drivers]
+    return driven[0] if driven and part not in circuit.fittings else INTERFACE

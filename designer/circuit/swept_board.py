@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -23,8 +24,12 @@ from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_o
 from designer.model.si_units import NO_UNITS
 from designer.model.swept_model import GREATEST, SMALLEST
 
-BOARD_SETTINGS = ("frequency", "omega", "amplitude", "offset")
-"""Of the generator: Hz, dimensionless by the design's time scale, V peak, V."""
+SETTINGS = {
+    "frequency": (SMALLEST, GREATEST),
+    "amplitude": (0.0, GREATEST),
+    "offset": (-GREATEST, GREATEST),
+}
+"""Of the generator, with their ranges: Hz, V peak, V."""
 UNITS = {"frequency": "Hz", "amplitude": "V", "offset": "V", "x": "V", "v": "V", "λ": "1/s"}
 """Of a board, by parameter, and of the two axes and the exponent of a diagram."""
 
@@ -37,7 +42,8 @@ class BoardSubject:
     """
 
     whose = "nominal board"
-    parameters = BOARD_SETTINGS
+    parameters = ("frequency", "omega", "amplitude", "offset")
+    """ω is the frequency by the design's time scale."""
     si: Mapping[str, Unit] = NO_UNITS
 
     def __init__(
@@ -75,13 +81,8 @@ class BoardSubject:
 
     def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""
-        out = []
-        for change in changes:
-            drive = self.excitation(change).drive
-            out.append(
-                DrivenSystem(lambda d=drive: Flow(self.system, d), drive.period)  # type: ignore[misc]
-            )
-        return out
+        drives = [self.excitation(change).drive for change in changes]
+        return [DrivenSystem(partial(Flow, self.system, d), d.period) for d in drives]
 
     def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
         """(states,) size of the states that starts are drawn from: one for all changes."""
@@ -96,12 +97,16 @@ class BoardSubject:
 
     def family(self, parameter: str) -> Family:
         """One flow for each value of a setting, the others as they stand."""
-        scales = self.design.errors.scales
+        frequency = self.design.errors.scales.frequency
         if parameter == "omega":
-            over = of_board(self.system, self.excitation({"omega": 1.0}), "frequency")
-            return Family("omega", 0.0, over.high, lambda w: over.build(scales.frequency(w)))
-        start = {"frequency": scales.frequency(1.0)} if self.frequency is None else {}
-        return of_board(self.system, self.excitation(start), parameter)
+            return Family("omega", 0.0, GREATEST, lambda w: self._flow({"frequency": frequency(w)}))
+        stand = {"frequency": frequency(1.0)} if self.frequency is None else {}
+        return Family(
+            parameter, *SETTINGS[parameter], lambda value: self._flow({**stand, parameter: value})
+        )
+
+    def _flow(self, change: Mapping[str, float]) -> Flow:
+        return Flow(self.system, self.excitation(change).drive, fast=False)
 
     def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """The generator's settings; no frequency where ω is swept."""
@@ -139,27 +144,3 @@ class BoardSubject:
             float(change.get("amplitude", self.amplitude)),
             offset=float(change.get("offset", self.offset)),
         )
-
-
-SETTINGS = {
-    "frequency": (SMALLEST, GREATEST),
-    "amplitude": (0.0, GREATEST),
-    "offset": (-GREATEST, GREATEST),
-}
-"""The same for the generator of a board: Hz, V peak, V."""
-
-
-def of_board(system: PiecewiseLinearSystem, excitation: Excitation, parameter: str) -> Family:
-    """A reduced board with one setting of its generator free: frequency, amplitude or offset.
-
-    Raises
-    ------
-    InputError : the setting is not one of them.
-    """
-    if parameter not in SETTINGS:
-        raise InputError(None, "over", parameter, f"one of {', '.join(SETTINGS)}")
-
-    def build(value: float) -> Flow:
-        return Flow(system, replace(excitation, **{parameter: value}).drive, fast=False)
-
-    return Family(parameter, *SETTINGS[parameter], build)

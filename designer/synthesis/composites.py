@@ -11,7 +11,7 @@ error that counts as none is known to be the least.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cvxpy as cp
@@ -20,6 +20,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT, CoefficientErrors
+from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.synthesis.attempt import Attempt, Order
 from designer.synthesis.milp import SOLVER
@@ -70,7 +71,7 @@ class PairProgram:
     changes: Mapping[str, Array]
     """(m, pairs) by resistor, what each of its pairs does to the errors."""
     curved: frozenset[str]
-    """Resistors whose effect is no product of powers (a loaded divider): of them at most one may
+    """Resistors whose effect is no product of powers (a loaded divider): at most one of them may
     change, or the sum would not hold."""
 
 
@@ -82,7 +83,14 @@ def improve(order: Order, made: Attempt) -> Attempt | None:
     known = matching_resistors(made.circuit)
     names = known if asked is True else [n for n in known if n in (asked or ())]
     tied = {name for group in order.spec.matched for name in group}
-    program = program_of(order, made, [n for n in names if n not in tied])
+    # Of the states' peaks the largest [V] sets the amplitude of a circuit without stops.
+    swing = float((made.errors.scales.volts * order.peaks.states).max())
+
+    def errors_of(circuit: Circuit) -> CoefficientErrors:
+        return order.errors(circuit, swing)
+
+    singles = [name for name in names if name not in tied]
+    program = _program(order, made, singles, lambda c: _without_scales(errors_of(c))[0])
     chosen = best(program, frozenset(made.circuit.values.values()) | set(order.spec.preferred))
     if not chosen:
         return None
@@ -91,25 +99,22 @@ def improve(order: Order, made: Attempt) -> Attempt | None:
         values |= {f"{name}A": pair.a, f"{name}B": pair.b}
     kinds: dict[str, Composite] = {name: pair.kind for name, pair in chosen.items()}
     circuit = order.build(values, kinds)
-    errors = order.errors(circuit, swing_of(order, made))
+    errors = errors_of(circuit)
     if errors.max_error >= made.errors.max_error - EXACT:
         return None
     return replace(made, values=values, circuit=circuit, errors=errors)
 
 
-def swing_of(order: Order, made: Attempt) -> float:
-    """Voltage [V] of the largest of the states' peaks: the amplitude of a circuit without stops."""
-    return float((made.errors.scales.volts * order.peaks.states).max())
-
-
-def program_of(order: Order, made: Attempt, names: Sequence[str]) -> PairProgram:
+def _program(
+    order: Order, made: Attempt, names: Sequence[str], error_of: Callable[[Circuit], Array]
+) -> PairProgram:
     """The errors near this attempt as functions of these resistors."""
-    h, D = _free(made.errors)
+    h, D = _without_scales(made.errors)
     half = REACH * made.errors.max_error
 
     def change(name: str, by: float) -> Array:
-        moved = order.build(made.values | {name: made.values[name] * float(np.exp(by))})
-        return _free(order.errors(moved, swing_of(order, made)))[0] - h
+        moved = made.values | {name: made.values[name] * float(np.exp(by))}
+        return error_of(order.build(moved)) - h
 
     tables, changes, curved = {}, {}, set()
     for number, name in enumerate(names, start=1):
@@ -148,27 +153,22 @@ def pairs_near(resistors: Array, wanted: float, half: float) -> tuple[Pair, ...]
     return tuple(Pair(kinds[k // n], float(a[k % n]), float(b[k % n])) for k in ordered)
 
 
-def _free(errors: CoefficientErrors) -> tuple[Array, Array]:
+def _without_scales(errors: CoefficientErrors) -> tuple[Array, Array]:
     """The errors (m,) with all scales taken out, and how they depend on the scales (m, n)."""
     volts = errors.scales.volts
     logs = np.log(np.concatenate([[errors.scales.seconds], volts]))
-    rows = []
-    for name in errors.errors:
-        row = np.zeros(len(logs))
-        if name.endswith("stop slope"):
-            equation, state = 1, 0
-        elif name.startswith("dead-zone"):
-            rows.append(row)
+    D = np.zeros((len(errors.errors), len(logs)))
+    for row, name in zip(D, errors.errors, strict=True):
+        equation, state = 1, 0
+        if name.startswith("dead-zone"):
             continue
-        else:
+        if not name.endswith("stop slope"):
             left, right = name.split(" ")
             equation = 2 * int(left[1]) - 2 + (left.endswith("''"))
             state = 2 * int(right[1]) - 2 + right.endswith("'")
         row[0] = 1.0
         row[1 + state] += 1.0
         row[1 + equation] -= 1.0
-        rows.append(row)
-    D = np.array(rows)
     h = np.array(list(errors.errors.values())) - D @ logs
     return h, D[:, [0, *range(2, len(logs))]]
 
@@ -246,11 +246,10 @@ class _Model:
         return self._chosen() if self._solve(cp.sum(self.new), limits) else known
 
     def _chosen(self) -> dict[str, Pair]:
-        out = {}
-        for n, z in self.z.items():
-            if z.value is not None and z.value.max() > 0.5:
-                out[n] = self.program.tables[n][int(np.argmax(z.value))]
-        return out
+        rows = {n: z.value for n, z in self.z.items() if z.value is not None}
+        return {
+            n: self.program.tables[n][int(np.argmax(x))] for n, x in rows.items() if x.max() > 0.5
+        }
 
     def _solve(self, aim: cp.Expression, limits: Sequence[cp.Constraint]) -> bool:
         """Whether there is an answer; at the limit of nodes it is the best so far, or none."""
@@ -261,6 +260,5 @@ class _Model:
         if problem.status not in (cp.OPTIMAL, cp.USER_LIMIT):
             return False
         # Without an incumbent HiGHS leaves nothing, or variables that are no choice.
-        whole = [z.value is not None and np.abs(z.value - z.value.round()).max() < 1e-6
-                 for z in self.z.values()]  # fmt: skip
-        return all(whole)
+        values = [z.value for z in self.z.values()]
+        return all(x is not None and np.abs(x - x.round()).max() < 1e-6 for x in values)

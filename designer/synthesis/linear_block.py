@@ -218,22 +218,19 @@ def _equal_parts(groups: Sequence[Sequence[str]]) -> Mask:
 
 
 @dataclass(frozen=True)
-class Slice:
-    """Rows that were joined from one stretch of the outermost tables."""
+class _Slice:
+    """Rows joined from one stretch of the outermost tables: (k, 7) indices by ascending error,
+    their (k,) errors, where the next slice begins, the steps of the loops, and whether rows of this
+    one are missing."""
 
     rows: Index
-    """(k, 7) indices, by ascending error."""
     errors: Array
-    """(k,) error of each row."""
     following: int
-    """Where the next slice begins."""
     steps: int
-    """Steps of the loops."""
     cut: bool
-    """Whether rows of this one are missing."""
 
 
-def slice_from(values: Values, rules: Rules, level: float, start: int, patience: int) -> Slice:
+def slice_from(values: Values, rules: Rules, level: float, start: int, patience: int) -> _Slice:
     """Join on from a pair of the outermost tables until a slice is full."""
     room, steps = SLICE, 0
     while True:
@@ -247,4 +244,4 @@ def slice_from(values: Values, rules: Rules, level: float, start: int, patience:
         room *= 4  # one pair alone fills the slice
     order = np.argsort(errors[:count], kind="stable")
     stuck = following == start
-    return Slice(rows[order], errors[order], following + stuck, steps, stuck)
+    return _Slice(rows[order], errors[order], following + stuck, steps, stuck)

@@ -228,7 +228,7 @@ def _thinned(found: _Levels, question: _Question) -> _Levels:
 
 
 def _what_binds(found: _Levels, question: _Question, resistors: Array) -> str:
-    """What leaves no choice: the first wish or condition without which there is one."""
+    """What leaves no choice: the first preference or condition without which there is one."""
     for name, relaxed in _relaxations(question, resistors):
         with part(f"without {name}"):
             again = _levels(relaxed, MOST_STEPS // 8)

@@ -12,7 +12,7 @@ paper's case agree to 2e-7 of the peak, corners at a contact included; the bound
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,21 +95,18 @@ class Loads:
 
     def of(self, section: str) -> Load:
         """The load of one section; KeyError where there is none."""
-        for load in self.sections:
-            if load.section == section:
-                return load
-        raise KeyError(section)
+        return {load.section: load for load in self.sections}[section]
 
 
-def design_loads(design: Design, reduction: Reduction, found: Sequence[ModelResponse]) -> Loads:
+def design_loads(design: Design, reduction: Reduction, responses: Sequence[ModelResponse]) -> Loads:
     """Loads of a design over its wanted responses and their starts from rest.
 
     reduction : of the board that is asked about, usually ``nominal.nominal_reduction(design)``.
     """
     system = reduction.system()
-    drives = [circuit_flow(system, design, r).drive for r in found]
-    orbits = [on_circuit(system, design, r) for r in found]
-    return over(reduction, *runs([r.omega for r in found], drives, orbits))
+    drives = [circuit_flow(system, design, r).drive for r in responses]
+    orbits = [on_circuit(system, design, r) for r in responses]
+    return over(reduction, *runs([r.omega for r in responses], drives, orbits))
 
 
 def runs(
@@ -121,12 +118,12 @@ def runs(
         same = sum(w == omega for w in omegas[:number])
         name = f"{omega:g}" + (f" ({same + 1})" if same else "")
         states = len(orbit.start)
-        if states:
-            settled = orbit.status in COUNTED
-            out.append(Run(name, drive, orbit.start, orbit.n if settled else UNSETTLED))
-            out.append(Run(f"{name} from rest", drive, np.zeros(states), REST))
-        else:
+        if not states:
             left_out[name] = orbit.reason or str(orbit.status)
+            continue
+        periods = orbit.n if orbit.status in COUNTED else UNSETTLED
+        out.append(Run(name, drive, orbit.start, periods))
+        out.append(Run(f"{name} from rest", drive, np.zeros(states), REST))
     return out, left_out
 
 
@@ -135,24 +132,21 @@ def over(
 ) -> Loads:
     """Loads over these runs; a run that does not come to its end is left out, with the reason."""
     missing = dict(left_out or {})
-    sections = [s.name for s in reduction.circuit.sections]
     best: dict[tuple[str, str], tuple[float, str]] = {}
     for run in wanted:
         try:
-            found = Sampled(reduction, run).extremes()
+            extremes = Sampled(reduction, run).extremes()
         except ArithmeticError as error:
             missing[run.name] = str(error)
             continue
-        for key, value in found.items():
+        for key, value in extremes.items():
             if key not in best or value > best[key][0]:
                 best[key] = (value, run.name)
-    if not best:
-        return Loads((), missing)
     loads = []
-    for name in sections:
-        (low, a), (high, b) = best[name, "low"], best[name, "high"]
-        current, c = max(best[name, "source"], best[name, "sink"])
-        loads.append(Load(name, -low, high, current, a, b, c))
+    for name in [s.name for s in reduction.circuit.sections] if best else []:
+        (low, low_in), (high, high_in) = best[name, "low"], best[name, "high"]
+        current, current_in = max(best[name, "source"], best[name, "sink"])
+        loads.append(Load(name, -low, high, current, low_in, high_in, current_in))
     return Loads(tuple(loads), missing)
 
 
@@ -171,40 +165,46 @@ class Sampled:
         while needed > points:  # a finer look may meet a mode that a coarse one misses
             points = needed
             self._strobe(points)
-            fastest = max(run.drive.omega, *(_fastest(self.system.mode(k)) for k in self._held()))
+            # Modes that hold at a strobe: not those that are only crossed in an instant.
+            modes = [self.system.mode(self.keys[int(i)]) for i in np.unique(self.at)]
+            rates = [float(np.abs(np.linalg.eigvals(mode.A)).max()) for mode in modes]
+            fastest = max(run.drive.omega, *rates)
             needed = min(int(np.ceil(run.drive.period * fastest / RESOLUTION)), MOST_POINTS)
-
-    def _held(self) -> list[ModeKey]:
-        """Modes that hold at a strobe: not those that are only crossed in an instant."""
-        return [self.keys[int(i)] for i in np.unique(self.at)]
 
     def extremes(self) -> dict[tuple[str, str], float]:
         """By section: -lowest and highest voltage, largest current out of and into the output."""
-        quantities: dict[tuple[str, str], tuple[str, str, float]] = {}
-        for s in self.reduction.circuit.sections:
-            quantities[s.name, "low"] = ("voltage", s.output, -1.0)
-            quantities[s.name, "high"] = ("voltage", s.output, 1.0)
-            quantities[s.name, "source"] = ("output", s.name, 1.0)
-            quantities[s.name, "sink"] = ("output", s.name, -1.0)
-        names = list(quantities)
-        table = self._table(list(quantities.values()))
-        values = table(self.x, self.u, self.at)
+        names = [
+            (s.name, quantity)
+            for s in self.reduction.circuit.sections
+            for quantity in ("low", "high", "source", "sink")
+        ]
+        values = self._outputs(self.x, self.u, self.at)
         which, left, right = _brackets(values)
-        best = values.max(axis=0)
+        best, row = values.max(axis=0), np.arange(len(which))
         for _ in range(ROUNDS):
             time = left[:, None] + (right - left)[:, None] * np.linspace(0.0, 1.0, BRACKET + 1)
             x, u = self._between(time.ravel())
-            at = modes_at(self.system, x, u, self.keys)
-            fine = table(x, u, at).reshape(len(which), BRACKET + 1, -1)
-            own = fine[np.arange(len(which)), :, which]
+            fine = self._outputs(x, u, modes_at(self.system, x, u, self.keys))
+            own = fine.reshape(len(which), BRACKET + 1, -1)[row, :, which]
             np.maximum.at(best, which, own.max(axis=1))
             peak = own.argmax(axis=1)
-            row = np.arange(len(which))
-            left, right = (
-                time[row, np.maximum(peak - 1, 0)],
-                time[row, np.minimum(peak + 1, BRACKET)],
-            )
+            left = time[row, np.maximum(peak - 1, 0)]
+            right = time[row, np.minimum(peak + 1, BRACKET)]
         return {name: float(value) for name, value in zip(names, best, strict=True)}
+
+    def _outputs(self, x: Array, u: Array, at: Index) -> Array:
+        """(k, 4 sections) -voltage, voltage, current and -current of each section's output at
+        states (k, n), drives (k,) and modes (k,)."""
+        sections = self.reduction.circuit.sections
+        out = np.empty((len(x), 4 * len(sections)))
+        for i, key in enumerate(self.keys):
+            here = at == i
+            if here.any():
+                solved = self.reduction.solution(key)
+                pairs = [(solved.voltage[s.output], solved.output[s.name]) for s in sections]
+                rows = np.array([row for v, c in pairs for row in (-1.0 * v, v, c, -1.0 * c)])
+                out[here] = x[here] @ rows[:, :-2].T + np.outer(u[here], rows[:, -2]) + rows[:, -1]
+        return out
 
     def _strobe(self, points: int) -> None:
         """x (k, n) and u (k,) on strobes, their modes, and the derivatives (k, n) there."""
@@ -239,33 +239,6 @@ class Sampled:
         )
         return cubic, self._drive(self.step * steps)
 
-    def _table(
-        self, quantities: list[tuple[str, str, float]]
-    ) -> Callable[[Array, Array, Index], Array]:
-        """(k, quantities) values of these rows of the solutions at states, drives and modes."""
-
-        def values(x: Array, u: Array, at: Index) -> Array:
-            out = np.empty((len(x), len(quantities)))
-            for i, key in enumerate(self.keys):
-                here = at == i
-                if not here.any():
-                    continue
-                solved = self.reduction.solution(key)
-                rows = np.array(
-                    [
-                        sign * (solved.voltage if kind == "voltage" else solved.output)[name]
-                        for kind, name, sign in quantities
-                    ]
-                )
-                out[here] = x[here] @ rows[:, :-2].T + np.outer(u[here], rows[:, -2]) + rows[:, -1]
-            return out
-
-        return values
-
-
-def _fastest(mode: Mode) -> float:
-    return float(np.abs(np.linalg.eigvals(mode.A)).max())
-
 
 def _brackets(values: Array) -> tuple[Index, Array, Array]:
     """Where a quantity (columns) may have its largest value: column, left and right strobe."""
@@ -292,11 +265,17 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
     ArithmeticError : somewhere no mode holds.
     """
     at = np.zeros(len(x), dtype=np.intp)
-    open_points = np.arange(len(x))
+    unsettled = np.arange(len(x))
+
+    def number(key: ModeKey) -> int:
+        if key not in keys:
+            keys.append(key)
+        return keys.index(key)
+
     for _ in range(WALK):
         moved = []
-        for i in np.unique(at[open_points]):
-            here = open_points[at[open_points] == i]
+        for i in np.unique(at[unsettled]):
+            here = unsettled[at[unsettled] == i]
             mode = system.mode(keys[int(i)])
             if not mode.guards:
                 continue
@@ -304,20 +283,14 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
             worst = value.argmax(axis=1)
             leaving = value[np.arange(len(here)), worst] > 0.0
             for g in np.unique(worst[leaving]):
-                target = mode.guards[int(g)].target
-                if target not in keys:
-                    keys.append(target)
                 go = here[leaving & (worst == g)]
-                at[go] = keys.index(target)
+                at[go] = number(mode.guards[int(g)].target)
                 moved.append(go)
         if not moved:
             return at
-        open_points = np.concatenate(moved)
-    for i in open_points:
-        key = system.mode_at(x[i], float(u[i]))
-        if key not in keys:
-            keys.append(key)
-        at[i] = keys.index(key)
+        unsettled = np.concatenate(moved)
+    for i in unsettled:
+        at[i] = number(system.mode_at(x[i], float(u[i])))
     return at
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from designer.catalog.entries import OpAmp
 from designer.circuit.dead_zone_parts import idle_limits
 from designer.circuit.design import ConditionCheck, Design
-from designer.circuit.netlist import Circuit, Section
-from designer.circuit.noise_gains import SectionStage, stages
+from designer.circuit.netlist import Circuit
+from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
 from designer.model.find_responses import Peaks
 from designer.synthesis.limits import (
@@ -31,78 +31,71 @@ from designer.synthesis.output_loads import Load, Loads
 
 def verify(
     design: Design,
-    kept: frozenset[str],
+    conditions: frozenset[str],
     opamp: OpAmp,
     peaks: Peaks,
     amplitudes: Sequence[float],
     loads: Loads | None,
 ) -> tuple[ConditionCheck, ...]:
-    """The kept conditions on the finished circuit, in the order of ``SIDE_CONDITIONS``.
+    """These conditions on the finished circuit, in the order of ``SIDE_CONDITIONS``.
 
     amplitudes : of the generator, one for each response [V peak]. loads : peak voltages and
     currents of the sections; None where no response was wanted, and then only the states' peaks
     count and no current is known.
     """
-    found = [
-        *_swing(design, peaks, loads),
-        *_idle(design, loads),
+    sections = () if loads is None else loads.sections
+    checks = [
+        *_swing(design, peaks, sections),
         *_level(design, opamp, peaks),
         *_stages(design, opamp, peaks),
-        *_current(opamp, loads),
-        *_resistors(design),
-        ConditionCheck(
-            "generator", "generator_peak_v", GENERATOR_PEAK, max(amplitudes, default=0.0), "VM1"
-        ),
     ]
-    return tuple(check for check in found if check.name in kept)
+    if sections:
+        most = max(sections, key=lambda load: load.current)
+        limit = guaranteed(opamp.output_current)
+        checks.append(ConditionCheck("load", "output_current_a", limit, most.current, most.section))
+    values = effective(design.circuit.values, design.composites)
+    signal = {name: value for name, value in values.items() if name in SIGNAL_RESISTORS}
+    low, high = min(signal, key=signal.__getitem__), max(signal, key=signal.__getitem__)
+    in_low, in_high = "signal_resistor_low_ohm", "signal_resistor_high_ohm"
+    amplitude = max(amplitudes, default=0.0)
+    checks += [
+        ConditionCheck("resistors", in_low, SIGNAL[0], signal[low], low, least=True),
+        ConditionCheck("resistors", in_high, SIGNAL[1], signal[high], high),
+        ConditionCheck("generator", "generator_peak_v", GENERATOR_PEAK, amplitude, "VM1"),
+    ]
+    return tuple(check for check in checks if check.name in conditions)
 
 
-def _swing(design: Design, peaks: Peaks, loads: Loads | None) -> list[ConditionCheck]:
-    limit = SWING_SHARE * design.circuit.saturation
+def _swing(design: Design, peaks: Peaks, sections: Sequence[Load]) -> list[ConditionCheck]:
+    """Outputs that stay linear against the op-amp's limit; fv of a rectifier, on its worse side,
+    against what the idle half's series diode stands (the driving section is a drop beyond fv)."""
+    circuit = design.circuit
     volts = design.errors.scales.volts * peaks.states
-    where, top = max(
-        zip(design.circuit.state_nets, volts.tolist(), strict=True), key=lambda pair: pair[1]
-    )
-    meant = saturating(design.circuit)
-    for load in _known(loads):
-        if load.section not in meant and load.peak > top:
-            where, top = load.section, load.peak
-    return [ConditionCheck("swing", "swing_v", limit, top, where)]
-
-
-def _idle(design: Design, loads: Loads | None) -> list[ConditionCheck]:
-    """fv of a rectifier against what the idle half's series diode stands, on the worse side.
-
-    The driving section's output is a drop beyond fv.
-    """
-    reach = idle_limits(design.circuit, effective(design.circuit.values, design.composites))
-    drop = {d.name: d.model.drop for d in design.circuit.diodes}
-    found = [
-        ConditionCheck(
-            "swing",
-            "rectifier_fv_v",
-            abs(limit),
-            max((load.high if limit > 0.0 else -load.low) - drop[diode], 0.0),
-            diode,
-        )
-        for load in _known(loads)
-        if load.section in reach
-        for diode, limit in [reach[load.section]]
-    ]
-    return [max(found, key=lambda check: check.excess)] if found else []
+    tops = dict(zip(circuit.state_nets, volts.tolist(), strict=True))
+    meant = saturating(circuit)
+    tops |= {load.section: load.peak for load in sections if load.section not in meant}
+    where = max(tops, key=tops.__getitem__)
+    limit = SWING_SHARE * circuit.saturation
+    checks = [ConditionCheck("swing", "swing_v", limit, tops[where], where)]
+    reach = idle_limits(circuit, effective(circuit.values, design.composites))
+    drop = {d.name: d.model.drop for d in circuit.diodes}
+    idle = []
+    for load in sections:
+        if load.section in reach:
+            diode, end = reach[load.section]
+            fv = max((load.high if end > 0.0 else -load.low) - drop[diode], 0.0)
+            idle.append(ConditionCheck("swing", "rectifier_fv_v", abs(end), fv, diode))
+    return checks + sorted(idle, key=lambda check: -check.excess)[:1]
 
 
 def saturating(circuit: Circuit) -> frozenset[str]:
     """Sections that reach their limits in contact: the stops' switches and what drives them."""
     ends = {contact.switch for stop in circuit.stops for _, contact in stop.contacts}
-    clip = [s for s in circuit.sections if s.name in ends]
-    return frozenset(s.name for s in [*clip, *_drivers(circuit, clip)])
-
-
-def _drivers(circuit: Circuit, driven: Sequence[Section]) -> list[Section]:
-    nodes = {s.inverting for s in driven}
-    feeding = {net for r in circuit.resistors if {r.a, r.b} & nodes for net in (r.a, r.b)}
-    return [s for s in circuit.sections if s.limits and s.output in feeding]
+    nodes = {s.inverting for s in circuit.sections if s.name in ends}
+    feeding = {net for r in circuit.resistors if nodes & set(r.nets) for net in r.nets}
+    return frozenset(
+        s.name for s in circuit.sections if s.name in ends or (s.limits and s.output in feeding)
+    )
 
 
 def _level(design: Design, opamp: OpAmp, peaks: Peaks) -> list[ConditionCheck]:
@@ -122,51 +115,12 @@ def _stages(design: Design, opamp: OpAmp, peaks: Peaks) -> list[ConditionCheck]:
     every = tuple(stages(design.circuit))
     frequency = peaks.fastest / (2.0 * np.pi * design.errors.scales.seconds)
     heaviest = min(every, key=lambda s: s.load)
+    slowest = max(every, key=lambda s: s.bandwidth(frequency))
     steepest = max((s for s in every if not s.integrates), key=lambda s: s.gain, default=None)
-
-    def product(stage: SectionStage) -> float:
-        return stage.bandwidth(frequency)
-
-    slowest = max(every, key=product)
-    out = [
-        ConditionCheck("load", "load_ohm", LOAD, heaviest.load, heaviest.section.name, least=True),
-        ConditionCheck(
-            "bandwidth",
-            "noise_gain_bandwidth_hz",
-            bandwidth_limit(opamp),
-            product(slowest),
-            slowest.section.name,
-        ),
-    ]
+    load, product = heaviest.load, slowest.bandwidth(frequency)
+    limit, slow = bandwidth_limit(opamp), slowest.section.name
+    checks = [ConditionCheck("load", "load_ohm", LOAD, load, heaviest.section.name, least=True)]
     if steepest is not None:
-        out.insert(
-            1,
-            ConditionCheck(
-                "noise_gain", "noise_gain", NOISE_GAIN, steepest.gain, steepest.section.name
-            ),
-        )
-    return out
-
-
-def _current(opamp: OpAmp, loads: Loads | None) -> list[ConditionCheck]:
-    if not _known(loads):
-        return []
-    most = max(_known(loads), key=lambda load: load.current)
-    limit = guaranteed(opamp.output_current)
-    return [ConditionCheck("load", "output_current_a", limit, most.current, most.section)]
-
-
-def _resistors(design: Design) -> list[ConditionCheck]:
-    values = effective(design.circuit.values, design.composites)
-    signal = {name: value for name, value in values.items() if name in SIGNAL_RESISTORS}
-    low, high = min(signal, key=signal.__getitem__), max(signal, key=signal.__getitem__)
-    return [
-        ConditionCheck(
-            "resistors", "signal_resistor_low_ohm", SIGNAL[0], signal[low], low, least=True
-        ),
-        ConditionCheck("resistors", "signal_resistor_high_ohm", SIGNAL[1], signal[high], high),
-    ]
-
-
-def _known(loads: Loads | None) -> tuple[Load, ...]:
-    return () if loads is None else loads.sections
+        gain, steep = steepest.gain, steepest.section.name
+        checks.append(ConditionCheck("noise_gain", "noise_gain", NOISE_GAIN, gain, steep))
+    return [*checks, ConditionCheck("bandwidth", "noise_gain_bandwidth_hz", limit, product, slow)]

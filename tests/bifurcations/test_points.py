@@ -17,7 +17,6 @@ from designer.bifurcations.flow_family import Family
 from designer.bifurcations.orbit_curve import Curve, Solved
 from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.bifurcations.windows import NOT_LOCATED, all_windows, outside, window, windows
-from designer.circuit import swept_board
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
@@ -408,7 +407,9 @@ def test_a_board_folds_where_its_model_does() -> None:
     circuit = case.reduction.circuit
     system = Reduction(circuit, nominal_board(circuit, ideal=True)).system()
     e = case.excitation
-    over = swept_board.of_board(system, e, "frequency")
+    over = Family(
+        "frequency", 1.0, 1e5, lambda f: Flow(system, replace(e, frequency=f).drive, fast=False)
+    )
     scale = e.frequency / 0.85
     board = trace(start(over, case.orbit, e.frequency), 0.8 * scale, 0.95 * scale)
     model = branch_of(PAPER, 0.85, "omega", 0.8, 0.95)

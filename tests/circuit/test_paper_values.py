@@ -128,4 +128,3 @@ def test_what_stands_beside_a_design() -> None:
     assert names(Dimensionless(0.5, 0.5, 0.0, 0.5, 0.1, 0.0, 0.25)) == names(other)
     one_sided = Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25, "upper")
     assert names(one_sided) == []
-    assert "two-sided" in str(paper_values.can_build(one_sided))
