@@ -28,7 +28,7 @@ from designer.spice import convergence_aids, numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
 from designer.yields import exact_rung as exact
-from designer.yields.ngspice_sampling import SLOW, Hearing, StartKind
+from designer.yields.cross_check import SLOW, CrossCheck, StartKind
 from designer.yields.study import Study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.two_engine_yield import Explanation, differences
@@ -102,7 +102,7 @@ def measure(file: ModelFile, samples: int = SAMPLES) -> tuple[list[Row], list[Di
 
 def _row(study: Study, index: int, found: Sequence[Difference]) -> Row:
     answers = {a.sample: a for a in study.answers_to(index)}
-    heard = study.heard_of(index)
+    heard = study.rows_of(index, study.cross_checks)
 
     def said(kind: StartKind) -> list[bool | None]:
         return [h.agrees(answers[h.sample]) for h in heard if h.kind is kind]
@@ -129,10 +129,14 @@ def _differences(study: Study, index: int, pool: SpicePool) -> list[Difference]:
     number = study.asked.index(index)
     question = study.plan.questions[number]
     answers = {a.sample: a for a in study.answers_to(index)}
-    heard = {h.sample: h for h in study.heard_of(index) if h.kind is StartKind.NOMINAL}
+    heard = {
+        h.sample: h for h in study.rows_of(index, study.cross_checks) if h.kind is StartKind.NOMINAL
+    }
     met = [
         d
-        for d in differences(list(answers.values()), study.heard_of(index), question)
+        for d in differences(
+            list(answers.values()), study.rows_of(index, study.cross_checks), question
+        )
         if d.kind is StartKind.NOMINAL
     ]
     peak = float(abs(question.start.extremes[0]).max())
@@ -156,7 +160,7 @@ def _differences(study: Study, index: int, pool: SpicePool) -> list[Difference]:
     return out
 
 
-def _at_finer_step(study: Study, number: int, said: Hearing, pool: SpicePool) -> str:
+def _at_finer_step(study: Study, number: int, said: CrossCheck, pool: SpicePool) -> str:
     """What ngspice says of this board, by the same way, at a step ``FINER`` times as fine."""
     question = study.plan.questions[number]
     assert question.settings is not None

@@ -34,8 +34,9 @@ from designer.dynamics.flow import Flow
 from designer.model.model_file import read_model_file
 from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread, draw
-from designer.yields import exact_rung, study_plan
-from designer.yields.layers import Here, Samples
+from designer.yields import exact_rung
+from designer.yields.layers import Here, samples_task
+from designer.yields.study import plan_study
 from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict
 
 ROOT = Path(__file__).parent.parent
@@ -104,7 +105,7 @@ def plan_of(stage: str, most: int) -> StudyPlan:
         )
         for r in made.found
     )
-    plan = study_plan.plan_study(file, made.design, [], made.catalog, samples=0, seed=SEED)
+    plan = plan_study(file, made.design, [], made.catalog, samples=0, seed=SEED)
     fine = FINE[stage]
     return replace(plan, questions=questions, spread=plan.spread if fine is None else fine)
 
@@ -133,7 +134,7 @@ def memory(plan: StudyPlan, samples: int) -> float:
 
 def _memory(plan: StudyPlan, samples: int) -> float:
     asked = replace(plan, samples=samples)
-    tasks = (Samples(asked, block) for block in asked.blocks())
+    tasks = (samples_task(asked, block) for block in asked.blocks())
     kept = [answers for _, answers in Here(cores()).run(tasks, lambda: None)]
     assert sum(len(answers) for answers in kept) == samples * len(plan.questions)
     # Not getrusage: what it tells of a new process includes the one that started it.
@@ -154,7 +155,7 @@ def measure(
             verdicts: Counter[Verdict] = Counter()
             longest = 0
             wanted = replace(asked, samples=samples)
-            tasks = (Samples(wanted, block) for block in wanted.blocks())
+            tasks = (samples_task(wanted, block) for block in wanted.blocks())
             for _, answers in Here(cores()).run(tasks, lambda: None):
                 verdicts.update(answer.verdict for answer in answers)
                 longest = max(longest, *(answer.periods for answer in answers))

@@ -23,7 +23,8 @@ from designer.spice import convergence_aids, equation_check, numerics_gate
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.yields import exact_rung, study_plan
+from designer.yields import exact_rung
+from designer.yields.study import plan_study
 
 MODEL: dict[str, Any] = {
     "m": 0.5, "k": 0.5, "k0": 0.95, "c": 0.5, "zeta": 0.1, "f20": 0.0, "b": 0.25, "sides": "both",
@@ -209,7 +210,7 @@ def _boards(
 ) -> dict[str, Any]:
     """A few boards of the spread, each from its own orbit on the exact circuit."""
     checked = checked_design.CheckedResponse(response, orbit, excitation, result)
-    plan = study_plan.plan_study(
+    plan = plan_study(
         made.modelfile, made.design, [checked], made.catalog, samples=BOARDS, seed=SEED
     )
     drawn = exact_rung.subjects(plan, range(BOARDS), 1)

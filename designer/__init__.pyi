@@ -76,9 +76,7 @@ from .model.template import (
 from .paper.paper_reports import (
     reproduce as reproduce,
 )
-from .yields.run_result import (
-    RunResult as RunResult,
-)
 from .yields.study import (
+    RunResult as RunResult,
     Study as Study,
 )

@@ -13,7 +13,7 @@ from designer.board.kicad_names import LIBRARY, POWER, footprint_name, library_n
 from designer.board.kicad_sim import Fields, fields, sources
 from designer.board.kicad_symbols import SymbolShape
 from designer.board.pins import SUPPLY_UNIT
-from designer.check.first_responses import FirstRun
+from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
 from designer.circuit.stage_title import SUPPLY, section_stages
 

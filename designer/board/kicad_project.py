@@ -18,7 +18,7 @@ from designer.board.kicad_placement import place
 from designer.board.kicad_sheet import layout, schematic, shapes, sheet_id
 from designer.board.kicad_symbols import library
 from designer.board.net_classes import net_settings
-from designer.check.first_responses import FirstRun
+from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit
 
 

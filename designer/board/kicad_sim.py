@@ -13,7 +13,7 @@ from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_names import kicad_net
 from designer.catalog import diode_curve
-from designer.check.first_responses import FirstRun
+from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.spice import opamp_model
 

@@ -26,6 +26,9 @@ from .design_search import (
     look as look,
     search as search,
 )
+from .limiting_parts import (
+    limitings as limitings,
+)
 from .memory import (
     Memory as Memory,
 )

@@ -34,10 +34,10 @@ from designer.centering.cure_milp import CureProgram, cheapest
 from designer.centering.cure_tighten import cut, shown
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
+from designer.centering.limiting_parts import limiting, together
 from designer.check.synthesis_result import Synthesis
 from designer.model.model_file import need_responses
 from designer.spread.part_rules import spread_of
-from designer.yields.limiting_parts import limiting, together
 from designer.yields.trimmed_yield import DcTrim
 from designer.yields.verdict import StudyPlan
 

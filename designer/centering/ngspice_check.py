@@ -20,8 +20,8 @@ from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
-from designer.yields.ngspice_runs import Query, confirm, way_to_rung
-from designer.yields.ngspice_sampling import survives
+from designer.yields.cross_check import survives
+from designer.yields.ngspice_runs import Query, run_queries, way_to_rung
 
 RUNG: Rung = "dynamic"
 STRETCH, LISTENED = 2.0, 16
@@ -100,8 +100,8 @@ class Listener:
             return [(len(there), 0, len(there))]
         queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]
         kept = [
-            survives(stand.spec, stand.orbit, h.response, h.either, symmetric=h.symmetric)
-            for h in confirm(self._pool, queries)
+            survives(stand.spec.completed(stand.orbit), h.response, h.either, symmetric=h.symmetric)
+            for h in run_queries(self._pool, queries)
         ]
         answers = len(kept) - kept.count(None)
         return [(len(there), kept.count(True), len(there) - answers)]

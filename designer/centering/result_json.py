@@ -13,7 +13,7 @@ from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import RUNG, STRETCH
-from designer.yields.ngspice_sampling import Hearing
+from designer.yields.cross_check import CrossCheck
 from designer.yields.verdict import Answer, Verdict
 
 Rank = tuple[float, float] | None
@@ -64,7 +64,7 @@ def search_json(found: Searched) -> dict[str, Any]:
 
 
 def confirmation_json(
-    heard: Sequence[Hearing],
+    heard: Sequence[CrossCheck],
     answers: Mapping[tuple[int, int], Answer],
     asked: Sequence[int],
     responses: int,

@@ -10,16 +10,12 @@ from .checked_design import (
 from .coexistence import (
     beside as beside,
 )
-from .deck_notes import (
-    circuit_notes as circuit_notes,
-    simulator_notes as simulator_notes,
-)
 from .deck_runs import (
-    response_runs as response_runs,
-)
-from .first_responses import (
     FirstRun as FirstRun,
+    circuit_notes as circuit_notes,
     first_run as first_run,
+    response_runs as response_runs,
+    simulator_notes as simulator_notes,
 )
 from .simulation import (
     Engine as Engine,

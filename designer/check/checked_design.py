@@ -1,8 +1,4 @@
-"""The main job, stage by stage: model file → responses → design → checked circuit → yields.
-
-Each stage takes what the one before it made and can be called alone. Nothing here writes files or
-prints; ``base.design_folder`` and the command line do.
-"""
+"""The wanted responses of a design on all three engines."""
 
 from __future__ import annotations
 
@@ -12,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from designer.catalog.catalog import Catalog
+from designer.base.arrays import Array
 from designer.check import trust
 from designer.check.trust import Trust
 from designer.circuit.design import Design
@@ -27,15 +23,11 @@ from designer.circuit.nominal import (
 )
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.model.find_responses import ModelResponse, find, peaks
-from designer.model.model_file import ModelFile
+from designer.model.find_responses import ModelResponse
 from designer.spice import numerics_gate as gate
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.spread.part_rules import check_names, spread_of
-from designer.synthesis.part_checks import check_choices, unit_circuit
-from designer.synthesis.parts_choice import synthesise
 
 
 @dataclass(frozen=True)
@@ -86,13 +78,13 @@ class CheckedResponse:
     @property
     def trust(self) -> dict[str, Trust]:
         """Of each engine's answer."""
-        said = {"model": self.model_trust, "circuit": self.circuit_trust}
-        return said if self.gate is None else {**said, "ngspice": trust.of_gate(self.gate)}
+        exact = {"model": self.model_trust, "circuit": self.circuit_trust}
+        return exact if self.gate is None else {**exact, "ngspice": trust.of_gate(self.gate)}
 
     @property
     def trusted(self) -> bool:
         """Whether every engine that was asked has an answer, and it can be trusted."""
-        return all(said.trusted is True for said in self.trust.values())
+        return all(one.trusted is True for one in self.trust.values())
 
     @property
     def agrees(self) -> bool:
@@ -107,29 +99,11 @@ class CheckedResponse:
         return len({(str(o.status), kind(o)) for o in engines}) == 1
 
 
-def design_for(modelfile: ModelFile, catalog: Catalog) -> tuple[tuple[ModelResponse, ...], Design]:
-    """Find the wanted responses on the model and choose the parts.
-
-    Raises
-    ------
-    InputError, Unreachable : see ``find_responses.find`` and ``parts_choice.synthesise``.
-    """
-    check_choices(modelfile.model, modelfile.circuit, catalog)
-    circuit = unit_circuit(modelfile.model, modelfile.circuit, catalog)
-    check_names(modelfile, circuit, catalog)
-    found = find(modelfile.model, modelfile.responses)
-    design = synthesise(
-        modelfile.model, modelfile.circuit, catalog, peaks(modelfile.model, found), found
-    )
-    spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
-    return found, design
-
-
 def check(
     design: Design,
     found: Sequence[ModelResponse],
     pool: SpicePool | None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], object] = lambda _: None,
     *,
     gates: Sequence[GateResult] | None = None,
 ) -> tuple[CheckedResponse, ...]:
@@ -145,20 +119,16 @@ def check(
     progress("exact circuit")
     flows = [circuit_flow(system, design, r) for r in found]
     orbits = [reached(flow, design, r) for flow, r in zip(flows, found, strict=True)]
-    met: list[GateResult | None] = [None] * len(found)
+    results: Sequence[GateResult | None] = [None] * len(found)
     if pool is not None and gates is not None:
-        met = list(gates)
+        results = gates
     elif pool is not None:
         progress("ngspice, numerics gate")
-        met = list(
-            gate.check(
-                pool,
-                [gate.GateSubject(reduction, e, o) for e, o in zip(settings, orbits, strict=True)],
-            )
-        )
+        pairs = zip(settings, orbits, strict=True)
+        results = gate.check(pool, [gate.GateSubject(reduction, e, o) for e, o in pairs])
     return tuple(
         CheckedResponse(r, o, e, g, design, flow)
-        for r, o, e, g, flow in zip(found, orbits, settings, met, flows, strict=True)
+        for r, o, e, g, flow in zip(found, orbits, settings, results, flows, strict=True)
     )
 
 
@@ -170,8 +140,14 @@ def traces(design: Design, checked: CheckedResponse) -> dict[str, Trace]:
     out["model"] = trace_of(model_flow(design, checked.model), checked.model.orbit, np.ones(4), 1.0)
     circuit = circuit_flow(nominal_reduction(design).system(), design, checked.model)
     out["circuit"] = trace_of(circuit, checked.circuit, volts, seconds)
-    read = checked.gate.read if checked.gate is not None else None
-    if read is not None and not isinstance(read, SimulationFailed) and read.trace is not None:
-        time, states = read.trace
-        out["ngspice"] = Trace(time / seconds, states / volts)
+    for trace in () if checked.gate is None else spice_trace(checked.gate, volts, seconds):
+        out["ngspice"] = trace
     return out
+
+
+def spice_trace(result: GateResult, volts: Array, seconds: float) -> tuple[Trace, ...]:
+    """ngspice's run in model units, as ``trace_of``; empty where it has none."""
+    if isinstance(result.read, SimulationFailed) or result.read.trace is None:
+        return ()
+    time, states = result.read.trace
+    return (Trace(time / seconds, states / volts),)

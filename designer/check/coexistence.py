@@ -215,12 +215,16 @@ class _Tally:
             for twin, images in enumerate(self._images[number]):
                 if (np.abs(images - orbit.start) < NEAR * peak).all(axis=1).any():
                     return number, twin
-            if self._flow.system.mirror is None and _mirrored(orbit, other, peak):
+            if self._flow.system.mirror is None and alike(other, orbit, ALIKE, mirrored=True):
                 return number, 1
         return None
 
 
-def _mirrored(a: Orbit, b: Orbit, peak: Array) -> bool:
-    """Whether two orbits without an exact mirror between them look like twins."""
-    image = -b.extremes[:, ::-1]
-    return bool((np.abs(a.extremes - image).max(axis=1) < ALIKE * peak).all())
+def alike(a: Orbit, b: Orbit, within: float, *, mirrored: bool = False) -> bool:
+    """Whether the extremes of two orbits differ by less than ``within`` of the first one's peaks.
+
+    mirrored : take the mirror image of the second one.
+    """
+    other = -b.extremes[:, ::-1] if mirrored else b.extremes
+    peak = np.abs(a.extremes).max(axis=1)
+    return bool((np.abs(a.extremes - other).max(axis=1) < within * peak).all())

@@ -1,19 +1,65 @@
-"""The runs of a deck for other simulators: each response of a design, from its own orbit."""
+"""What the decks of a design run and say at their top: the first response in ``circuit.cir``, every
+response in a deck for another simulator, each from its own orbit."""
 
 from __future__ import annotations
 
-from designer.check.first_responses import PERIODS
+from dataclasses import dataclass
+
+from designer.base.arrays import Array
+from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
-from designer.circuit.netlist import Excitation
+from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.model.find_responses import ModelResponse, find
 from designer.model.response_table import Response
 from designer.spice import numerics_gate
 from designer.spice.deck import SolverSettings
-from designer.spice.simulator_decks import ResponseRun
+from designer.spice.simulator_decks import Dialect, ResponseRun
 
+PERIODS = 20
+"""Drive periods that a run takes."""
 FINER = 8
-"""How much smaller the step is than the first that the numerics gate tries."""
+"""How much smaller the step for another simulator is than the first that the numerics gate
+tries."""
+OTHERS: dict[Dialect, str] = {
+    "ltspice": "For LTspice. The op-amps are one subcircuit, opamp, at the end of the elements",
+    "portable": "For simulators after SPICE 2: R, C, D, V, I, E and G alone",
+}
+"""First line of a deck for another simulator."""
+
+
+@dataclass(frozen=True)
+class FirstRun:
+    """The run that a deck shows."""
+
+    excitation: Excitation
+    """The generator's setting."""
+    settings: SolverSettings
+    """Settings of ngspice."""
+    stop_time: float
+    """End of the run [s]."""
+    initial: Array | None
+    """(states,) capacitor voltages at t = 0; None for discharged ones."""
+
+
+def first_run(made: Synthesis, checked: CheckedResponse | None = None) -> FirstRun:
+    """The first response, ω = 1 where there is none.
+
+    checked : of that response; its gate's settings are used.
+    """
+    design, first = made.design, _responses(made)[0]
+    excitation = _excitation(made, first)
+    if checked is None:
+        orbit = on_circuit(nominal_reduction(design).system(), design, first)
+    else:
+        orbit = checked.circuit
+    period = 1.0 / excitation.frequency
+    settings = SolverSettings("trap", period / 1000.0)
+    if checked is not None and checked.gate is not None:
+        settings = checked.gate.settings
+    initial = orbit.start if len(orbit.start) else None
+    return FirstRun(excitation, settings, PERIODS * period, initial)
 
 
 def response_runs(made: Synthesis) -> tuple[ResponseRun, ...]:
@@ -22,15 +68,21 @@ def response_runs(made: Synthesis) -> tuple[ResponseRun, ...]:
     The step is an eighth of that which the numerics gate tries first: the gate takes smaller ones
     until two agree, and a deck that somebody runs elsewhere has no gate.
     """
-    found = made.found or find(made.design.model, [Response(1.0)])
-    return tuple(_run(made, response) for response in found)
+    return tuple(_run(made, response) for response in _responses(made))
+
+
+def _responses(made: Synthesis) -> tuple[ModelResponse, ...]:
+    return made.found or find(made.design.model, [Response(1.0)])
+
+
+def _excitation(made: Synthesis, response: ModelResponse) -> Excitation:
+    frequency = made.design.errors.scales.frequency(response.omega)
+    return Excitation(frequency, made.design.amplitude(response.b))
 
 
 def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:
     design = made.design
-    excitation = Excitation(
-        design.errors.scales.frequency(response.omega), design.amplitude(response.b)
-    )
+    excitation = _excitation(made, response)
     reduction = nominal_reduction(design)
     orbit = on_circuit(reduction.system(), design, response)
     subject = numerics_gate.GateSubject(reduction, excitation, orbit)
@@ -44,4 +96,62 @@ def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:
         settings=SolverSettings("trap", step, reltol=numerics_gate.RELTOL),
         stop_time=PERIODS * period,
         initial=orbit.start if len(orbit.start) else None,
+    )
+
+
+def circuit_notes(made: Synthesis, run: FirstRun) -> tuple[str, ...]:
+    """For ``circuit.cir``. run : what it shows."""
+    drive = run.excitation
+    if made.found:
+        first = made.found[0]
+        wanted = f", expected {first.expected}" if first.expected else ""
+        shown = f"number 1 of {len(made.found)} in the model file, omega {first.omega:g}{wanted}"
+    else:
+        shown = "the model file wants none, so omega is 1"
+    return (
+        "For ngspice 36 or later: its XSPICE code model limit is used. Run: ngspice -b circuit.cir",
+        *_circuit(made),
+        f"Response: {shown}. VM1 drives it: {drive.frequency:.6g} Hz, {drive.amplitude:.6g} V peak",
+        "Another response: frequency and amplitude of VM1 are in setup.csv, with how to start it.",
+        "The start voltages (IC=) belong to this response alone, and .tran to its frequency",
+        "Every response with its own start, and other simulators: designer export DIR --deck NAME,",
+        "with ltspice or portable, writes circuit-ltspice.cir or circuit-portable.cir",
+    )
+
+
+def simulator_notes(
+    made: Synthesis, dialect: Dialect, runs: tuple[ResponseRun, ...]
+) -> tuple[str, ...]:
+    """For a deck of another simulator."""
+    return (
+        OTHERS[dialect],
+        *_circuit(made),
+        "An op-amp is a current into 1 kohm, clamped by diodes at its output limits, and a source.",
+        "Finite gain and bias current are the nominal ones, as in circuit.cir",
+        f"Responses: {len(runs)} at the end of the deck, the first one switched on. For another,",
+        "put a star before each line of the block that is on, and take away those of the other",
+    )
+
+
+def _circuit(made: Synthesis) -> tuple[str, ...]:
+    circuit = made.design.circuit
+    stage = made.modelfile.circuit.dead_zone if circuit.stops else "none"
+    return (
+        f"Circuit: {len(circuit.sections)} op-amps {circuit.opamp} at +-{circuit.supply:g} V, "
+        f"{len(circuit.resistors)} resistors, {len(circuit.capacitors)} capacitors, "
+        f"dead zone: {stage}",
+        *_nodes(circuit),
+    )
+
+
+def _nodes(circuit: Circuit) -> tuple[str, ...]:
+    """The state nets carry displacement and velocity of each mass in turn."""
+    carried = [
+        f"{net} {'dx' if i % 2 else 'x'}{i // 2 + 1}{'/dt' if i % 2 else ''}"
+        for i, net in enumerate(circuit.state_nets)
+    ]
+    stops = f", {OUTPUT} output of the nonlinear stage" if circuit.stops else ""
+    return (
+        f"Nodes: {', '.join(carried)}{stops}, {circuit.generator.net} generator",
+        "A further n turns the sign (v1n is -v1). Volts per unit of each state are in scales.csv",
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -18,7 +19,7 @@ from designer.base.errors import InputError
 from designer.base.frames import table_html
 from designer.base.progress import Progress
 from designer.check import coexistence, trust
-from designer.check.checked_design import CheckedResponse
+from designer.check.checked_design import CheckedResponse, spice_trace
 from designer.check.coexistence import Coexistence
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.check.trust import Trust
@@ -45,10 +46,8 @@ from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.spice.simulator import SimulationFailed
 
 Engine = Literal["model", "circuit", "ngspice"]
-ENGINES: tuple[Engine, ...] = ("model", "circuit", "ngspice")
 NEAR_TWIN = 0.02
 """Of the peak: how far the twin of a circuit's orbit may be from the mirror image."""
 
@@ -132,7 +131,7 @@ def simulate(
     """
     coexistence.check(starts)
     drawn = (starts, seed)
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     if rung != "ideal" and engine != "ngspice":
         raise InputError(
             None, "--rung", rung, "ideal, or --engine ngspice: other engines have none"
@@ -146,28 +145,23 @@ def simulate(
     for number, spec in enumerate(specs, start=1):
         if spec.omega is not None:
             check_omega(f"response[{number}].omega", spec.omega, file)
-    if engine == "model":
-        step = said.stage("responses of the model", len(specs))
-        return tuple(
-            _timed(step, lambda s=s: _on_model(modelfile, s, traces, drawn))  # type: ignore[misc]
-            for s in specs
-        )
-    if engine == "circuit":
-        made = synthesis or synthesise(modelfile)
-        step = said.stage("responses of the exact circuit", len(specs))
-        return tuple(
-            _timed(step, lambda s=s: _on_circuit(made, s, bool(omegas), traces, drawn))  # type: ignore[misc]
-            for s in specs
-        )
+    if engine != "ngspice":
+        one = partial(_on_model, modelfile, traces, drawn)
+        if engine == "circuit":
+            made = synthesis or synthesise(modelfile)
+            one = partial(_on_circuit, made, bool(omegas), traces, drawn)
+        what = "model" if engine == "model" else "exact circuit"
+        step = progress.stage(f"responses of the {what}", len(specs))
+        return tuple(_timed(step, one, spec) for spec in specs)
     with SpicePool(cores() if jobs is None else jobs) as pool:
         require_ngspice(pool)
         made = synthesis or synthesise(modelfile)
-        return _in_ngspice(made, specs, bool(omegas), pool, said, traces, rung)
+        return _in_ngspice(made, specs, bool(omegas), pool, progress, traces, rung)
 
 
 def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
     """What ``simulate`` states of an engine: tolerances, bounds and limits (docs/engine.md)."""
-    exact: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "flow": "exact, by modes",
         "strobe_tolerance": attractors.STROBE_TOLERANCE,
         "undecided_below": attractors.ENGINE_ERROR,
@@ -177,15 +171,11 @@ def engine_settings(engine: Engine, rung: Rung = "ideal") -> dict[str, Any]:
         "starts": STARTS,
         "most_events_a_period": MAX_EVENTS,
     }
-    if engine != "ngspice":
-        return exact
-    return {
-        **exact,
-        "strobe_tolerance": read_orbit.STROBE_TOLERANCE,
-        "undecided_below": read_orbit.ENGINE_ERROR,
-        "gate_bound": numerics_gate.BOUND,
-        "rung": rung,
-    }
+    if engine == "ngspice":
+        settings["strobe_tolerance"] = read_orbit.STROBE_TOLERANCE
+        settings["undecided_below"] = read_orbit.ENGINE_ERROR
+        settings |= {"gate_bound": numerics_gate.BOUND, "rung": rung}
+    return settings
 
 
 # ---------------------------------------------------------------------------------------------
@@ -207,15 +197,17 @@ def _figures(orbit: Orbit) -> dict[str, Any]:
     }
 
 
-def _timed(step: Callable[[], None], work: Callable[[], Simulated]) -> Simulated:
+def _timed(
+    step: Callable[[], None], one: Callable[[Response], Simulated], spec: Response
+) -> Simulated:
     began = time.perf_counter()
-    result = work()
+    result = one(spec)
     step()
     return replace(result, seconds=time.perf_counter() - began)
 
 
 def _on_model(
-    modelfile: ModelFile, spec: Response, traces: bool, drawn: tuple[int, int]
+    modelfile: ModelFile, traces: bool, drawn: tuple[int, int], spec: Response
 ) -> Simulated:
     with naming(modelfile):
         (r,) = find(modelfile.model, [spec])
@@ -270,20 +262,17 @@ def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
     if found is None:
         return None
     near = attractors.describe(flow, found[0], orbit.n, found[1])
-    peak = np.abs(orbit.extremes).max(axis=1)
-    alike = (np.abs(near.extremes + orbit.extremes[:, ::-1]).max(axis=1) < NEAR_TWIN * peak).all()
     swapped = (near.n, near.p, near.q) == (orbit.n, orbit.q, orbit.p)
-    return near if alike and swapped and near.symmetric is False and near.radius < 1.0 else None
+    if not (swapped and near.symmetric is False and near.radius < 1.0):
+        return None
+    return near if coexistence.alike(orbit, near, NEAR_TWIN, mirrored=True) else None
 
 
 def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
     """kernel : which one carries the strobes. undecided_below : contacts shallower and misses
     nearer than this, in units of x1, count as grazing."""
     peak = float(np.abs(orbit.extremes[0]).max()) if len(orbit.extremes) else float("nan")
-    return {
-        "kernel": flow.kernel,
-        "undecided_below": attractors.ENGINE_ERROR * peak / unit,
-    }
+    return {"kernel": flow.kernel, "undecided_below": attractors.ENGINE_ERROR * peak / unit}
 
 
 def _traces(
@@ -314,7 +303,7 @@ def _circuit_orbits(
 
 
 def _on_circuit(
-    made: Synthesis, spec: Response, scan: bool, traces: bool, drawn: tuple[int, int]
+    made: Synthesis, scan: bool, traces: bool, drawn: tuple[int, int], spec: Response
 ) -> Simulated:
     r, flow, orbits = _circuit_orbits(made, spec, scan)
     volts, seconds = made.design.volts(r.b), made.design.errors.scales.seconds
@@ -351,13 +340,13 @@ def _in_ngspice(
     specs: Sequence[Response],
     scan: bool,
     pool: SpicePool,
-    said: Progress,
+    progress: Progress,
     traces: bool,
     rung: Rung,
 ) -> tuple[Simulated, ...]:
     """ngspice from the exact circuit's attractors, at settings that pass the gate."""
     began = time.perf_counter()
-    step = said.stage("responses of the exact circuit", len(specs))
+    step = progress.stage("responses of the exact circuit", len(specs))
     reduction = nominal.nominal_reduction(made.design)
     rows, subjects = [], []
     for spec in specs:
@@ -370,28 +359,28 @@ def _in_ngspice(
         ]
         rows.append((r, excitation, len(started)))
         step()
-    said.stage("ngspice, numerics gate")
+    progress.stage("ngspice, numerics gate")
     results = iter(numerics_gate.check(pool, subjects))
     seconds = (time.perf_counter() - began) / max(len(specs), 1)
     out = []
     for r, excitation, count in rows:
         volts, scale = made.design.volts(r.b), made.design.errors.scales.seconds
         gates = [next(results) for _ in range(count)]
-        asked = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
-        heard = [o for o in asked if o is not None] or [Orbit(OrbitStatus.FAILED)]
-        shown = [dimensionless(o, volts, scale) for o in heard]
+        answers = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
+        orbits = [o for o in answers if o is not None] or [Orbit(OrbitStatus.FAILED)]
+        shown = [dimensionless(o, volts, scale) for o in orbits]
         out.append(
             Simulated(
                 r.omega,
                 r.expected,
-                matches(heard[0], r.spec),
+                matches(orbits[0], r.spec),
                 shown[0],
                 tuple(shown[i] for i in _distinct(shown)[1:]),
                 seconds,
                 b=r.b,
                 sides=_sides(made.design.model),
                 settings=_gate_settings(gates[0]) if gates else {},
-                traces=_spice_traces(gates[0], volts, scale) if gates and traces else (),
+                traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
             )
         )
@@ -410,22 +399,13 @@ def _gate_settings(result: numerics_gate.GateResult) -> dict[str, Any]:
     }
 
 
-def _spice_traces(
-    result: numerics_gate.GateResult, volts: Array, seconds: float
-) -> tuple[Trace, ...]:
-    if isinstance(result.read, SimulationFailed) or result.read.trace is None:
-        return ()
-    time_, states = result.read.trace
-    return (Trace(time_ / seconds, states / volts),)
-
-
 def _distinct(orbits: Sequence[Orbit]) -> list[int]:
     """Which orbits to show: the first, and the others that do not look like one before them."""
-    kept = [0]
+    shown = [0]
     for i in range(1, len(orbits)):
-        if not any(_alike(orbits[i], orbits[k]) for k in kept):
-            kept.append(i)
-    return kept
+        if not any(_alike(orbits[i], orbits[k]) for k in shown):
+            shown.append(i)
+    return shown
 
 
 def _alike(a: Orbit, b: Orbit) -> bool:
@@ -433,11 +413,7 @@ def _alike(a: Orbit, b: Orbit) -> bool:
         return False
     if not (len(a.extremes) and len(b.extremes)):
         return True
-    size = np.abs(a.extremes).max(axis=1)
-    twin = -b.extremes[:, ::-1]
-    return any(
-        bool((np.abs(a.extremes - e).max(axis=1) < 1e-3 * size).all()) for e in (b.extremes, twin)
-    )
+    return any(coexistence.alike(a, b, coexistence.ALIKE, mirrored=m) for m in (False, True))
 
 
 def _measured(flow: Flow, orbit: Orbit) -> Orbit:

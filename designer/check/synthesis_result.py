@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 from designer.base.frames import table_html
 from designer.catalog.catalog import Catalog, load_catalog
-from designer.check import checked_design
 from designer.circuit.design import Design, settings
-from designer.model.find_responses import ModelResponse
+from designer.model.find_responses import ModelResponse, find, peaks
 from designer.model.model_file import ModelFile, naming
+from designer.spread.part_rules import check_names, spread_of
+from designer.synthesis import parts_choice
+from designer.synthesis.part_checks import check_choices, unit_circuit
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,12 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
     began = time.perf_counter()
     catalog = modelfile.choices(load_catalog() if catalog is None else catalog)
     with naming(modelfile):
-        found, design = checked_design.design_for(modelfile, catalog)
+        choice = modelfile.model, modelfile.circuit, catalog
+        check_choices(*choice)
+        check_names(modelfile, unit_circuit(*choice), catalog)
+        found = find(modelfile.model, modelfile.responses)
+        design = parts_choice.synthesise(*choice, peaks(modelfile.model, found), found)
+        spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
     return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)
 
 

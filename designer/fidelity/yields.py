@@ -23,9 +23,10 @@ from designer.fidelity import rungs
 from designer.fidelity.label import ResponseLabel
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
-from designer.yields import exact_rung, study_plan
-from designer.yields.ngspice_runs import hear
-from designer.yields.ngspice_sampling import Ask, StartKind, Why
+from designer.yields import exact_rung
+from designer.yields.cross_check import Ask, StartKind, Why
+from designer.yields.ngspice_runs import cross_checks
+from designer.yields.study import plan_study
 from designer.yields.verdict import StudyPlan, Verdict
 
 REFINEMENTS = 3
@@ -153,7 +154,7 @@ def question(
     if settings is None:
         return "the numerics gate did not pass"
     checked = CheckedResponse(response, nominal.orbit, nominal.excitation, None)
-    plan = study_plan.plan_study(
+    plan = plan_study(
         made.modelfile, made.design, [checked], made.catalog, samples=samples, seed=seed
     )
     (asked,) = plan.questions
@@ -175,7 +176,7 @@ def tally(
     asks = [
         Ask(a.sample, 0, StartKind.NOMINAL, Why.ALL) for a in answers if a.verdict != Verdict.FAILED
     ]
-    hearings = hear(plan, asks, pool, jobs, progress, refinements=REFINEMENTS)
+    hearings = cross_checks(plan, asks, pool, jobs, progress, refinements=REFINEMENTS)
     heard = {h.sample: h for h in hearings}
     asked = plan.questions[0]
     both = []

@@ -13,9 +13,9 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.model.find_responses import ModelResponse
 from designer.model.model import STATES, Mechanical
 from designer.model.model_file import ModelFile
-from designer.yields import study_plan
 from designer.yields.start_recipe import Recipe, hertz, volts
 from designer.yields.start_recipe_search import find_recipes
+from designer.yields.study import plan_study
 
 if TYPE_CHECKING:
     from designer.check.synthesis_result import Synthesis
@@ -79,7 +79,7 @@ def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
         for i, c in enumerate(checked)
         if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
     ]
-    plan = study_plan.plan_study(
+    plan = plan_study(
         made.modelfile,
         made.design,
         [checked[i] for i in shown],

@@ -17,8 +17,7 @@ from designer.base.plain_json import dumps
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
-from designer.check.deck_notes import circuit_notes
-from designer.check.first_responses import first_run
+from designer.check.deck_runs import circuit_notes, first_run
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import build
 from designer.circuit.coefficients import coefficient_errors

@@ -15,8 +15,7 @@ from designer.base.frames import table_html
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
 from designer.base.version import __version__
-from designer.check.deck_notes import simulator_notes
-from designer.check.deck_runs import response_runs
+from designer.check.deck_runs import response_runs, simulator_notes
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import kicad_files
 from designer.jobs.design_files import design_provenance

@@ -14,8 +14,7 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.jobs.design_source import read_design
 from designer.jobs.study_stage import RANDOM, Place, read_study
-from designer.yields.run_result import RunResult
-from designer.yields.study import Study
+from designer.yields.study import RunResult, Study
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,7 +18,7 @@ from designer.board.component import components
 from designer.board.kicad_project import Project, files
 from designer.board.kicad_rules import board_rules, rules_text
 from designer.check.checked_design import CheckedResponse
-from designer.check.first_responses import first_run
+from designer.check.deck_runs import first_run
 from designer.check.synthesis_result import Synthesis
 from designer.jobs.design_files import design_provenance
 from designer.model.model_file import naming

@@ -11,7 +11,7 @@ from typing import Any
 
 from designer.base.defaults import SAMPLES, SEED, at_least, cores
 from designer.base.errors import InputError
-from designer.yields.study_layers import RungName
+from designer.yields.tolerance_study import StudyEngine
 from designer.yields.yield_maps import Over
 
 MOST_SAMPLES = 1_000_000
@@ -33,7 +33,7 @@ class Options:
     """Whether unfinished work goes on."""
     until: float | None = None
     """Width that every interval shall have; None: the study stops at ``samples``."""
-    rung: RungName = "auto"
+    rung: StudyEngine = "auto"
     """Which engine decides a study; "auto": it is chosen."""
     tuned: bool = False
     """Whether boards are tuned too."""

@@ -22,7 +22,7 @@ from designer.fidelity.rung_errors import BOARD
 from designer.fidelity.rungs import CIRCUIT
 from designer.fidelity.trade_study import SHARE
 from designer.jobs.options import Options
-from designer.yields.study_layers import RUNGS, RungName
+from designer.yields.tolerance_study import STUDY_ENGINES, StudyEngine
 
 TRADE = "trade.json"
 """What ``jobs.trade_job`` writes."""
@@ -37,7 +37,7 @@ LEAST = 40
 class RungChoice:
     """The rung that a study takes, and why."""
 
-    rung: RungName
+    rung: StudyEngine
     """Which engine decides a study."""
     reason: str
     """Why, in one line for people; "" where nothing was measured."""
@@ -74,7 +74,7 @@ def before_search(folder: Folder, model: str) -> RungChoice | None:
     return choice if choice.reason else None
 
 
-def for_search(folder: Folder, options: Options, progress: Progress) -> RungName:
+def for_search(folder: Folder, options: Options, progress: Progress) -> StudyEngine:
     """The rung of the study at the end of a search, and a note of why. ``exact`` stands for "as
     usual": the search's confirmation asks ngspice about `LEAST` boards of each response."""
     if options.rung != "auto":
@@ -112,7 +112,7 @@ def _of_search(model: object, search: Mapping[str, Any]) -> RungChoice:
     trade = search.get("trade")
     if trade is None or trade["model"] != model:
         return RungChoice("auto", "")
-    if trade["rung"] not in RUNGS:
+    if trade["rung"] not in STUDY_ENGINES:
         raise ValueError(trade["rung"])
     reason = str(trade["reason"]).removesuffix(EARLIER)
     return RungChoice(trade["rung"], f"{reason}{EARLIER}")

@@ -17,6 +17,7 @@ from designer.base.manifest import Stages
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
+from designer.centering.limiting_parts import limitings
 from designer.centering.ngspice_check import LEVELS, RUNG
 from designer.centering.result_json import confirmation_json
 from designer.check.synthesis_result import Synthesis
@@ -37,11 +38,9 @@ from designer.spice.batch_backend import program_version
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.yields import ngspice_runs
+from designer.yields.cross_check import Ask, StartKind, Why
 from designer.yields.layers import Here
-from designer.yields.limiting_parts import limitings
-from designer.yields.ngspice_sampling import Ask, StartKind, Why
-from designer.yields.study_layers import RungName
-from designer.yields.tolerance_study import check
+from designer.yields.tolerance_study import StudyEngine, check
 from designer.yields.verdict import Answer, Verdict
 
 CONFIRMATION = "confirmation.json"
@@ -54,7 +53,7 @@ def search(
     out: Path | str | None = None,
     *,
     samples: int | None = None,
-    rung: RungName = "auto",
+    rung: StudyEngine = "auto",
     seed: int | None = None,
     jobs: int | None = None,
     overwrite: bool = False,
@@ -185,7 +184,7 @@ def _confirm(
         plan = replace(study.plan, questions=questions)
         asks = [a for a in to_confirm(study.answers) if questions[a.question].settings is not None]
         step = progress.stage(f"ngspice, rung {RUNG}, {len(asks)} boards", len(asks))
-        heard = ngspice_runs.hear(plan, asks, pool, jobs, step, rung=RUNG)
+        heard = ngspice_runs.cross_checks(plan, asks, pool, jobs, step, rung=RUNG)
     answers = {(a.sample, a.question): a for a in study.answers}
     rows = confirmation_json(heard, answers, study.asked, len(study.checked))
     for index, limit, gate in zip(study.asked, limits, gates, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,22 +10,15 @@ from typing import TYPE_CHECKING, Any
 from designer.base.design_folder import REPORTS, TOLERANCE, Folder
 from designer.base.keyed_store import Vouch, nobody
 from designer.base.manifest import StageName
-from designer.model.tuning_bands import Bands
+from designer.jobs.study_cache import CACHE, StudyCache
 from designer.yields.blame_analysis import Blame
-from designer.yields.blame_pieces import StoredParts
-from designer.yields.layers import CHUNK, SEARCH
-from designer.yields.ngspice_sampling import Hearing
-from designer.yields.power_up_yield import PowerUpAnswer
+from designer.yields.layers import LAYERS, LayerName
 from designer.yields.row_store import BlockStore
-from designer.yields.setting_search import MOST_TRIES
-from designer.yields.start_recipe import Recipe
+from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
-from designer.yields.study_cache import KEPT, Kept
 from designer.yields.study_identity import blame_hash, study_hash
-from designer.yields.study_layers import Stores
-from designer.yields.trimmed_yield import DcTrim, Trimmed
-from designer.yields.tuned_yield import Tuned
-from designer.yields.verdict import BLOCK, Answer, StudyPlan
+from designer.yields.tolerance_study import Stores
+from designer.yields.verdict import StudyPlan
 from designer.yields.yield_maps import OVERS
 
 if TYPE_CHECKING:
@@ -33,7 +26,7 @@ if TYPE_CHECKING:
 
 SAMPLES, NGSPICE = "samples.parquet", "ngspice.parquet"
 TUNED, TRIMMED, REACHED = "tuned.parquet", "trimmed.parquet", "reached.parquet"
-BLOCK_FOLDERS = {
+BLOCK_FOLDERS: dict[LayerName, str] = {
     "samples": SAMPLES,
     "ngspice": NGSPICE,
     "tuned": TUNED,
@@ -113,7 +106,7 @@ def study_files(options: Options, responses: int, census: bool) -> list[str]:
     pieces = [PIECES] if options.blamed or options.maps else []
     maps = [f"map-{over}-{i + 1}.png" for over in options.maps for i in range(responses)]
     maps += [MAPS] if maps else []
-    return [TOLERANCE, *REPORTS, KEPT, *boards, *pieces, *maps, *blocks]
+    return [TOLERANCE, *REPORTS, CACHE, *boards, *pieces, *maps, *blocks]
 
 
 class FolderStores(Stores):
@@ -127,8 +120,8 @@ class FolderStores(Stores):
         root: Path,
         guard: Callable[[], None],
         note: Callable[[str], None] = lambda _: None,
-        kept: Kept | None = None,
-        pieces: Kept | None = None,
+        kept: StudyCache | None = None,
+        pieces: StudyCache | None = None,
         prefix: str = "",
         vouch: Vouch = nobody,
     ) -> None:
@@ -137,61 +130,10 @@ class FolderStores(Stores):
         self._pieces, self._prefix = pieces, prefix
         self._stores: dict[str, BlockStore[Any]] = {}
 
-    def samples(self, plan: StudyPlan) -> BlockStore[Answer]:
-        return self._store(plan, SAMPLES, Answer, "samples", BLOCK)
-
-    def ngspice(self, plan: StudyPlan) -> BlockStore[Hearing]:
-        return self._store(plan, NGSPICE, Hearing, "ngspice", CHUNK)
-
-    def tuned(self, plan: StudyPlan, bands: Bands) -> BlockStore[Tuned]:
-        more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
-        return self._store(plan, TUNED, Tuned, "tuned", SEARCH, more)
-
-    def trimmed(self, plan: StudyPlan, trim: DcTrim) -> BlockStore[Trimmed]:
-        return self._store(plan, TRIMMED, Trimmed, "trimmed", BLOCK, trim.as_dict())
-
-    def reached(self, plan: StudyPlan, recipes: Sequence[Recipe]) -> BlockStore[PowerUpAnswer]:
-        more = {"recipes": [r.as_dict() for r in recipes]}
-        return self._store(plan, REACHED, PowerUpAnswer, "reached", SEARCH, more)
-
-    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
-        if self._kept is None:
-            return None
-        found: Blame | None = self._kept.get("blame", blame_hash(plan))
-        if found is None or (found.share < 1.0 and (found.budget or 0) < budget):
-            return None
-        return found
-
-    def keep_blame(self, plan: StudyPlan, found: Blame) -> None:
-        if self._kept is not None:
-            self._guard()
-            self._kept.put("blame", blame_hash(plan), replace(found, seconds=0.0))
-
-    def blame_pieces(self, plan: StudyPlan) -> StoredParts:
-        return self._pieces_of(blame_hash(plan))
-
-    def maps(self, plan: StudyPlan) -> StoredParts:
-        return self._pieces_of(study_hash(plan, "maps"))
-
-    def _pieces_of(self, key: str) -> StoredParts:
-        if self._pieces is None:
-            return StoredParts()
-        return _FolderPieces(self._pieces, key, self._guard)
-
-    @property
-    def names(self) -> Iterable[str]:
-        """Every file of a block, relative to the folder."""
-        return sorted({name for store in self._stores.values() for name in store.names})
-
-    def _store(
-        self,
-        plan: StudyPlan,
-        folder: str,
-        row: type[Any],
-        layer: str,
-        size: int,
-        more: Mapping[str, Any] | None = None,
+    def rows(
+        self, layer: LayerName, plan: StudyPlan, more: Mapping[str, Any] | None = None
     ) -> BlockStore[Any]:
+        folder, (row, size) = BLOCK_FOLDERS[layer], LAYERS[layer]
         if folder not in self._stores:
             self._stores[folder] = BlockStore(
                 self._root,
@@ -207,11 +149,40 @@ class FolderStores(Stores):
             )
         return self._stores[folder]
 
+    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
+        if self._kept is None:
+            return None
+        found: Blame | None = self._kept.get("blame", blame_hash(plan))
+        if found is None or (found.share < 1.0 and (found.budget or 0) < budget):
+            return None
+        return found
+
+    def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
+        if self._kept is not None:
+            self._guard()
+            self._kept.put("blame", blame_hash(plan), replace(blame, seconds=0.0))
+
+    def blame_parts(self, plan: StudyPlan) -> StoredParts:
+        return self._pieces_of(blame_hash(plan))
+
+    def maps(self, plan: StudyPlan) -> StoredParts:
+        return self._pieces_of(study_hash(plan, "maps"))
+
+    def _pieces_of(self, key: str) -> StoredParts:
+        if self._pieces is None:
+            return StoredParts()
+        return _FolderPieces(self._pieces, key, self._guard)
+
+    @property
+    def names(self) -> Iterable[str]:
+        """Every file of a block, relative to the folder."""
+        return sorted({name for store in self._stores.values() for name in store.names})
+
 
 class _FolderPieces(StoredParts):
     """Pieces of what ``key`` decides, in a file."""
 
-    def __init__(self, file: Kept, key: str, guard: Callable[[], None]) -> None:
+    def __init__(self, file: StudyCache, key: str, guard: Callable[[], None]) -> None:
         self._file, self._key, self._guard = file, key, guard
 
     def get(self, name: str) -> Any | None:

@@ -40,7 +40,7 @@ from designer.jobs.study_stage import (
 from designer.model.measured_values import MEASURED, read_measured
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.spread.part_rules import spread_of
-from designer.yields.study_layers import RungName
+from designer.yields.tolerance_study import StudyEngine
 from designer.yields.yield_maps import Over
 
 THE_BOARD = "board"
@@ -87,7 +87,7 @@ def tolerance(
     *,
     samples: int | None = None,
     until: float | None = None,
-    rung: RungName | None = None,
+    rung: StudyEngine | None = None,
     tuned: bool = False,
     reached: bool = False,
     map_: Sequence[Over] = (),

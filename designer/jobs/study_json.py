@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,15 @@ from designer.jobs.json_answers import hertz_json
 from designer.model.model import Mechanical
 from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
-from designer.yields.ngspice_sampling import Hearing, NgspiceVerdict
-from designer.yields.power_up_yield import PowerUpAnswer
-from designer.yields.study import Study
-from designer.yields.study_plan import of_yield
+from designer.yields.cross_check import CrossCheck, NgspiceVerdict
+from designer.yields.study import Study, trust_of_yield
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
-from designer.yields.verdict import Answer, Verdict, Yield, count
+from designer.yields.verdict import Answer, Verdict, Yield, count, count_verdicts, reasons
 from designer.yields.yield_maps import YieldMap
 
 MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")
-ORDER = (Verdict.OK, Verdict.LOST, Verdict.GRAZING, Verdict.FAILED)
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
@@ -47,9 +43,9 @@ def study_json(
         "narrow": study.narrow,
         "all_on_one_board": {
             "built": _yield(study.all_on_one_board),
-            "tuned": _yield(study.all_tuned),
-            "trimmed": _yield(study.all_trimmed),
-            "reached": _yield(study.all_reached),
+            "tuned": _yield(study.on_one_board(study.tuned)),
+            "trimmed": _yield(study.on_one_board(study.trimmed)),
+            "reached": _yield(study.on_one_board(study.power_ups)),
         },
         "blame": study.blame_status.as_dict(),
         "equation_check": None if equations is None else equations.as_dict(),
@@ -80,19 +76,19 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "others": [o.response for o in model.others],
         "yield": _yield(counted),
         "rate": None if counted is None else counted.rate,
-        "reasons": _reasons(answers),
+        "reasons": reasons((a.verdict, a.reason) for a in answers),
         "margins": margins(answers),
-        "agreement": _agreement(answers, study.heard_of(index)),
+        "agreement": _agreement(answers, study.rows_of(index, study.cross_checks)),
         "combined": _combined(study.combined[index]),
-        "tuned": tuned_json(study.tuned_of(index), study.plan.census),
-        "trimmed": trimmed_json(study.trimmed_of(index), study.plan.census),
+        "tuned": tuned_json(study.rows_of(index, study.tuned), study.plan.census),
+        "trimmed": trimmed_json(study.rows_of(index, study.trimmed), study.plan.census),
         "reached": _reached(study, index),
         "blame": _blame(study, index),
         "trust": {
             **{engine: said.verdict() for engine, said in checked.trust.items()},
             "yield": None
             if counted is None
-            else of_yield(counted, checked.circuit_trust).verdict(),
+            else trust_of_yield(counted, checked.circuit_trust).verdict(),
         },
     }
     if counted is None:
@@ -120,17 +116,15 @@ def tuned_json(rows: Sequence[Tuned], census: bool = False) -> dict[str, Any] | 
     """What exists within the bands, and under ``bench`` what the bench procedure finds."""
     if not rows:
         return None
-    bench = Counter(r.bench_verdict for r in rows)
-    found = Yield(*(bench[verdict] for verdict in ORDER), census=census)
     return {
         **_counted(count(rows, census)),
         "tries": sum(r.tries for r in rows),
         "unanswered": sum(r.unanswered for r in rows),
         "followed": sum(r.followed for r in rows),
-        "reasons": _reasons(rows),
+        "reasons": reasons((a.verdict, a.reason) for a in rows),
         "bench": {
-            **_counted(found),
-            "reasons": _counted_reasons((r.bench_verdict, r.bench_reason) for r in rows),
+            **_counted(count_verdicts((r.bench_verdict for r in rows), census)),
+            "reasons": reasons((r.bench_verdict, r.bench_reason) for r in rows),
             "steps": sum(r.bench_steps for r in rows),
             "seen_where_it_is_not": sum(r.bench_seen and r.bench_verdict != "ok" for r in rows),
         },
@@ -143,19 +137,19 @@ def trimmed_json(rows: Sequence[Trimmed], census: bool = False) -> dict[str, Any
         return None
     return {
         **_counted(count(rows, census)),
-        "reasons": _reasons(rows),
+        "reasons": reasons((a.verdict, a.reason) for a in rows),
         "at_end": sum(r.at_end for r in rows),
     }
 
 
 def _reached(study: Study, index: int) -> dict[str, Any] | None:
     """From power-up by the recipe."""
-    rows = study.reached_of(index)
+    rows = study.rows_of(index, study.power_ups)
     if not rows or study.recipes is None:
         return None
     return {
         **_counted(count(rows, study.plan.census)),
-        "reasons": _reasons(rows),
+        "reasons": reasons((a.verdict, a.reason) for a in rows),
         "clipped_at_start": sum(r.clipped for r in rows),
         "recipe": study.recipes[study.asked.index(index)].as_dict(),
     }
@@ -177,7 +171,7 @@ def _counted(counted: Yield) -> dict[str, Any]:
     return {**(_yield(counted) or {}), "rate": counted.rate}
 
 
-def _agreement(answers: Sequence[Answer], heard: Sequence[Hearing]) -> dict[str, Any]:
+def _agreement(answers: Sequence[Answer], heard: Sequence[CrossCheck]) -> dict[str, Any]:
     """What ngspice was asked and said, from the boards' own orbits and from the nominal one."""
     known = {a.sample: a for a in answers}
 
@@ -226,28 +220,6 @@ def _combined(both: Combined | None) -> dict[str, Any] | None:
         ],
         "differences": [dict(d.__dict__) for d in both.differences],
     }
-
-
-def _reasons(answers: Sequence[Answer | Tuned | Trimmed | PowerUpAnswer]) -> dict[str, int]:
-    """Why boards do not show the response, most frequent first."""
-    return _counted_reasons((a.verdict, a.reason) for a in answers)
-
-
-def _counted_reasons(judged: Iterable[tuple[Verdict, str]]) -> dict[str, int]:
-    met = Counter(
-        f"{verdict}: {_kind(reason)}" if reason else str(verdict)
-        for verdict, reason in judged
-        if verdict != "ok"
-    )
-    return dict(sorted(met.items(), key=lambda item: (-item[1], item[0])))
-
-
-def _kind(reason: str) -> str:
-    """The reason without its figures, so that like ones are counted together."""
-    for kind in ("asymmetric", "not found", "not seen"):
-        if reason.startswith(f"{kind} "):
-            return kind
-    return "most settings gave no answer" if reason.endswith("settings gave no answer") else reason
 
 
 def margins(answers: Sequence[Answer]) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from designer.jobs import design_files
 from designer.jobs.json_answers import run_json
 from designer.jobs.options import Options
 from designer.jobs.origin import provenance
+from designer.jobs.study_cache import CACHE, StudyCache
 from designer.jobs.study_folder import (
     BOARDS,
     PIECES,
@@ -40,15 +41,12 @@ from designer.spice.equation_check import EquationCheck
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
 from designer.synthesis.milp import SOLVER
-from designer.yields.blame_extent import BUDGET
-from designer.yields.blame_status import BlameStage
+from designer.yields.blame_analysis import BlameStage
+from designer.yields.blame_replay import BUDGET
 from designer.yields.layers import Here, Runner
-from designer.yields.run_result import RunResult
-from designer.yields.study import Study
-from designer.yields.study_cache import KEPT, Kept
+from designer.yields.study import RunResult, Study
 from designer.yields.study_identity import RULES, checks_hash
-from designer.yields.study_layers import Stores
-from designer.yields.tolerance_study import check, tolerance
+from designer.yields.tolerance_study import Stores, check, tolerance
 
 SPICE_TIMEOUT = 900.0
 """The longest that one run of ngspice may take in a study, s: a way of thousands of periods."""
@@ -80,7 +78,7 @@ class Place:
         """The answer that stands there."""
         return run_json(folder.json(DESIGN), folder.json(self.prefix + TOLERANCE))
 
-    def kept(self, folder: Folder, note: Note, name: str = KEPT) -> Kept:
+    def kept(self, folder: Folder, note: Note, name: str = CACHE) -> StudyCache:
         """What is stored there under a name. note : is told of a damaged file."""
 
         def write(name: str, content: bytes) -> None:
@@ -89,7 +87,7 @@ class Place:
         def vouch(name: str, content: bytes) -> bool:
             return folder.vouches(self.prefix + name, content)
 
-        return Kept(folder / (self.prefix + name), write, note, vouch)
+        return StudyCache(folder / (self.prefix + name), write, note, vouch)
 
 
 RANDOM, BUILT = Place(), Place("measured", "measured/")
@@ -124,7 +122,7 @@ class StudyHelp:
                 require_ngspice(pool)
             runner: Runner = Here(options.workers)
             if options.cluster is not None:
-                from designer.yields.dask_runner import Cluster
+                from designer.jobs.dask_runner import Cluster
 
                 progress.stage(f"cluster {options.cluster}")
                 runner = stack.enter_context(Cluster(options.cluster))
@@ -287,7 +285,7 @@ def read_study(path: Path, made: Synthesis, place: Place) -> Study:
 
 
 def checks(
-    folder: Folder, made: Synthesis, pool: SpicePool | None, kept: Kept, progress: Progress
+    folder: Folder, made: Synthesis, pool: SpicePool | None, kept: StudyCache, progress: Progress
 ) -> Checks:
     """The checks of a design, made now or taken from the folder."""
     if pool is None:

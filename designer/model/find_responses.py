@@ -93,9 +93,9 @@ def matches(orbit: Orbit, spec: Response) -> bool:
     """Whether an orbit is the one wanted; anything that is an answer, where nothing is."""
     if orbit.status is not OrbitStatus.PERIODIC:
         return spec.expect is None and spec.symmetric is None and orbit.status in ANSWERS
-    if not spec.accepts(orbit.n, orbit.p, orbit.q):
+    if spec.symmetric is False and orbit.symmetric is not False:
         return False
-    return spec.symmetric is None or orbit.symmetric is spec.symmetric
+    return not spec.difference(orbit)
 
 
 def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal, NoReturn
 
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, shown, span
+from designer.dynamics.orbit import Orbit
 from designer.model.model import Mechanical
 from designer.model.si_units import FREQUENCIES, angular_frequency
 
@@ -111,9 +112,34 @@ class Response(FileTable):
     """Clearance at which this response is wanted: a value, a range to choose from, or None for the
     model's own."""
 
+    def completed(self, nominal: Orbit) -> Response:
+        """The same; where no n-p-q is expected, the nominal orbit's or its twin is wanted."""
+        if self.expect is not None:
+            return self
+        return replace(self, expect=Expect(nominal.n, nominal.p, nominal.q))
+
     def accepts(self, n: int, p: int, q: int) -> bool:
         """Whether n-p-q is what is expected here; without an expectation, anything is."""
         return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
+
+    def accepts_text(self, response: str, *, symmetric: bool) -> bool:
+        """Whether a response in words, "1-2-2" or a status, survives as this one."""
+        try:
+            shown = Expect.parse(response)
+        except ValueError:
+            return False
+        return self.accepts(shown.n, shown.p, shown.q) and (symmetric or not self.symmetric)
+
+    def difference(self, orbit: Orbit) -> str:
+        """Why a periodic orbit does not survive as this response; "" where it does.
+
+        Boards are never exactly symmetric: ``symmetric = false`` refuses no orbit.
+        """
+        if not self.accepts(orbit.n, orbit.p, orbit.q):
+            return f"to {orbit.response}"
+        if self.symmetric and not orbit.symmetric:
+            return f"asymmetric by {orbit.asymmetry:.2g} of the peak"
+        return ""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
-from designer.check import checked_design
+from designer.check.synthesis_result import synthesise
 from designer.circuit import paper_values
 from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.dead_zone_parts import OUTPUT
@@ -138,7 +138,7 @@ def build(name: str, catalog: Catalog) -> Built:
         circuit = paper_values.circuit(model, values, opamp)
     else:
         dead_zone: DeadZone = "rectifier" if name == RECTIFIER else "saturation"
-        _, design = checked_design.design_for(model_with(dead_zone), catalog)
+        design = synthesise(model_with(dead_zone), catalog).design
         circuit = design.circuit
         setting = design.errors.scales.frequency(1.0), design.amplitude()
     return built(ComparedCircuit(TITLES[name], "", circuit, *setting))

@@ -47,7 +47,7 @@ from designer.paper.circuits import (
 )
 from designer.paper.report_files import README, write_files
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.yields.verdict import kept
+from designer.yields.verdict import rounded
 
 FORMAT = 1
 COMMAND = "designer reproduce circuit --out reports/paper-circuit"
@@ -199,7 +199,7 @@ def _circuit(bench: _Bench, name: str) -> dict[str, Any]:
                 "ngspice": h.response,
                 "ngspice_passed": h.passed,
                 "ngspice_reason": h.reason,
-                "ngspice_error": kept(error_of(r, h.displacement)),
+                "ngspice_error": rounded(error_of(r, h.displacement)),
                 "steps_a_period": h.steps,
                 "portrait": _portrait(_trace(one, f)),
                 "ngspice_portrait": _portrait(h.trace),
@@ -218,7 +218,7 @@ def _circuit(bench: _Bench, name: str) -> dict[str, Any]:
             "v1": _rounded(spice[:, 0]),
             "exact": _rounded(exact),
             "ngspice": _rounded(spice[:, 1]),
-            "difference": kept(float(np.abs(exact - spice[:, 1]).max())),
+            "difference": rounded(float(np.abs(exact - spice[:, 1]).max())),
             **_lines(spice[:, 0], exact, threshold),
         },
         "responses": rows,
@@ -230,8 +230,8 @@ def _lines(v1: Array, out: Array, threshold: float) -> dict[str, float]:
     inside = np.abs(v1) < 0.9 * threshold
     beyond = v1 > 1.1 * threshold
     return {
-        "slope_inside": kept(float(np.polyfit(v1[inside], out[inside], 1)[0])),
-        "slope_contact": kept(float(np.polyfit(v1[beyond], out[beyond], 1)[0])),
+        "slope_inside": rounded(float(np.polyfit(v1[inside], out[inside], 1)[0])),
+        "slope_contact": rounded(float(np.polyfit(v1[beyond], out[beyond], 1)[0])),
     }
 
 
@@ -295,7 +295,7 @@ def _settled_row(f: SettledResponse) -> dict[str, Any]:
         "expected": f.expected,
         "circuit": f.orbit.response,
         "kept": f.kept,
-        "error": kept(f.error),
+        "error": rounded(f.error),
     }
 
 

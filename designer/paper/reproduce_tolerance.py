@@ -33,7 +33,7 @@ from designer.paper.tolerance_cases import TITLES, SpreadCase, YieldRow, cases
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
 from designer.yields import exact_rung
 from designer.yields.blame_analysis import blame
-from designer.yields.power_up_yield import reached_block
+from designer.yields.power_up import power_up_block
 from designer.yields.start_recipe_search import find_recipes
 from designer.yields.study_identity import study_hash
 from designer.yields.tuned_yield import tuned_block
@@ -118,7 +118,7 @@ def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[s
     tuned = tuned_block(plan, range(short), some, Bands(), jobs, step)
     step = progress.stage(f"{case.name}: reached", short * number)
     recipes = find_recipes(plan, jobs)
-    reached = reached_block(plan, range(short), recipes, jobs, step)
+    reached = power_up_block(plan, range(short), recipes, jobs, step)
     judged = {
         "as built": Counter((a.question, a.verdict) for a in answers),
         "tuned": Counter((t.question, t.verdict) for t in tuned),

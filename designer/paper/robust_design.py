@@ -29,6 +29,7 @@ from designer.base.report_pieces import CaseStore
 from designer.base.toml_writer import toml_text
 from designer.base.version import __version__
 from designer.catalog.catalog import Catalog, load_catalog
+from designer.centering.limiting_parts import limitings
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import search_job
@@ -44,13 +45,11 @@ from designer.paper.report_files import README, write_files
 from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
-from designer.yields import exact_rung, study_identity, study_plan
+from designer.yields import exact_rung, study_identity
 from designer.yields.blame_analysis import blame
-from designer.yields.joint_yield import all_on_one
-from designer.yields.limiting_parts import limitings
-from designer.yields.study import Study
+from designer.yields.study import Study, plan_study
 from designer.yields.tolerance_study import tolerance
-from designer.yields.verdict import StudyPlan, Yield, count
+from designer.yields.verdict import StudyPlan, Yield, all_on_one, count
 
 FORMAT = 1
 MODEL = Path("examples/robust.toml")
@@ -155,7 +154,7 @@ def _searched(
     checked = checked_design.check(synthesis.design, synthesis.found, None)
     jobs = cores() if options.jobs is None else options.jobs
     asked = [c for c in checked if c.model.found]
-    plan = study_plan.plan_study(
+    plan = plan_study(
         synthesis.modelfile,
         synthesis.design,
         asked,
@@ -180,29 +179,29 @@ def _searched(
             stores=FolderStores(powered, lambda: None, progress.note),
             progress=progress,
         )
-        if _decided(study, len(checked), tuned=tuned):
+        if _decided(study, len(checked)):
             break
+    for name, rows in (("reached", study.power_ups), ("tuned", study.tuned)):
+        whole = study.on_one_board(rows)
+        row["all_on_one"][name] = None if whole is None else _counted(whole)
+        for i in range(len(checked) if rows is not None else 0):
+            row["responses"][i][name] = _counted(count(study.rows_of(i, rows)))
     for i in range(len(checked)):
-        layers = {"reached": study.reached_of(i)} | ({"tuned": study.tuned_of(i)} if tuned else {})
-        row["responses"][i] |= {name: _counted(count(rows)) for name, rows in layers.items()}
         row["responses"][i]["b"] = synthesis.found[i].b
-    row["all_on_one"] |= {
-        name: None if one is None else _counted(one)
-        for name, one in (("tuned", study.all_tuned), ("reached", study.all_reached))
-    }
     search = read_json(place / "search.json")
     keys = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
     return {**row, "search": {key: search[key] for key in keys}}
 
 
-def _decided(study: Study, responses: int, *, tuned: bool) -> bool:
-    """Whether the intervals of tuned and reached yields have the target outside, all of them."""
-    counted = [count(study.reached_of(i)) for i in range(responses)]
-    counted += [study.all_reached] if study.all_reached is not None else []
-    if tuned:
-        counted += [count(study.tuned_of(i)) for i in range(responses)]
-        counted += [study.all_tuned] if study.all_tuned is not None else []
-    return not any(low <= TARGET <= high for low, high in (c.interval for c in counted))
+def _decided(study: Study, responses: int) -> bool:
+    """Whether the intervals of tuned and power-up yields have the target outside, all of them."""
+    counted: list[Yield | None] = []
+    for rows in (study.power_ups, study.tuned):
+        if rows is not None:
+            counted += [count(study.rows_of(i, rows)) for i in range(responses)]
+            counted.append(study.on_one_board(rows))
+    intervals = [one.interval for one in counted if one is not None]
+    return not any(low <= TARGET <= high for low, high in intervals)
 
 
 def _as_built(

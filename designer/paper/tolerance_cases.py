@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
-from designer.check import checked_design
+from designer.check.synthesis_result import synthesise
 from designer.circuit import paper_values
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
@@ -125,7 +125,7 @@ def _circuits(
         one = build(name, catalog)
         settings = [one.excitation(r.omega) for r in wanted]
         yield name, one.circuit, *_questions(one.circuit, one.volts, settings, wanted)
-    _, design = checked_design.design_for(modelfile, catalog)
+    design = synthesise(modelfile, catalog).design
     settings = [
         Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in wanted
     ]

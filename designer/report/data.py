@@ -16,8 +16,7 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.model.model import Dimensionless, Mechanical
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.yields.blame_analysis import ResponseBlame
-from designer.yields.run_result import RunResult
-from designer.yields.study import Study
+from designer.yields.study import RunResult, Study
 from designer.yields.verdict import StudyPlan, Yield
 
 

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from designer.base.csv_tables import csv_text
-from designer.yields.joint_yield import worst
-from designer.yields.verdict import Answer, StudyPlan, Verdict
+from designer.yields.verdict import Answer, StudyPlan, Verdict, worst
 
 if TYPE_CHECKING:
     from designer.yields.study import Study

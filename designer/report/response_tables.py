@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -21,8 +20,8 @@ from designer.report.data import ReportData
 from designer.report.spread_words import words_of
 from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import shortest_contact
-from designer.yields.ngspice_sampling import Hearing, NgspiceVerdict, StartKind
-from designer.yields.verdict import Answer, Verdict, Yield
+from designer.yields.cross_check import CrossCheck, NgspiceVerdict, StartKind
+from designer.yields.verdict import Answer, Yield, reasons
 
 REASONS_SHOWN = 5
 """Kinds of loss that are named; the rest is counted."""
@@ -146,8 +145,9 @@ def _counts(y: Yield) -> tuple[str, ...]:
 
 def _reasons(answers: Sequence[Answer]) -> str:
     """Why boards do not show a response, most frequent first; figures in a reason do not count."""
-    counts = Counter(_reason(a) for a in answers if a.verdict is not Verdict.OK)
-    ranked = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+    counts = reasons((a.verdict, a.reason) for a in answers)
+    named = [(text.replace(": to ", " to "), n) for text, n in counts.items()]
+    ranked = sorted(named, key=lambda item: (-item[1], item[0]))
     shown = [f"{text} ({n})" for text, n in ranked[:REASONS_SHOWN]]
     rest = ranked[REASONS_SHOWN:]
     if rest:
@@ -155,18 +155,16 @@ def _reasons(answers: Sequence[Answer]) -> str:
     return ", ".join(shown)
 
 
-def _reason(answer: Answer) -> str:
-    reason = re.sub(r" by .*", "", answer.reason)
-    join = "" if not reason else " " if reason.startswith("to ") else ": "
-    return f"{answer.verdict}{join}{reason}"
-
-
 def ngspice_table(data: ReportData) -> Table | None:
     """How often ngspice, asked about the same boards, answered the same as the exact circuit."""
     rows = []
     for i, c in enumerate(data.checked):
         for kind, start in STARTED.items():
-            asked = [h for h in data.study.heard_of(i) if h.kind is kind and h.response]
+            asked = [
+                h
+                for h in data.study.rows_of(i, data.study.cross_checks)
+                if h.kind is kind and h.response
+            ]
             if asked:
                 cells = _ngspice_cells(data.study.answers_to(i), asked)
                 rows.append((words.name(c), start, *cells))
@@ -177,7 +175,7 @@ def ngspice_table(data: ReportData) -> Table | None:
     return table(columns, rows, range(2, 7))
 
 
-def _ngspice_cells(answers: Sequence[Answer], asked: Sequence[Hearing]) -> tuple[str, ...]:
+def _ngspice_cells(answers: Sequence[Answer], asked: Sequence[CrossCheck]) -> tuple[str, ...]:
     known = {a.sample: a for a in answers}
     notes: dict[NgspiceVerdict, Counter[str]] = {one: Counter() for one in NgspiceVerdict}
     for h in asked:

@@ -4,8 +4,9 @@ disagreements, start recipes, blame, maps. None for what it does not have."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from designer.base.page import Table, table, table_of
 from designer.report import words
@@ -14,10 +15,9 @@ from designer.report.measured_table import table as measured_boards
 from designer.report.response_tables import STARTED
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
-from designer.yields.corners import Corner
-from designer.yields.joint_yield import all_on_one
 from designer.yields.two_engine_yield import Combined
-from designer.yields.verdict import Yield, count
+from designer.yields.verdict import BoardRow, Yield, count
+from designer.yields.worst_corner import Corner
 from designer.yields.yield_maps import YieldMap
 
 PARTS_SHOWN = 4
@@ -41,35 +41,31 @@ def kinds(data: ReportData) -> Table | None:
     """As built, tuned, trimmed, reached and both engines together, side by side."""
     study, census = data.study, data.plan.census
     bench = [replace(t, verdict=t.bench_verdict) for t in study.tuned or ()]
+
+    def of_layer(rows: Sequence[BoardRow], response: int) -> str:
+        return _share(count(study.rows_of(response, rows), census))
+
     columns: dict[str, tuple[Callable[[int], str], Yield | None]] = {
         "as built": (lambda i: _share(data.yields[i]), study.all_on_one_board)
     }
-    if study.tuned is not None:
-        bench_all = None if study.all_tuned is None else all_on_one(bench, census)
-        columns["tuned"] = (lambda i: _share(count(study.tuned_of(i), census)), study.all_tuned)
-        columns["tuned on the bench"] = (
-            lambda i: _share(count([t for t in bench if study.asked[t.question] == i], census)),
-            bench_all,
-        )
-    if study.trimmed is not None:
-        columns["trimmed"] = (
-            lambda i: _share(count(study.trimmed_of(i), census)),
-            study.all_trimmed,
-        )
-    if study.reached is not None:
-        columns["reached"] = (
-            lambda i: _share(count(study.reached_of(i), census)),
-            study.all_reached,
-        )
+    layers: dict[str, Sequence[BoardRow] | None] = {
+        "tuned": study.tuned,
+        "tuned on the bench": None if study.tuned is None else bench,
+        "trimmed": study.trimmed,
+        "reached": study.power_ups,
+    }
+    for name, rows in layers.items():
+        if rows is not None:
+            columns[name] = (partial(of_layer, rows), study.on_one_board(rows))
     if any(study.combined):
         columns["both engines together"] = (lambda i: _both(study.combined[i]), None)
     if len(columns) == 1 or not data.checked:
         return None
-    rows = [(words.name(c), *(cell(i) for cell, _ in columns.values()))
-            for i, c in enumerate(data.checked)]  # fmt: skip
+    lines = [(words.name(c), *(cell(i) for cell, _ in columns.values()))
+             for i, c in enumerate(data.checked)]  # fmt: skip
     if study.all_on_one_board is not None:
-        rows.append(("all on one board", *(_share(whole) for _, whole in columns.values())))
-    return table(("response", *columns), rows, range(1, len(columns) + 1))
+        lines.append(("all on one board", *(_share(whole) for _, whole in columns.values())))
+    return table(("response", *columns), lines, range(1, len(columns) + 1))
 
 
 def _share(counted: Yield | None) -> str:

@@ -16,7 +16,7 @@ from designer.catalog.entries import Kind
 from designer.circuit.netlist import Capacitor, Circuit, Resistor
 from designer.model.board_table import PartArray
 from designer.model.model_file import ModelFile
-from designer.spread.part_rules import spread_of
+from designer.spread.part_rules import kind_of, spread_of
 
 
 @dataclass(frozen=True)
@@ -96,16 +96,15 @@ def bought(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> dict[str
     spread = spread_of(modelfile, circuit, catalog)
     stated = {**spread.grades, **spread.asked}
     inside = {name for a in arrays(modelfile, circuit, catalog) for name in a.parts}
-    found = {}
+    grades = {}
     parts: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)
     for part in parts:
         grade = stated.get(part.name)
         if grade is None or part.name in inside:
             continue
-        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
-        if catalog.sold(kind, part.value, grade) is not None:
-            found[part.name] = grade
-    return found
+        if catalog.sold(kind_of(part), part.value, grade) is not None:
+            grades[part.name] = grade
+    return grades
 
 
 def arrays(modelfile: ModelFile, circuit: Circuit, catalog: Catalog) -> tuple[PartArray, ...]:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from designer.model.model_file import ModelFile
 
 Part = Resistor | Capacitor | Reference
+_OWN = ("grade", "law", "tempco", "ageing")
+"""What a rule may state of a part."""
 KINDS = {"resistors": Resistor, "capacitors": Capacitor, "references": Reference}
 """What a list of parts may say for all of a kind."""
 
@@ -96,7 +98,7 @@ class _Rules:
         self.parts: dict[str, Part] = {
             p.name: p for p in circuit.parts if isinstance(p, Resistor | Capacitor | Reference)
         }
-        self.own = dict(self._own())
+        self.own = self._own()
         arrays = dict(self._of_arrays())
         self.own |= arrays
         self.elements = frozenset(arrays)
@@ -136,24 +138,18 @@ class _Rules:
     def refuse(self, key: str, found: object, expected: str) -> InputError:
         return InputError(self.file, f"spread.{key}", found, expected)
 
-    def _own(self) -> Iterator[tuple[str, PartRule]]:
+    def _own(self) -> dict[str, PartRule]:
         """What each part has of its own; a later table adds to an earlier one."""
         found: dict[str, PartRule] = {}
         for number, rule in enumerate(self.rules.part, start=1):
             for name in self.named(rule.names, f"part[{number}].names"):
-                before = found.get(name, PartRule((name,)))
-                said = PartRule(
-                    (name,),
-                    before.grade if rule.grade is None else rule.grade,
-                    before.law if rule.law is None else rule.law,
-                    before.tempco if rule.tempco is None else rule.tempco,
-                    before.ageing if rule.ageing is None else rule.ageing,
-                )
+                stated = {key: v for key in _OWN if (v := getattr(rule, key)) is not None}
+                own = replace(found.get(name, PartRule((name,))), **stated)
                 part = self.parts[name]
-                shape, grade = self.shape(part, said), self.grade(part, said)
+                shape, grade = self.shape(part, own), self.grade(part, own)
                 check_binned(shape, grade, f"spread.part[{number}].law", self.file)
-                found[name] = said
-        yield from found.items()
+                found[name] = own
+        return found
 
     def _of_arrays(self) -> Iterator[tuple[str, PartRule]]:
         """What parts have as elements of arrays; a temperature coefficient and a drift of their own
@@ -173,11 +169,8 @@ class _Rules:
                 width = family.temperature_coefficient
                 ageing = before.ageing
                 if ageing is None and self.rules.ageing == "catalogue":
-                    if family.drift is None:
-                        said = f"{name}, {family.name}, of which the catalogue has no drift"
-                        expected = "a drift there, or an ageing in [[spread.part]]"
-                        raise self.refuse("ageing", said, expected)
-                    ageing = (-family.drift, family.drift)
+                    drift = self.drift(name, family)
+                    ageing = (-drift, drift)
                 tempco = (-width, width) if before.tempco is None else before.tempco
                 yield name, PartRule((name,), family.grade, before.law, tempco, ageing)
 
@@ -185,13 +178,12 @@ class _Rules:
         """The family of arrays that a part is an element of."""
         part = self.parts[name]
         assert isinstance(part, Resistor | Capacitor)
-        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
         try:
             sold = self.catalog.array(family, part.value).family
         except InputError as error:
-            said = f"{name}, {error.found}" if isinstance(error, Unreachable) else error.found
-            raise self.refuse(f"network[{number}].family", said, error.expected) from None
-        if sold.kind != kind:
+            found = f"{name}, {error.found}" if isinstance(error, Unreachable) else error.found
+            raise self.refuse(f"network[{number}].family", found, error.expected) from None
+        if sold.kind != kind_of(part):
             raise self.refuse(f"network[{number}].parts", name, f"{sold.kind}s, as {family} holds")
         return sold
 
@@ -217,8 +209,8 @@ class _Rules:
         if isinstance(part, Reference):
             stated = self.rules.reference_grade
             return part.grade if stated is None else stated
-        resistor = isinstance(part, Resistor)
-        return self.choice.resistor_grade if resistor else self.choice.capacitor_grade
+        choice = self.choice
+        return choice.resistor_grade if isinstance(part, Resistor) else choice.capacitor_grade
 
     def shape(self, part: Part, rule: PartRule | None) -> SpreadShape:
         if rule is not None and rule.law is not None:
@@ -237,8 +229,7 @@ class _Rules:
         asked = self.grade(part, self.own.get(part.name))
         if isinstance(part, Reference) or part.name in self.elements:
             return asked
-        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
-        sold = self.catalog.sold(kind, part.value, asked)
+        sold = self.catalog.sold(kind_of(part), part.value, asked)
         if sold is None or math.isclose(sold.family.grade, asked, rel_tol=1e-9):
             return asked
         return sold.family.grade
@@ -290,25 +281,22 @@ class _Rules:
             return self.catalog.reference(part.model).temperature_coefficient
         return self.family(part, rule, "temperature", "tempco").temperature_coefficient
 
-    def drift(self, part: Resistor | Capacitor, rule: PartRule | None) -> float:
-        """What a part's data sheet lets it change by."""
-        family = self.family(part, rule, "ageing", "ageing")
+    def drift(self, name: str, family: PartFamily) -> float:
+        """What the data sheet lets a part of this family change by."""
         if family.drift is None:
-            said = f"{part.name}, {family.name}, of which the catalogue has no drift"
-            raise self.refuse("ageing", said, "a drift there, or an ageing in [[spread.part]]")
+            found = f"{name}, {family.name}, of which the catalogue has no drift"
+            raise self.refuse("ageing", found, "a drift there, or an ageing in [[spread.part]]")
         return family.drift
 
     def family(
         self, part: Resistor | Capacitor, rule: PartRule | None, key: str, own: str
     ) -> PartFamily:
         """The family that the bill of materials buys the part from; for the figure ``own``."""
-        kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
         try:
-            bought = self.catalog.part(kind, part.value, self.grade(part, rule))
+            bought = self.catalog.part(kind_of(part), part.value, self.grade(part, rule))
         except Unreachable as error:
-            said = f"{part.name}, {error.found}"
             expected = f"{error.expected}; or {own} in [[spread.part]]"
-            raise self.refuse(key, said, expected) from None
+            raise self.refuse(key, f"{part.name}, {error.found}", expected) from None
         return bought.family
 
     def ageing(self) -> dict[str, Distribution]:
@@ -321,7 +309,7 @@ class _Rules:
             elif self.rules.ageing is None or isinstance(part, Reference):
                 continue
             elif self.rules.ageing == "catalogue":
-                width = self.drift(part, rule)
+                width = self.drift(name, self.family(part, rule, "ageing", "ageing"))
                 found[name] = Uniform(-width, width)
             else:
                 found[name] = Uniform(*self.rules.ageing)
@@ -333,8 +321,7 @@ class _Rules:
             field = f"network[{number}].parts"
             names = tuple(self.named(rule.parts, field))
             if len(names) < 2 or len({type(self.parts[name]) for name in names}) > 1:
-                said = ", ".join(names)
-                raise self.refuse(field, said, "two or more resistors, or capacitors")
+                raise self.refuse(field, ", ".join(names), "two or more resistors, or capacitors")
             for name in names:
                 if names.count(name) > 1 or any(name in g.parts for g in groups):
                     raise self.refuse(field, name, "parts that are in one network, once")
@@ -345,8 +332,8 @@ class _Rules:
             if rule.family is not None:
                 family = self.array(rule.family, names[0], number)
                 share = family.share
-                same = {float(f"{_sold(self.parts[name]):.9g}") for name in names}
-                if len(same) > 1 or len(names) > family.elements:
+                values = {f"{self.circuit.values[name]:.9g}" for name in names}
+                if len(values) > 1 or len(names) > family.elements:
                     expected = f"up to {family.elements} parts of one value, as an array holds"
                     raise self.refuse(field, ", ".join(names), expected)
             assert share is not None
@@ -375,10 +362,9 @@ class _Rules:
         return self.shape(self.parts[name], self.own.get(name)).law == "binned"
 
 
-def _sold(part: Part) -> float:
-    """The value that a resistor or capacitor is sold for."""
-    assert isinstance(part, Resistor | Capacitor)
-    return part.value
+def kind_of(part: Resistor | Capacitor) -> Kind:
+    """Its kind in the catalogue."""
+    return "resistor" if isinstance(part, Resistor) else "capacitor"
 
 
 def _of_figure(rule: DataSheet | tuple[float, float], figure: Figure) -> Distribution | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from designer.circuit.netlist import Board, Capacitor, Circuit, Reference, Resis
 from designer.model.distributions import Distribution, Normal, Uniform
 from designer.model.measured_values import MeasuredBoards
 from designer.spread import random_streams
-
-if TYPE_CHECKING:
-    pass
 
 NAME = "bench-1"
 SATURATION_SPREAD = 0.05

@@ -3,79 +3,60 @@ from . import (
     margins as margins,
     ngspice_runs as ngspice_runs,
     study_identity as study_identity,
-    study_plan as study_plan,
 )
 from .blame_analysis import (
     Blame as Blame,
+    BlameStage as BlameStage,
+    BlameStatus as BlameStatus,
+    NearLimit as NearLimit,
     ResponseBlame as ResponseBlame,
     blame as blame,
 )
-from .blame_extent import (
-    BUDGET as BUDGET,
-)
-from .blame_pieces import (
-    StoredParts as StoredParts,
-)
 from .blame_replay import (
+    BUDGET as BUDGET,
     BlamedPart as BlamedPart,
 )
-from .blame_status import (
-    BlameStage as BlameStage,
-    BlameStatus as BlameStatus,
-)
-from .corners import (
-    Corner as Corner,
-)
-from .dask_runner import (
-    Cluster as Cluster,
-)
-from .exact_rung import (
-    images as images,
-    waveform_error as waveform_error,
-)
-from .joint_yield import (
-    all_on_one as all_on_one,
-    worst as worst,
-)
-from .layers import (
-    CHUNK as CHUNK,
-    SEARCH as SEARCH,
-    Here as Here,
-    Runner as Runner,
-)
-from .limiting_parts import (
-    limiting as limiting,
-    limitings as limitings,
-    together as together,
-)
-from .margins import (
-    Margin as Margin,
-)
-from .ngspice_runs import (
-    Query as Query,
-    confirm as confirm,
-    hear as hear,
-    way_to_rung as way_to_rung,
-)
-from .ngspice_sampling import (
+from .cross_check import (
     NOMINAL_SAMPLES as NOMINAL_SAMPLES,
     OWN_SAMPLES as OWN_SAMPLES,
     Ask as Ask,
-    Hearing as Hearing,
+    CrossCheck as CrossCheck,
     NgspiceVerdict as NgspiceVerdict,
     StartKind as StartKind,
     Why as Why,
     survives as survives,
 )
-from .power_up_yield import (
-    PowerUpAnswer as PowerUpAnswer,
-    reached_block as reached_block,
+from .exact_rung import (
+    images as images,
+    waveform_error as waveform_error,
+)
+from .layers import (
+    LAYERS as LAYERS,
+    Here as Here,
+    LayerName as LayerName,
+    Runner as Runner,
+    Step as Step,
+    Task as Task,
+)
+from .margins import (
+    DRAWN as DRAWN,
+    Crossing as Crossing,
+    Limit as Limit,
+    Margin as Margin,
+    Prediction as Prediction,
+)
+from .ngspice_runs import (
+    Query as Query,
+    cross_checks as cross_checks,
+    run_queries as run_queries,
+    way_to_rung as way_to_rung,
+)
+from .power_up import (
+    PowerUp as PowerUp,
+    power_up_block as power_up_block,
 )
 from .row_store import (
     BlockStore as BlockStore,
-)
-from .run_result import (
-    RunResult as RunResult,
 )
 from .setting_search import (
     MOST_TRIES as MOST_TRIES,
@@ -88,12 +69,14 @@ from .start_recipe import (
 from .start_recipe_search import (
     find_recipes as find_recipes,
 )
-from .study import (
-    Study as Study,
+from .stored_parts import (
+    StoredParts as StoredParts,
 )
-from .study_cache import (
-    KEPT as KEPT,
-    Kept as Kept,
+from .study import (
+    RunResult as RunResult,
+    Study as Study,
+    plan_study as plan_study,
+    trust_of_yield as trust_of_yield,
 )
 from .study_identity import (
     RULES as RULES,
@@ -102,15 +85,10 @@ from .study_identity import (
     nine_digits as nine_digits,
     study_hash as study_hash,
 )
-from .study_layers import (
-    RUNGS as RUNGS,
-    RungName as RungName,
-    Stores as Stores,
-)
-from .study_plan import (
-    of_yield as of_yield,
-)
 from .tolerance_study import (
+    STUDY_ENGINES as STUDY_ENGINES,
+    Stores as Stores,
+    StudyEngine as StudyEngine,
     check as check,
     tolerance as tolerance,
 )
@@ -134,16 +112,26 @@ from .two_engine_yield import (
 from .verdict import (
     BLOCK as BLOCK,
     Answer as Answer,
+    BoardRow as BoardRow,
     Question as Question,
     StudyPlan as StudyPlan,
     Verdict as Verdict,
     Yield as Yield,
+    all_on_one as all_on_one,
     count as count,
+    count_verdicts as count_verdicts,
     judge as judge,
-    kept as kept,
+    reasons as reasons,
+    rounded as rounded,
+    worst as worst,
+)
+from .worst_corner import (
+    Corner as Corner,
+    Index as Index,
 )
 from .yield_maps import (
     OVERS as OVERS,
+    Axis as Axis,
     Over as Over,
     YieldMap as YieldMap,
     settle_open as settle_open,

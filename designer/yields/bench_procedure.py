@@ -16,7 +16,7 @@ from designer.base.arrays import Array
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.model.tuning_bands import Bands
-from designer.yields.generator_offsets import AS_BUILT, Adjustment
+from designer.yields.adjustment import AS_BUILT, Adjustment
 from designer.yields.verdict import Question
 
 BITS = 8
@@ -106,7 +106,8 @@ class _Person:
         """Set the generator, wait, look: whether the wanted pattern is on the screen."""
         self.setting = setting
         self.steps += 1
-        wanted = self.question.spec.expect or self.question.start
+        wanted = self.question.wanted.expect
+        assert wanted is not None
         periods = wanted.n * max(-(-WATCHED // wanted.n), 3)
         flow = Flow(self.system, setting.of(self.question.excitation).drive)
         waited = flow.run(self.state, DWELL)
@@ -162,11 +163,12 @@ class _Person:
         )
         if n != wanted:
             return False
-        p, q = (self._pulses(trace, side) / (len(laps) // n) for side in (1, -1))
-        spec, nominal = self.question.spec, self.question.start
-        if spec.expect is None:
-            return (p, q) in ((nominal.p, nominal.q), (nominal.q, nominal.p))
-        return p == int(p) and q == int(q) and spec.accepts(n, int(p), int(q))
+        pulses = [self._pulses(trace, side) for side in (1, -1)]
+        shown = len(laps) // n
+        if any(count % shown for count in pulses):
+            return False
+        p, q = (count // shown for count in pulses)
+        return self.question.wanted.accepts(n, p, q)
 
     def _pulses(self, trace: Array, side: int) -> int:
         """How often v1 goes far enough beyond a stop to be seen on fv; the trace is a loop."""

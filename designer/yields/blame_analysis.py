@@ -18,17 +18,16 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from typing import Any
 
 from designer.base.plain_json import plain
-from designer.yields import margins as smooth
-from designer.yields.blame_extent import extent_of
-from designer.yields.blame_pieces import StoredParts
-from designer.yields.blame_replay import KEPT, LOST, BlamedPart as BlamedPart, replay
-from designer.yields.corners import Corner, worst_corners
+from designer.yields import margins as margin_limits
+from designer.yields.blame_replay import KEPT, LOST, BlamedPart, extent_of, replay
 from designer.yields.margins import Margin, Prediction
-from designer.yields.sobol import Index, sobol
+from designer.yields.stored_parts import StoredParts
 from designer.yields.verdict import Answer, StudyPlan, Verdict
+from designer.yields.worst_corner import Corner, Index, sobol, worst_corners
 
 SHOWN_LIMITS = 4
 NOTHING_LOST = "no board was lost, so none was replayed"
@@ -118,15 +117,15 @@ def blame(
     budget: int | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-    pieces: StoredParts | None = None,
+    parts: StoredParts | None = None,
 ) -> Blame:
     """Blame the parts for the losses among these answers (as built, exact rung).
 
     answers : of any of the plan's samples, in any order. lost, kept : boards of each response that
-    are replayed, at most. budget : steps of the work, see ``blame_extent``; all of it if None.
-    progress : called once for each of the extent's steps. pieces : what is known of this very
-    blame, and where the rest goes as it is found. The same answers and budget give the same blame
-    but for ``seconds``.
+    are replayed, at most. budget : steps of the work (``blame_replay``); all of it if None.
+    progress : called once for each of the extent's steps. parts : the finished ones of this very
+    blame, and where the others go. The same answers and budget give the same blame but for
+    ``seconds``.
     """
     began = time.perf_counter()
     spent = Counter[str]()
@@ -138,52 +137,40 @@ def blame(
 
         return step
 
-    pieces = StoredParts() if pieces is None else pieces
+    parts = StoredParts() if parts is None else parts
     extent = extent_of(plan, answers, budget, lost=lost, kept=kept)
-    boards, rows = extent.boards, extent.rows
-    subjects, cut = replay(
-        plan,
-        boards,
-        extent.replays,
-        extent.made,
-        extent.hopeless,
-        pieces,
-        jobs,
-        count_as("attractors"),
-    )
-    found = smooth.margins(
+    attractor, orbit = count_as("attractors"), count_as("orbits")
+    blamed, cut = replay(plan, extent, parts, jobs, attractor)
+    margins = margin_limits.margins(
         plan.circuit,
         plan.questions,
-        boards,
-        rows,
+        extent.boards,
+        extent.rows,
         only=extent.crossings,
         jobs=jobs,
-        progress=count_as("orbits"),
-        pieces=pieces,
+        progress=orbit,
+        parts=parts,
     )
-    indices = sobol(plan.circuit, plan.spread, found, plan.seed)
-    corners = worst_corners(plan, found, indices, jobs, count_as("attractors"), pieces)
+    indices = sobol(plan.circuit, plan.spread, margins, plan.seed)
+    corners = worst_corners(plan, margins, indices, jobs, attractor, parts)
     for _ in range(extent.steps - spent.total()):  # what turned out not to be needed
         progress()
-    responses = []
-    for i, row in enumerate(rows):
-        number = sum(a.verdict is Verdict.LOST for a in row)
-        limits = tuple(NearLimit(x.what, x.distance) for x in found[i].limits[:SHOWN_LIMITS])
-        responses.append(
-            ResponseBlame(
-                question=i,
-                lost=number,
-                subjects=subjects[i],
-                indices=indices[i],
-                limits=limits,
-                prediction=found[i].prediction,
-                sought=found[i].sought,
-                there=found[i].there,
-                corner=corners[i],
-                limited_by=_sentence(row, subjects[i], indices[i], found[i]),
-                skipped=_skipped(row, subjects[i], cut[i]),
-            )
+    responses = [
+        ResponseBlame(
+            question=i,
+            lost=sum(a.verdict is Verdict.LOST for a in row),
+            subjects=blamed[i],
+            indices=indices[i],
+            limits=tuple(NearLimit(x.what, x.distance) for x in margin.limits[:SHOWN_LIMITS]),
+            prediction=margin.prediction,
+            sought=margin.sought,
+            there=margin.there,
+            corner=corners[i],
+            limited_by=_sentence(row, blamed[i], indices[i], margin),
+            skipped=_skipped(row, blamed[i], cut[i]),
         )
+        for i, (row, margin) in enumerate(zip(extent.rows, margins, strict=True))
+    ]
     return Blame(
         tuple(responses),
         1 + max((a.sample for a in answers), default=0),
@@ -196,7 +183,7 @@ def blame(
     )
 
 
-def _skipped(row: Sequence[Answer], subjects: Sequence[BlamedPart], cut: bool) -> str:
+def _skipped(row: Sequence[Answer], blamed: Sequence[BlamedPart], cut: bool) -> str:
     """Why the boards of one question were not replayed, or not all of them."""
     lost = [a for a in row if a.verdict is Verdict.LOST]
     if not lost:
@@ -205,7 +192,7 @@ def _skipped(row: Sequence[Answer], subjects: Sequence[BlamedPart], cut: bool) -
         return ""
     causes = {a.reason for a in lost}
     cause = f" ({causes.pop()})" if len(causes) == 1 else ""
-    replayed = max((s.replayed for s in subjects), default=0)
+    replayed = max((p.replayed for p in blamed), default=0)
     return (
         f"every board is lost{cause}, and no part or group that was made exact saves one of the "
         f"first {replayed}, so no more were replayed"
@@ -213,7 +200,7 @@ def _skipped(row: Sequence[Answer], subjects: Sequence[BlamedPart], cut: bool) -
 
 
 def _sentence(
-    row: Sequence[Answer], subjects: Sequence[BlamedPart], indices: Sequence[Index], margin: Margin
+    row: Sequence[Answer], blamed: Sequence[BlamedPart], indices: Sequence[Index], margin: Margin
 ) -> str:
     """What limits the response, in one line."""
     nearest = margin.limits[0] if margin.limits else None
@@ -226,15 +213,72 @@ def _sentence(
             f"nothing was lost; nearest is {nearest.what}, {nearest.distance:.2g} standard "
             f"deviations away, mostly through {through}"
         )
-    said = []
+    clauses = []
     if nearest is not None:
-        said.append(f"{nearest.what}, mostly through {through}")
-    helped = [s for s in subjects if s.kind == "group" and s.avoided]
+        clauses.append(f"{nearest.what}, mostly through {through}")
+    helped = [p for p in blamed if p.kind == "group" and p.avoided]
     if helped:
         best = helped[0]
-        said.append(f"{best.name} exact: {best.avoided} of {best.replayed} losses avoided")
+        clauses.append(f"{best.name} exact: {best.avoided} of {best.replayed} losses avoided")
     to, number = Counter(a.response for a in lost).most_common(1)[0]
-    said.append(f"lost most often to {to} ({number} of {len(lost)})")
+    clauses.append(f"lost most often to {to} ({number} of {len(lost)})")
     if margin.sought and 2 * margin.there > margin.sought:
-        said.append("the response exists on most lost boards, but the start leads elsewhere")
-    return "; ".join(said)
+        clauses.append("the response exists on most lost boards, but the start leads elsewhere")
+    return "; ".join(clauses)
+
+
+class BlameStage(StrEnum):
+    """How far a blame is."""
+
+    WHOLE = "whole"
+    PART = "part"
+    NOT_YET = "not done yet"
+    LEFT_OUT = "left out"
+
+
+@dataclass(frozen=True)
+class BlameStatus:
+    """How much of a study's blame there is, for its answer, its page and the terminal."""
+
+    stage: BlameStage
+    """How far the blame is."""
+    share: float
+    """Share of the whole work that was done."""
+    budget: int | None
+    """Steps that were allowed, None where all were."""
+    reason: str
+    """Why there is no blame, or not all of it; "" where it is whole."""
+
+    @classmethod
+    def of(cls, blame: Blame | None, wanted: bool = True) -> BlameStatus:
+        """Of what a study has. wanted : whether a blame was asked for."""
+        if blame is None and not wanted:
+            return cls(BlameStage.LEFT_OUT, 0.0, None, "it was not asked for")
+        if blame is None:
+            reason = "the yields stand without it; it is worked out after them"
+            return cls(BlameStage.NOT_YET, 0.0, None, reason)
+        if blame.share >= 1.0:
+            return cls(BlameStage.WHOLE, 1.0, blame.budget, "")
+        reason = (
+            f"{100.0 * blame.share:.0f} % of its work fits into {blame.budget} steps, so fewer "
+            "boards were replayed and followed than without a budget"
+        )
+        return cls(BlameStage.PART, blame.share, blame.budget, reason)
+
+    @property
+    def sentence(self) -> str:
+        """For people; "" where the blame is whole."""
+        if self.stage is BlameStage.WHOLE:
+            return ""
+        if self.stage is BlameStage.PART:
+            return f"Blame, in part: {self.reason}."
+        return f"Blame {self.stage}: {self.reason}."
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "status": str(self.stage),
+            "share": self.share,
+            "budget": self.budget,
+            "reason": self.reason,
+        }

@@ -3,6 +3,11 @@
 Lost boards are replayed on the exact rung with one part at its nominal value (and without offset,
 for an op-amp section), everything else as drawn; so are groups of parts. The same is done with
 boards that were ok, which tells the losses that an exact part would *cause*.
+
+The unit of a blame's work is a step: an attractor that is sought, or an orbit that is followed. How
+many there are is known before the first, so that progress can say how long it takes. What a budget
+leaves out are boards: fewer lost ones are replayed and followed, of every response in turn, never
+fewer parts.
 """
 
 from __future__ import annotations
@@ -11,9 +16,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import islice
-
-import numpy as np
+from itertools import groupby, islice
 
 from designer.base.proportion import wilson
 from designer.base.threads import parallel
@@ -21,8 +24,12 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor, Section
 from designer.spread.board_quantities import exact_in, quantities
-from designer.yields.blame_pieces import StoredParts
-from designer.yields.verdict import Answer, StudyPlan, Verdict, judge
+from designer.spread.spread import draw_many
+from designer.yields.exact_rung import Case, settled
+from designer.yields.margins import DRAWN, ROUNDS, lost_boards
+from designer.yields.stored_parts import StoredParts
+from designer.yields.verdict import Answer, StudyPlan, Verdict
+from designer.yields.worst_corner import CORNER
 
 LOST, KEPT = 50, 20
 """Boards of each response that are replayed: lost ones, and ok ones, in order of the samples."""
@@ -30,10 +37,12 @@ PROBE = 10
 """Lost boards of a response of which no board is ok that decide whether more are replayed."""
 TOGETHER = 8
 """Boards that are replayed before what they showed is stored; no answer depends on it."""
+BUDGET = 20_000
+"""Steps of a blame, about, where nobody says another number."""
 
 _DEAD_ZONE = re.compile(r"R[2-9]\d\d[AB]?")
 _VERDICTS = {str(verdict)[0]: verdict for verdict in Verdict}
-"""A verdict by its first letter, as a piece holds it."""
+"""A verdict by its first letter, as a stored part holds it."""
 
 
 @dataclass(frozen=True)
@@ -68,17 +77,14 @@ class BlamedPart:
 
 
 @dataclass(frozen=True)
-class ExactChange:
-    """A part or a group that is made exact on boards that are replayed."""
+class _Change:
+    """A part or a group that is made exact: parts at their nominal values, or fields of ``Boards``
+    that are nominal on every part."""
 
     name: str
-    """Name of the part or the group."""
     kind: str
-    """What it is; see ``BlamedPart``."""
     parts: tuple[str, ...] = ()
-    """Names of the parts that get their nominal values."""
     fields: tuple[str, ...] = ()
-    """Fields of ``Boards`` that are nominal on every part."""
 
     def of(self, boards: Boards) -> Boards:
         """The same boards with it exact."""
@@ -86,27 +92,97 @@ class ExactChange:
 
 
 @dataclass(frozen=True)
-class Replay:
-    """A board that is asked a question again."""
+class _Replay:
+    """A board that is asked a question again. before : its verdict in the study. place : number of
+    the question's boards of that verdict before it. turn : that, over the most of them."""
 
     question: int
-    """Number of the question of the plan."""
     sample: int
-    """Number of the board."""
     before: Verdict
-    """What became of the board in the study."""
     place: int
-    """Number of lost or of ok boards of the question before it."""
     turn: float
-    """Share of the question's boards of that verdict that come before it."""
 
     @property
-    def piece(self) -> str:
-        """Name of what it shows among the pieces of a blame."""
+    def part(self) -> str:
+        """Name of its result among the stored parts of a blame."""
         return f"replay {self.question} {self.sample}"
 
 
-def replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[Replay]:
+@dataclass(frozen=True)
+class Extent:
+    """How much of a blame is done: all of it where that stays within a budget, else a share."""
+
+    boards: Boards
+    """Boards of the study, by sample."""
+    rows: tuple[tuple[Answer, ...], ...]
+    """The answers to each question, by sample."""
+    changes: tuple[_Change, ...]
+    """What is made exact."""
+    replays: tuple[_Replay, ...]
+    """Boards that are asked again."""
+    crossings: tuple[tuple[int, int], ...]
+    """Lost boards that are followed from the nominal one, as (question, sample)."""
+    steps: int
+    """Steps of all this, at most."""
+    whole: int
+    """Steps of all this without a budget."""
+
+    @property
+    def share(self) -> float:
+        """Of the whole work, that which is done."""
+        return self.steps / self.whole if self.whole else 1.0
+
+    @property
+    def hopeless(self) -> list[bool]:
+        """Of each question, whether boards were lost and none is ok."""
+        seen = [{a.verdict for a in row} for row in self.rows]
+        return [Verdict.LOST in verdicts and Verdict.OK not in verdicts for verdicts in seen]
+
+
+def extent_of(
+    plan: StudyPlan,
+    answers: Sequence[Answer],
+    budget: int | None = None,
+    *,
+    lost: int = LOST,
+    kept: int = KEPT,
+) -> Extent:
+    """What a blame of these answers does within a budget of so many steps; without one, all.
+
+    answers : of any of the plan's samples, in any order. lost, kept : boards of each response that
+    are replayed, at most. The nominal board and the corners are always looked at, and so is one
+    board at least of each response that lost any.
+    """
+    count = max(1 + max((a.sample for a in answers), default=0), DRAWN)
+    boards = draw_many(plan.circuit, plan.spread, plan.seed, range(count))
+    rows = tuple(
+        tuple(sorted((a for a in answers if a.question == i), key=lambda a: a.sample))
+        for i in range(len(plan.questions))
+    )
+    again, followed = _replays(rows, (lost, kept)), _in_turn(lost_boards(rows))
+    samples = sorted({r.sample for r in again})
+    changes = _changes(plan.circuit, boards.take(samples)) if samples else []
+    around = 2 * len(quantities(plan.circuit, boards))
+    least = len(rows) * (around + 2**CORNER)
+    costs = (len(changes), ROUNDS + around)
+    whole = least + len(again) * costs[0] + len(followed) * costs[1]
+    if budget is not None and budget < whole:
+        share = max(budget - least, 0) / (whole - least)
+        # The first boards in turn are one of each response.
+        again = again[: max(int(share * len(again)), len({r.question for r in again}))]
+        followed = followed[: max(int(share * len(followed)), len({q for q, _ in followed}))]
+    steps = least + len(again) * costs[0] + len(followed) * costs[1]
+    return Extent(boards, rows, tuple(changes), tuple(again), tuple(followed), steps, whole)
+
+
+def _in_turn(pairs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The first of each question, then the second of each, …"""
+    by_question = groupby(pairs, key=lambda pair: pair[0])
+    turned = [(turn, pair) for _, group in by_question for turn, pair in enumerate(group)]
+    return [pair for _, pair in sorted(turned)]
+
+
+def _replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[_Replay]:
     """The boards that are replayed, every response's in turn, so that a first part of the list
     holds some of each.
 
@@ -114,7 +190,7 @@ def replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[Rep
     that lost no board has none.
     """
     found = [
-        Replay(i, a.sample, verdict, place, place / limit)
+        _Replay(i, a.sample, verdict, place, place / limit)
         for i, row in enumerate(rows)
         if any(a.verdict is Verdict.LOST for a in row)
         for verdict, limit in zip((Verdict.LOST, Verdict.OK), most, strict=True)
@@ -123,23 +199,23 @@ def replays(rows: Sequence[Sequence[Answer]], most: tuple[int, int]) -> list[Rep
     return sorted(found, key=lambda r: (r.turn, r.question, r.sample))
 
 
-def changes(circuit: Circuit, boards: Boards) -> list[ExactChange]:
+def _changes(circuit: Circuit, boards: Boards) -> list[_Change]:
     """Every part that differs between these boards, and the groups of them."""
     differing = {q.part for q in quantities(circuit, boards)}
     differing |= {s.name for s in circuit.sections if s.name in boards.low}
     kinds = {p.name: _KINDS[type(p)] for p in circuit.parts if type(p) in _KINDS}
     kinds |= {rail.name: "supply" for rail in circuit.rails}
-    out = [ExactChange(n, k, (n,)) for n, k in kinds.items() if n in differing]
+    out = [_Change(n, k, (n,)) for n, k in kinds.items() if n in differing]
 
     def group(name: str, parts: Iterable[str]) -> None:
         parts = tuple(p for p in parts if p in differing)
         if len(parts) > 1:
-            out.append(ExactChange(name, "group", parts))
+            out.append(_Change(name, "group", parts))
 
     if len({q.part for q in quantities(circuit, boards) if q.group == "offset"}) > 1:
-        out.append(ExactChange("all offsets", "group", fields=("offset",)))
+        out.append(_Change("all offsets", "group", fields=("offset",)))
     if boards.low:
-        out.append(ExactChange("all output limits", "group", fields=("low", "high")))
+        out.append(_Change("all output limits", "group", fields=("low", "high")))
     resistors = [r.name for r in circuit.resistors]
     dead_zone = [n for n in resistors if _DEAD_ZONE.fullmatch(n)]
     group("resistors of the dead zone", dead_zone)
@@ -160,93 +236,80 @@ _KINDS: dict[type, str] = {
 
 def replay(
     plan: StudyPlan,
-    boards: Boards,
-    todo: Sequence[Replay],
-    made: Sequence[ExactChange],
-    hopeless: Sequence[bool],
-    pieces: StoredParts,
+    extent: Extent,
+    parts: StoredParts,
     jobs: int,
     progress: Callable[[], None],
 ) -> tuple[list[tuple[BlamedPart, ...]], list[bool]]:
-    """The subjects of each question, most losses avoided first; and whether its replays were cut
+    """The parts of each question, most losses avoided first; and whether its replays were cut
     short.
 
-    boards : of the study, by sample. made : what is made exact. hopeless : of each question,
-    whether no board of the study shows it. Of such a one no more than ``PROBE`` boards are
-    replayed where nothing that was made exact saves any of them. progress : called once an
-    attractor, also where the pieces know it.
+    Of a question that no board of the study shows no more than ``PROBE`` boards are replayed where
+    nothing that was made exact saves any of them. progress : called once an attractor, also where
+    it is stored.
     """
-    first = [r for r in todo if r.before is Verdict.LOST and r.place < PROBE]
-    seen = _all(plan, boards, first, made, pieces, jobs, progress)
+    first = [r for r in extent.replays if r.before is Verdict.LOST and r.place < PROBE]
+    seen = _all(plan, extent, first, parts, jobs, progress)
     saved = {r.question for r in first if Verdict.OK in seen[r]}
-    cut = [lost and i not in saved for i, lost in enumerate(hopeless)]
-    rest = [r for r in todo if r not in seen and not cut[r.question]]
-    seen |= _all(plan, boards, rest, made, pieces, jobs, progress)
-    return [_subjects(i, made, seen) for i in range(len(plan.questions))], cut
+    cut = [hopeless and i not in saved for i, hopeless in enumerate(extent.hopeless)]
+    rest = [r for r in extent.replays if r not in seen and not cut[r.question]]
+    seen |= _all(plan, extent, rest, parts, jobs, progress)
+    return [_blamed(i, extent.changes, seen) for i in range(len(plan.questions))], cut
 
 
 def _all(
     plan: StudyPlan,
-    boards: Boards,
-    todo: Sequence[Replay],
-    made: Sequence[ExactChange],
-    pieces: StoredParts,
+    extent: Extent,
+    replays: Sequence[_Replay],
+    parts: StoredParts,
     jobs: int,
     progress: Callable[[], None],
-) -> dict[Replay, list[Verdict]]:
-    """What each board shows with each change; what the pieces hold is not computed again."""
-    seen: dict[Replay, list[Verdict]] = {}
-    for r in todo:
-        known = pieces.get(r.piece)
+) -> dict[_Replay, list[Verdict]]:
+    """What each board shows with each change; stored results are not computed again."""
+    seen: dict[_Replay, list[Verdict]] = {}
+    for r in replays:
+        known = parts.get(r.part)
         if known is not None:
             seen[r] = [_VERDICTS[letter] for letter in known]
-            for _ in made:
+            for _ in extent.changes:
                 progress()
-    missing = [r for r in todo if r not in seen]
+    missing = [r for r in replays if r not in seen]
     for start in range(0, len(missing), TOGETHER):
         some = missing[start : start + TOGETHER]
-        columns = _some(plan, boards, some, made, jobs, progress)
+        columns = _some(plan, extent, some, jobs, progress)
         seen |= {r: list(row) for r, row in zip(some, zip(*columns, strict=True), strict=True)}
-        pieces.put({r.piece: "".join(str(v)[0] for v in seen[r]) for r in some})
+        parts.put({r.part: "".join(str(v)[0] for v in seen[r]) for r in some})
     return seen
 
 
 def _some(
     plan: StudyPlan,
-    boards: Boards,
-    some: Sequence[Replay],
-    made: Sequence[ExactChange],
+    extent: Extent,
+    replays: Sequence[_Replay],
     jobs: int,
     progress: Callable[[], None],
 ) -> list[list[Verdict]]:
     """For each change the verdicts of these boards with it."""
-    samples = sorted({r.sample for r in some})
-    place = {sample: k for k, sample in enumerate(samples)}
-    drawn = boards.take(samples)
-    questions = [plan.questions[r.question] for r in some]
-    starts = np.array([q.start.start for q in questions])
+    samples = sorted({r.sample for r in replays})
+    drawn = extent.boards.take(samples)
+    asked = [(samples.index(r.sample), plan.questions[r.question]) for r in replays]
+    cases: list[Case] = [(board, q, q.excitation, q.start.start) for board, q in asked]
 
-    def one(change: ExactChange) -> list[Verdict]:
-        orbits = Ensemble(change.of(drawn)).settle(
-            [place[r.sample] for r in some],
-            [q.excitation.drive for q in questions],
-            starts,
-            progress=progress,
-        )
-        pairs = zip(orbits, questions, strict=True)
-        return [judge(orbit, q.spec, q.start)[0] for orbit, q in pairs]
+    def one(change: _Change) -> list[Verdict]:
+        rows = settled(Ensemble(change.of(drawn)), cases, progress=progress)
+        return [verdict for _, verdict, _ in rows]
 
-    return list(parallel(one, made, jobs))
+    return list(parallel(one, extent.changes, jobs))
 
 
-def _subjects(
-    question: int, made: Sequence[ExactChange], seen: dict[Replay, list[Verdict]]
+def _blamed(
+    question: int, changes: Sequence[_Change], seen: dict[_Replay, list[Verdict]]
 ) -> tuple[BlamedPart, ...]:
     own = {r: verdicts for r, verdicts in seen.items() if r.question == question}
     if not own:
         return ()
     out = []
-    for k, change in enumerate(made):
+    for k, change in enumerate(changes):
         tally = Counter((r.before, verdicts[k]) for r, verdicts in own.items())
         replayed, kept = (
             sum(tally[before, now] for now in Verdict if now is not Verdict.FAILED)
@@ -254,4 +317,4 @@ def _subjects(
         )
         avoided, caused = tally[Verdict.LOST, Verdict.OK], tally[Verdict.OK, Verdict.LOST]
         out.append(BlamedPart(change.name, change.kind, avoided, replayed, caused, kept))
-    return tuple(sorted(out, key=lambda s: (-s.avoided, s.caused, s.name)))
+    return tuple(sorted(out, key=lambda p: (-p.avoided, p.caused, p.name)))

@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble, displacement
-from designer.circuit.netlist import nominal_board
+from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_four_state import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.numerics_gate import GateSubject
 from designer.spread.spread import draw_many
-from designer.yields.verdict import Answer, StudyPlan, judge, kept
+from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, rounded
+
+Case = tuple[int, Question, Excitation, Array]
+"""A board, by its place in an ensemble, what it is asked, the generator's setting, the start."""
+
+
+def settled(
+    ensemble: Ensemble,
+    cases: Sequence[Case],
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> list[tuple[Orbit, Verdict, str]]:
+    """The orbit of each case, its verdict and the reason; ``progress`` is called once each."""
+    if not cases:
+        return []
+    boards, questions, excitations, starts = zip(*cases, strict=True)
+    drives = [excitation.drive for excitation in excitations]
+    orbits = ensemble.settle(boards, drives, np.array(starts), jobs=jobs, progress=progress)
+    return [(orbit, *q.judge(orbit)) for q, orbit in zip(questions, orbits, strict=True)]
 
 
 def block(
@@ -43,44 +61,35 @@ def of_boards(
 
 def subjects(plan: StudyPlan, indices: range, jobs: int) -> list[tuple[Answer, GateSubject | None]]:
     """``block``'s answers, each with what ngspice needs of its board; None without an orbit."""
-    return [
-        (
-            answer,
-            GateSubject(boards.reduction(answer.sample - indices.start), excitation, orbit)
-            if len(orbit.start)
-            else None,
-        )
-        for answer, orbit, boards in _asked(
-            plan,
-            draw_many(plan.circuit, plan.spread, plan.seed, indices),
-            indices,
-            jobs,
-            lambda: None,
-        )
-        for excitation in [plan.questions[answer.question].excitation]
-    ]
+    drawn = draw_many(plan.circuit, plan.spread, plan.seed, indices)
+    pairs: list[tuple[Answer, GateSubject | None]] = []
+    for answer, orbit, boards in _asked(plan, drawn, indices, jobs, lambda: None):
+        subject = None
+        if len(orbit.start):
+            reduction = boards.reduction(answer.sample - indices.start)
+            excitation = plan.questions[answer.question].excitation
+            subject = GateSubject(reduction, excitation, orbit)
+        pairs.append((answer, subject))
+    return pairs
 
 
 def _asked(
     plan: StudyPlan, drawn: Boards, indices: range, jobs: int, progress: Callable[[], None]
 ) -> Iterator[tuple[Answer, Orbit, Ensemble]]:
     boards = Ensemble(drawn, jobs=jobs)
-    drives = [q.excitation.drive for q in plan.questions]
-    asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
-    found = boards.respond(
+    asked = plan.asked(indices)
+    settled = boards.respond(
         [i for i, _ in asked],
-        [drives[number] for _, number in asked],
+        [plan.questions[number].excitation.drive for _, number in asked],
         np.array([plan.questions[number].start.start for _, number in asked]),
         jobs=jobs,
         progress=progress,
     )
     twins = all(stop.upper and stop.lower for stop in plan.circuit.stops)
-    wanted = [
-        images(_nominal_displacement(plan, k), mirror=twins) for k in range(len(plan.questions))
-    ]
-    for (i, number), response in zip(asked, found, strict=True):
-        orbit, question = response.orbit, plan.questions[number]
-        verdict, reason = judge(orbit, question.spec, question.start)
+    wanted = [images(_nominal_displacement(plan, q), mirror=twins) for q in plan.questions]
+    for (i, number), response in zip(asked, settled, strict=True):
+        orbit = response.orbit
+        verdict, reason = plan.questions[number].judge(orbit)
         waveform = float("nan")
         if orbit.status is OrbitStatus.PERIODIC:
             waveform = waveform_error(response.trace, wanted[number])
@@ -90,12 +99,12 @@ def _asked(
             verdict=verdict,
             response=orbit.response,
             reason=reason,
-            radius=kept(orbit.radius),
-            penetration=kept(orbit.penetration),
-            miss=kept(orbit.miss),
-            asymmetry=kept(orbit.asymmetry),
+            radius=rounded(orbit.radius),
+            penetration=rounded(orbit.penetration),
+            miss=rounded(orbit.miss),
+            asymmetry=rounded(orbit.asymmetry),
             periods=orbit.periods,
-            waveform=kept(waveform),
+            waveform=rounded(waveform),
         )
         yield answer, orbit, boards
 
@@ -120,9 +129,8 @@ def waveform_error(shown: Array, wanted: Array) -> float:
     return float(np.sqrt(square) / np.abs(wanted[0]).max())
 
 
-def _nominal_displacement(plan: StudyPlan, number: int) -> Array:
+def _nominal_displacement(plan: StudyPlan, question: Question) -> Array:
     """Empty where the nominal circuit has no answer; then no board has a waveform error."""
-    question = plan.questions[number]
     system = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
     try:
         return displacement(Flow(system, question.excitation.drive), question.start)

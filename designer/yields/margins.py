@@ -4,10 +4,9 @@ The margin is the least of a few linear functions of the quantities that differ 
 divided by its own standard deviation over the spread. They come from two places:
 
 - the nominal board: every function of ``dynamics.continued_orbit`` on the wanted orbit, linearised
-by
-  central differences;
+  by central differences;
 - lost boards: on the straight line from the nominal board to a lost one, the point where the
-  response is lost (``yields.crossings``), the function that ends there, and its gradient shortly
+  response is lost (``Crossing``), the function that ends there, and its gradient shortly
   before. Such a limit sees what is curved near the nominal board.
 
 Which of them are kept is decided on the boards of even number: one after the other, the one that
@@ -20,10 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.base.threads import parallel
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
@@ -33,18 +34,24 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
-from designer.yields.blame_pieces import StoredParts, counted
-from designer.yields.crossings import ROUNDS, Crossing, crossings
+from designer.yields.exact_rung import Case, settled
+from designer.yields.stored_parts import StoredParts, counted
 from designer.yields.verdict import Answer, Question, Verdict
 
 STEP = 0.02
 """Of a quantity's standard deviation: half the span of a central difference."""
 BACK = 0.8
 """Of the way to the crossing: where its gradient is taken, since a fold has none at its end."""
+DRAWN = 256
+"""Boards, at least, from which the standard deviations of the quantities are taken."""
 NEAREST = 6
 """Limits of the nominal board that are considered: those nearest to it."""
 CROSSINGS = 8
 """Lost boards for each response whose crossings are sought."""
+PACE = 0.25
+"""Of the way to a lost board: the first steps; then the gap is halved."""
+ROUNDS = 10
+"""Attractors sought for a crossing, at most."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,30 @@ class Limit:
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """Where on the straight way from the nominal board to a lost one the response ends.
+
+    Where it was met on the board itself, ``inside`` and ``outside`` are 1: the response is there,
+    and the nominal orbit leads to another attractor.
+    """
+
+    board: int
+    """The lost board, by its place in the ensemble."""
+    question: int
+    """Number of the question of the plan."""
+    inside: float
+    """The farthest share of the way at which the response was met."""
+    outside: float
+    """The nearest share of the way at which the response was not met."""
+    orbit: Orbit
+    """The orbit at ``inside``."""
+
+    @property
+    def there(self) -> bool:
+        return self.inside == 1.0
+
+
+@dataclass(frozen=True)
 class Prediction:
     """How well the sign of a margin says what became of boards that had no part in choosing it."""
 
@@ -80,9 +111,9 @@ class Prediction:
     lost: int
     """Boards that were lost."""
     missed: int
-    """Lost boards that were said to be ok."""
+    """Lost boards that were predicted to be ok."""
     alarms: int
-    """Ok boards that were said to be lost."""
+    """Ok boards that were predicted to be lost."""
 
     @property
     def right(self) -> int:
@@ -132,45 +163,39 @@ def margins(
     only: Collection[tuple[int, int]] | None = None,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-    pieces: StoredParts | None = None,
+    parts: StoredParts | None = None,
 ) -> tuple[Margin, ...]:
     """The margin of each question.
 
     boards : drawn of the spread; answers : of each question, what became of board ``sample``.
     count : crossings sought for each question. only : of those the ones that are sought, as
     (question, sample); all of them if None. progress : called once an attractor or followed
-    orbit. pieces : what is known already, and where the rest goes.
+    orbit. parts : the known ones, and where the others go.
     """
     differing = quantities(circuit, boards)
-    pieces = StoredParts() if pieces is None else pieces
-    wanted = [pair for pair in lost_boards(answers, count) if only is None or pair in only]
-    met = _met(boards, wanted, questions, pieces, jobs, progress)
+    parts = StoredParts() if parts is None else parts
+    lost = [pair for pair in lost_boards(answers, count) if only is None or pair in only]
+    crossed = _stored_crossings(boards, lost, questions, parts, jobs, progress)
     nominal = Boards.of(circuit, [nominal_board(circuit)])
     probes = _probes(nominal, differing)
-    found: list[list[Limit]] = []
+    limits: list[list[Limit]] = []
     for number, question in enumerate(questions):
         base = _Base(nominal, question, question.start)
-
-        def at_nominal(step: Callable[[], None], base: _Base = base) -> tuple[Limit, ...]:
-            return tuple(_nominal_limits(base, probes, differing, boards, jobs, step))
-
-        found.append(list(counted(pieces, f"nominal {number}", progress, at_nominal)))
-    for crossing in met:
-
-        def at_crossing(step: Callable[[], None], crossing: Crossing = crossing) -> Limit | None:
-            question = questions[crossing.question]
-            return _crossing_limit(crossing, question, boards, differing, jobs, step)
-
+        compute = partial(_nominal_limits, base, probes, differing, boards, jobs)
+        limits.append(list(counted(parts, f"nominal {number}", progress, compute)))
+    for crossing in crossed:
+        question = questions[crossing.question]
+        compute_one = partial(_crossing_limit, crossing, question, boards, differing, jobs)
         name = f"limit {crossing.question} {crossing.board}"
-        limit = counted(pieces, name, progress, at_crossing)
+        limit = counted(parts, name, progress, compute_one)
         if limit is not None:
-            found[crossing.question].append(limit)
-    out = []
+            limits[crossing.question].append(limit)
+    found = []
     for number, row in enumerate(answers):
-        margin = _chosen(Margin(differing, tuple(found[number])), boards, row)
-        own = [c for c in met if c.question == number]
-        out.append(replace(margin, sought=len(own), there=sum(c.there for c in own)))
-    return tuple(out)
+        margin = _chosen(Margin(differing, tuple(limits[number])), boards, row)
+        own = [c for c in crossed if c.question == number]
+        found.append(replace(margin, sought=len(own), there=sum(c.there for c in own)))
+    return tuple(found)
 
 
 def lost_boards(
@@ -187,34 +212,70 @@ def lost_boards(
     ]
 
 
-def _met(
+def _stored_crossings(
     boards: Boards,
-    wanted: Sequence[tuple[int, int]],
+    lost: Sequence[tuple[int, int]],
     questions: Sequence[Question],
-    pieces: StoredParts,
+    parts: StoredParts,
     jobs: int,
     progress: Callable[[], None],
 ) -> list[Crossing]:
-    """The crossing of each of these (question, sample), those that are known not sought again."""
+    """The crossing of each of these (question, sample), those that are stored not sought again."""
     known: dict[tuple[int, int], Crossing] = {}
-    for question, sample in wanted:
-        crossing = pieces.get(f"crossing {question} {sample}")
+    for question, sample in lost:
+        crossing = parts.get(f"crossing {question} {sample}")
         if crossing is not None:
             known[question, sample] = crossing
             for _ in range(ROUNDS):
                 progress()
-    missing = [pair for pair in wanted if pair not in known]
-    found = crossings(
-        boards,
-        [sample for _, sample in missing],
-        [question for question, _ in missing],
-        questions,
-        jobs=jobs,
-        progress=progress,
-    )
-    pieces.put({f"crossing {c.question} {c.board}": c for c in found})
+    missing = [pair for pair in lost if pair not in known]
+    found = crossings(boards, missing, questions, jobs=jobs, progress=progress)
+    parts.put({f"crossing {c.question} {c.board}": c for c in found})
     known |= {(c.question, c.board): c for c in found}
-    return [known[pair] for pair in wanted]
+    return [known[pair] for pair in lost]
+
+
+def crossings(
+    boards: Boards,
+    lost: Sequence[tuple[int, int]],
+    questions: Sequence[Question],
+    *,
+    jobs: int = 1,
+    progress: Callable[[], None] = lambda: None,
+) -> list[Crossing]:
+    """The crossing of each of these (question, sample), along the attractor.
+
+    progress : called ``ROUNDS`` times for each.
+    """
+    size = len(lost)
+    inside, outside = np.zeros(size), np.full(size, np.inf)
+    orbits = [questions[number].start for number, _ in lost]
+    for _ in range(ROUNDS):
+        going = np.flatnonzero(inside < 1.0).tolist()
+        for _ in range(size - len(going)):
+            progress()
+        if not going:
+            continue
+        farther, halfway = np.minimum(inside + PACE, 1.0), 0.5 * (inside + outside)
+        share = np.where(np.isinf(outside), farther, halfway)[going]
+        ensemble = Ensemble(between(boards.take([lost[k][1] for k in going]), share))
+        asked = [questions[lost[k][0]] for k in going]
+        cases: list[Case] = [
+            (i, q, q.excitation, orbits[k].start)
+            for i, (k, q) in enumerate(zip(going, asked, strict=True))
+        ]
+        rows = settled(ensemble, cases, jobs, progress)
+        for k, at, (orbit, verdict, _) in zip(going, share, rows, strict=True):
+            if verdict is Verdict.OK:
+                inside[k], orbits[k] = at, orbit
+                if at == 1.0:
+                    outside[k] = 1.0
+            else:
+                outside[k] = at
+    return [
+        Crossing(sample, number, float(inside[k]), float(outside[k]), orbits[k])
+        for k, (number, sample) in enumerate(lost)
+    ]
 
 
 @dataclass(frozen=True)
@@ -286,19 +347,17 @@ def _nominal_limits(
     boards: Boards,
     jobs: int,
     progress: Callable[[], None],
-) -> list[Limit]:
-    orbit = _follow(base, Ensemble(base.board), 1)[0]
+) -> tuple[Limit, ...]:
+    (orbit,) = _follow(base, Ensemble(base.board), 1)
     if orbit is None:
-        return []
+        return ()
     wanted = functions(orbit, base.symmetric)
     slopes = _gradients(base, wanted, probes, jobs, progress)
-    limits = [
-        limit
-        for f, row in zip(wanted, slopes, strict=True)
-        for limit in [_limit(f, f.value, row, differing, boards)]
-        if limit is not None
+    all_ = [
+        _limit(f, f.value, row, differing, boards) for f, row in zip(wanted, slopes, strict=True)
     ]
-    return sorted(limits, key=lambda limit: limit.distance)[:NEAREST]
+    limits = [limit for limit in all_ if limit is not None]
+    return tuple(sorted(limits, key=lambda limit: limit.distance)[:NEAREST])
 
 
 def _crossing_limit(
@@ -352,33 +411,34 @@ def _limit(
 
 def _chosen(margin: Margin, boards: Boards, answers: Sequence[Answer]) -> Margin:
     """Of its limits those that foretell the verdicts of even boards, tested on the odd ones."""
-    ok = np.array([a.sample for a in answers if a.verdict is Verdict.OK], dtype=np.intp)
-    lost = np.array([a.sample for a in answers if a.verdict is Verdict.LOST], dtype=np.intp)
-    if not margin.limits:
-        return replace(
-            margin, prediction=_prediction(margin, boards, ok[ok % 2 == 1], lost[lost % 2 == 1])
-        )
-    each = margin.each(boards) > 0.0
-    learn_ok, learn_lost = ok[ok % 2 == 0], lost[lost % 2 == 0]
-    fine, kept = np.ones(len(boards), dtype=bool), []
-    best = int(fine[learn_ok].sum() + (~fine[learn_lost]).sum())
+    ok, lost = (
+        np.array([a.sample for a in answers if a.verdict is verdict], dtype=np.intp)
+        for verdict in (Verdict.OK, Verdict.LOST)
+    )
+    if margin.limits:
+        picked = _picked(margin.each(boards) > 0.0, ok[ok % 2 == 0], lost[lost % 2 == 0])
+        nearest = int(np.argmin([limit.distance for limit in margin.limits]))
+        limits = [margin.limits[k] for k in picked or [nearest]]
+        margin = replace(margin, limits=tuple(sorted(limits, key=lambda limit: limit.distance)))
+    fine, ok, lost = margin.of(boards) > 0.0, ok[ok % 2 == 1], lost[lost % 2 == 1]
+    prediction = Prediction(len(ok), len(lost), int(fine[lost].sum()), int((~fine[ok]).sum()))
+    return replace(margin, prediction=prediction)
+
+
+def _picked(each: NDArray[np.bool_], ok: Index, lost: Index) -> list[int]:
+    """Of the limits, those that set more of these verdicts right, one after the other.
+
+    each : (boards, limits) whether each limit lets the board pass.
+    """
+
+    def right(fine: NDArray[np.bool_]) -> int:
+        return int(fine[ok].sum() + (~fine[lost]).sum())
+
+    fine, picked = np.ones(len(each), dtype=bool), list[int]()
     while True:
-        scores = [
-            int((fine & each[:, j])[learn_ok].sum() + (~(fine & each[:, j]))[learn_lost].sum())
-            for j in range(each.shape[1])
-        ]
-        j = int(np.argmax(scores))
-        if scores[j] <= best:
-            break
-        best = scores[j]
-        fine &= each[:, j]
-        kept.append(j)
-    kept = kept or [int(np.argmin([limit.distance for limit in margin.limits]))]
-    limits = sorted((margin.limits[j] for j in kept), key=lambda limit: limit.distance)
-    out = replace(margin, limits=tuple(limits))
-    return replace(out, prediction=_prediction(out, boards, ok[ok % 2 == 1], lost[lost % 2 == 1]))
-
-
-def _prediction(margin: Margin, boards: Boards, ok: Array, lost: Array) -> Prediction:
-    fine = margin.of(boards) > 0.0
-    return Prediction(len(ok), len(lost), int(fine[lost].sum()), int((~fine[ok]).sum()))
+        scores = [right(fine & one) for one in each.T]
+        best = int(np.argmax(scores))
+        if scores[best] <= right(fine):
+            return picked
+        fine = fine & each[:, best]
+        picked.append(best)

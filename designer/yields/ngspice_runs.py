@@ -1,9 +1,9 @@
-"""ngspice's word on samples: which runs it makes, and how long.
+"""Runs of ngspice on samples: which it makes, and how long.
 
 Two starts. On the sample's own orbit of the exact circuit rung ngspice only has to stay there. From
 the nominal design's orbit it has to find its way, as the exact rung did: at least 5/(1 - ρ) drive
 periods (times n for a period of n), and no fewer than the exact trajectory from that very start
-takes to come within `REMAINDER` of its attractor. `yields.ngspice_sampling` says who is asked.
+takes to come within `REMAINDER` of its attractor. `yields.cross_check` says who is asked.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from itertools import groupby
 from typing import TypeVar
 
 import numpy as np
@@ -28,7 +29,7 @@ from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.yields import exact_rung
-from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, StartKind, is_answer
+from designer.yields.cross_check import OR, UNDECIDED, Ask, CrossCheck, StartKind, is_answer
 from designer.yields.verdict import StudyPlan
 
 T = TypeVar("T")
@@ -73,7 +74,7 @@ class Query:
 
 @dataclass(frozen=True)
 class NgspiceAnswer:
-    """What ngspice said."""
+    """What ngspice answers to a query; the fields are those of a ``CrossCheck``."""
 
     response: str
     """n-p-q, status or ``UNDECIDED``."""
@@ -87,7 +88,7 @@ class NgspiceAnswer:
     """Both answers of an undecided one, if both are any."""
 
 
-def hear(
+def cross_checks(
     plan: StudyPlan,
     asks: Sequence[Ask],
     pool: SpicePool,
@@ -96,18 +97,18 @@ def hear(
     *,
     rung: Rung = "ideal",
     refinements: int = NOMINAL_REFINEMENTS,
-) -> list[Hearing]:
+) -> list[CrossCheck]:
     """ngspice's answers in the order of ``asks``, without those that cannot be asked; see
-    `answered`. progress : called once for each answer."""
-    answers: dict[int, Hearing] = {}
-    for k, answer in answered(plan, [asks], pool, jobs, rung=rung, refinements=refinements):
+    `checks_run`. progress : called once for each answer."""
+    answers: dict[int, CrossCheck] = {}
+    for k, answer in checks_run(plan, [asks], pool, jobs, rung=rung, refinements=refinements):
         if answer is not None:
             answers[k] = answer
             progress()
     return [answers[k] for k in sorted(answers)]
 
 
-def answered(
+def checks_run(
     plan: StudyPlan,
     blocks: Iterable[Sequence[Ask]],
     pool: SpicePool,
@@ -115,7 +116,7 @@ def answered(
     *,
     rung: Rung = "ideal",
     refinements: int = NOMINAL_REFINEMENTS,
-) -> Iterator[tuple[int, Hearing | None]]:
+) -> Iterator[tuple[int, CrossCheck | None]]:
     """ngspice's answers as they come, with the number of the ask, counted through all blocks.
 
     The exact rung is asked again for the boards of a block, before the last runs of the block
@@ -133,7 +134,7 @@ def answered(
     None where the exact rung has no orbit or the response no settings.
     """
     asked: dict[int, tuple[int, Ask]] = {}
-    known: deque[tuple[int, Hearing | None]] = deque()
+    known: deque[tuple[int, CrossCheck | None]] = deque()
 
     def queries() -> Iterator[Query]:
         first = 0
@@ -149,10 +150,10 @@ def answered(
                 yield query
             first += len(block)
 
-    for number, (query, answer) in confirmed(pool, queries()):
+    for number, (query, answer) in queries_run(pool, queries()):
         yield from _taken(known)
         k, ask = asked[number]
-        yield k, _hearing(ask, answer, query.subject.discard)
+        yield k, _row(ask, answer, query.subject.discard)
     yield from _taken(known)
 
 
@@ -162,34 +163,24 @@ def _taken(items: deque[T]) -> Iterator[T]:
         yield items.popleft()
 
 
-def _hearing(ask: Ask, answer: NgspiceAnswer, periods: int) -> Hearing:
-    return Hearing(
-        ask.sample,
-        ask.question,
-        ask.kind,
-        ask.why,
-        answer.response,
-        answer.reason,
-        answer.remedies,
-        periods,
-        answer.symmetric,
-        answer.either,
-    )
+def _row(ask: Ask, answer: NgspiceAnswer, periods: int) -> CrossCheck:
+    return CrossCheck(**asdict(ask), **asdict(answer), periods=periods)
 
 
 def _queries(
     plan: StudyPlan, asks: Sequence[Ask], jobs: int, rung: Rung, refinements: int
-) -> Iterator[tuple[Ask, Query | Hearing | None]]:
+) -> Iterator[tuple[Ask, Query | CrossCheck | None]]:
     """Each ask with the run that answers it, or with what is known without one."""
     subjects = _subjects(plan, asks, jobs)
     for ask in asks:
-        subject, question = subjects.get((ask.sample, ask.question)), plan.questions[ask.question]
+        subject, question = subjects[ask.sample, ask.question], plan.questions[ask.question]
         if subject is None or question.settings is None:
             yield ask, None
             continue
         halvings = OWN_REFINEMENTS
         if ask.kind is StartKind.NOMINAL:
-            way = periods_to_settle(_flow(subject), question.start.start, subject.orbit)
+            flow = Flow(subject.system, subject.excitation.drive)
+            way = periods_to_settle(flow, question.start.start, subject.orbit)
             if way > MOST_PERIODS:
                 yield ask, _too_long(ask, way)
                 continue
@@ -207,22 +198,13 @@ def _subjects(
     """What ngspice needs of each board, by (sample, question)."""
     numbers = sorted({a.question for a in asks})
     fewer = replace(plan, questions=tuple(plan.questions[n] for n in numbers))
-    found: dict[tuple[int, int], GateSubject | None] = {}
-    for run in _runs(sorted({a.sample for a in asks})):
-        for answer, subject in exact_rung.subjects(fewer, run, jobs):
-            found[answer.sample, numbers[answer.question]] = subject
-    return found
-
-
-def _runs(samples: Sequence[int]) -> list[range]:
-    """Sorted sample indices as runs without gaps."""
-    runs: list[range] = []
-    for i in samples:
-        if runs and runs[-1].stop == i:
-            runs[-1] = range(runs[-1].start, i + 1)
-        else:
-            runs.append(range(i, i + 1))
-    return runs
+    samples = enumerate(sorted({a.sample for a in asks}))
+    subjects: dict[tuple[int, int], GateSubject | None] = {}
+    for _, group in groupby(samples, key=lambda pair: pair[1] - pair[0]):  # without gaps
+        run = [sample for _, sample in group]
+        for answer, subject in exact_rung.subjects(fewer, range(run[0], run[-1] + 1), jobs):
+            subjects[answer.sample, numbers[answer.question]] = subject
+    return subjects
 
 
 def way_to_rung(orbit: Orbit) -> int:
@@ -233,14 +215,10 @@ def way_to_rung(orbit: Orbit) -> int:
     return math.ceil(min(max(way, numerics_gate.DISCARD), numerics_gate.MOST_DISCARDED))
 
 
-def _too_long(ask: Ask, way: float) -> Hearing:
+def _too_long(ask: Ask, way: float) -> CrossCheck:
     needed = f"{way:.0f} drive periods" if math.isfinite(way) else "more than can be said"
     reason = f"too long a way from the nominal orbit: {needed}, at most {MOST_PERIODS} are run"
-    return Hearing(ask.sample, ask.question, ask.kind, ask.why, "", reason, "", 0, False)
-
-
-def _flow(subject: GateSubject) -> Flow:
-    return Flow(subject.system, subject.excitation.drive)
+    return _row(ask, NgspiceAnswer("", reason), 0)
 
 
 def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
@@ -276,7 +254,7 @@ def periods_to_settle(flow: Flow, start: Array, orbit: Orbit) -> int | float:
     return max(least, arrived)
 
 
-def confirm(
+def run_queries(
     pool: SpicePool,
     queries: Sequence[Query],
     progress: Callable[[], None] = lambda: None,
@@ -293,28 +271,28 @@ def confirm(
     # The longest first: the workers then end together.
     order = sorted(range(len(queries)), key=lambda k: -queries[k].steps)
     answers: dict[int, NgspiceAnswer] = {}
-    for number, (_, answer) in confirmed(pool, (queries[k] for k in order)):
+    for number, (_, answer) in queries_run(pool, (queries[k] for k in order)):
         answers[order[number]] = answer
         progress()
     return [answers[k] for k in range(len(queries))]
 
 
-def confirmed(
+def queries_run(
     pool: SpicePool, queries: Iterable[Query]
 ) -> Iterator[tuple[int, tuple[Query, NgspiceAnswer]]]:
-    """`confirm` as the answers come, with the number of the query."""
-    queue = RunQueue((_Try(q, q.subject, q.settings) for q in queries), _task)
+    """`run_queries` as the answers come, with the number of the query."""
+    queue = RunQueue((_Run(q, q.subject, q.settings) for q in queries), _task)
     for number, outcome in remedies.run(pool, queue):
         index, tried = queue.ended(number)
-        follows = _after(tried, _heard(outcome))
-        if isinstance(follows, _Try):
+        follows = _after(tried, _answer_of(outcome))
+        if isinstance(follows, _Run):
             queue.again.append((index, follows))
         else:
             yield index, (tried.query, follows)
 
 
 @dataclass(frozen=True)
-class _Try:
+class _Run:
     """A run to be made. halved : how often its step has been. before : the last answer at a larger
     step, None where there was none."""
 
@@ -325,21 +303,21 @@ class _Try:
     before: str | None = None
 
 
-def _task(tried: _Try) -> Task[Read]:
+def _task(tried: _Run) -> Task[Read]:
     return numerics_gate.task(tried.subject, tried.settings)
 
 
-def _after(tried: _Try, said: NgspiceAnswer) -> _Try | NgspiceAnswer:
-    """What is asked next, or the answer in the end."""
+def _after(tried: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
+    """The run that follows, or the final answer."""
     query = tried.query
-    none = not is_answer(said.response)
-    if not none and said.response == (tried.before or query.expected):
-        return said
+    none = not is_answer(answer.response)
+    if not none and answer.response == (tried.before or query.expected):
+        return answer
     fine, more = 2**tried.halved, longer(tried.subject)
     # A few strobes of a motion without a period may look like one.
     brief = tried.subject.brief and query.expected == OrbitStatus.APERIODIC
     if (
-        (said.response == OrbitStatus.NOT_SETTLED or (brief and not none))
+        (answer.response == OrbitStatus.NOT_SETTLED or (brief and not none))
         and tried.subject.judged < LONG
         and fine * numerics_gate.length(more) <= MOST_AGAIN
     ):
@@ -349,9 +327,9 @@ def _after(tried: _Try, said: NgspiceAnswer) -> _Try | NgspiceAnswer:
         and 2 * fine * numerics_gate.length(tried.subject) <= MOST_AGAIN
     ):
         half = replace(tried.settings, max_step=tried.settings.max_step / 2.0)
-        before = tried.before if none else said.response
+        before = tried.before if none else answer.response
         return replace(tried, settings=half, halved=tried.halved + 1, before=before)
-    return said if none else _undecided(tried.before, said)
+    return answer if none else _undecided(tried.before, answer)
 
 
 def longer(subject: GateSubject) -> GateSubject:
@@ -360,16 +338,18 @@ def longer(subject: GateSubject) -> GateSubject:
     return replace(subject, discard=2 * subject.discard + STRETCH, judged=LONG)
 
 
-def _undecided(before: str | None, said: NgspiceAnswer) -> NgspiceAnswer:
+def _undecided(before: str | None, answer: NgspiceAnswer) -> NgspiceAnswer:
     if before is None:
         return NgspiceAnswer(
-            UNDECIDED, f"only one run had an answer: {said.response}", said.remedies
+            UNDECIDED, f"only one run had an answer: {answer.response}", answer.remedies
         )
-    both = f"{before}, at a smaller step {said.response}"
-    return NgspiceAnswer(UNDECIDED, both, said.remedies, either=OR.join((before, said.response)))
+    both = f"{before}, at a smaller step {answer.response}"
+    return NgspiceAnswer(
+        UNDECIDED, both, answer.remedies, either=OR.join((before, answer.response))
+    )
 
 
-def _heard(outcome: remedies.AidedRun[Read]) -> NgspiceAnswer:
+def _answer_of(outcome: remedies.AidedRun[Read]) -> NgspiceAnswer:
     tried = " ".join(outcome.tried)
     if isinstance(outcome.result, SimulationFailed):
         return NgspiceAnswer(str(OrbitStatus.FAILED), outcome.result.reason, tried)

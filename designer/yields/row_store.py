@@ -12,28 +12,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, get_type_hints
+from typing import Any, Generic, TypeVar, get_type_hints
 
 import pyarrow as pa
 
 from designer.base.atomic_write import appearing
 from designer.base.keyed_store import KeyedStore, Vouch, nobody, quiet
 from designer.base.parquet_entry import ParquetForm, Rows
-from designer.yields.verdict import BLOCK
+from designer.yields.cross_check import CrossCheck
+from designer.yields.verdict import BLOCK, BoardRow
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-    class Sampled(DataclassInstance, Protocol):
-        """A row of one sample."""
-
-        @property
-        def sample(self) -> int: ...
-
-    Row = TypeVar("Row", bound=Sampled)
-else:
-    Row = TypeVar("Row")
-
+Row = TypeVar("Row", bound=BoardRow | CrossCheck)
 FORMAT = 2
 _TYPES: dict[type, pa.DataType] = {
     bool: pa.bool_(),
@@ -84,29 +73,29 @@ class BlockStore(Generic[Row]):
         self._hints = {f.name: get_type_hints(row)[f.name] for f in fields(row)}
         form = ParquetForm(self._schema_of())
         self._store: KeyedStore[Rows] = KeyedStore(root, form, note, vouch, self._write)
-        self._found: dict[str, list[Row]] = {}
+        self._read: dict[str, list[Row]] = {}
 
     def name(self, block: range) -> str:
         """File of a block, relative to the design folder."""
         return f"{self._folder}/block-{block.start // self.size:06d}.parquet"
 
     def read(self, block: range) -> list[Row]:
-        """What is known of the block's samples in this very study; nothing where a file is of
-        another study, damaged or not there."""
+        """The stored rows of the block's samples in this study; none where a file is of another
+        study, damaged or not there."""
         name = self.name(block)
-        found = self._store.read(name, self._key(block))
-        if found is None:
+        stored = self._store.read(name, self._key(block))
+        if stored is None:
             return []
         try:
-            rows = [self._row_of(values) for values in found]
+            rows = [self._row_of(values) for values in stored]
         except (KeyError, ValueError):  # a word that is none of an enumeration's
             return []
         if name not in self._store.unsealed:
-            self._found[name] = rows
+            self._read[name] = rows
         return [row for row in rows if row.sample in block]
 
     def put(self, block: range, rows: Sequence[Row]) -> None:
-        """Keep a block's rows, all at once; a file that holds just these is left alone.
+        """Store a block's rows, all at once; a file that holds just these is left alone.
 
         Raises
         ------
@@ -114,12 +103,12 @@ class BlockStore(Generic[Row]):
         """
         name = self.name(block)
         self.names.add(name)
-        if self._found.get(name) == list(rows):
+        if self._read.get(name) == list(rows):
             return
         self._guard()
         columns = [self._columns(row) for row in rows]
         self._store.write(name, self._key(block), columns, {"rows": len(rows)})
-        self._found[name] = list(rows)
+        self._read[name] = list(rows)
 
     def say_ignored(self) -> None:
         """Tell once how many blocks of another study or of other rules were left aside."""
@@ -130,17 +119,17 @@ class BlockStore(Generic[Row]):
         self._noted = count
 
     def forget(self) -> None:
-        """Let go of the rows that are kept for comparison: memory stays flat."""
-        self._found.clear()
+        """Drop the rows that are held for comparison: memory stays flat."""
+        self._read.clear()
 
     def _key(self, block: range) -> dict[str, Any]:
         first = block.start // self.size * self.size
         return {"format": FORMAT, "study": self._study, "first": first}
 
     def _write(self, name: str, content: bytes) -> None:
-        kept = "a place that can be written; finished blocks are kept: --resume goes on"
+        expected = "a place that can be written; finished blocks are kept: --resume goes on"
         path = self._root / name
-        with appearing(path, "the block of samples", kept) as partial:
+        with appearing(path, "the block of samples", expected) as partial:
             path.parent.mkdir(exist_ok=True)
             partial.write_bytes(content)
 
@@ -156,10 +145,10 @@ class BlockStore(Generic[Row]):
         return pa.schema(columns)
 
     def _columns(self, row: Row) -> dict[str, Any]:
-        values = asdict(row)
-        for name, value in values.items():
-            if isinstance(value, StrEnum):
-                values[name] = str(value)
+        values: dict[str, Any] = {
+            name: str(value) if isinstance(value, StrEnum) else value
+            for name, value in asdict(row).items()
+        }
         if self._omegas:
             values["omega"] = self._omegas[values["question"]]
         if self._labels:
@@ -167,8 +156,9 @@ class BlockStore(Generic[Row]):
         return values
 
     def _row_of(self, values: Mapping[str, Any]) -> Row:
-        known = {name: values[name] for name in self._hints}
-        for name, kind in self._hints.items():
-            if issubclass(kind, StrEnum):
-                known[name] = kind(known[name])
-        return self._row(**known)
+        return self._row(
+            **{
+                name: kind(values[name]) if issubclass(kind, StrEnum) else values[name]
+                for name, kind in self._hints.items()
+            }
+        )

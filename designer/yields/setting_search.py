@@ -1,19 +1,8 @@
 """A setting of the generator at which a board shows a wanted response: a stated search.
 
-All settings lie inside the bands. The DC offset that centres the board comes first, by
-``yields.centring``; what is then left is a window in frequency and amplitude. In rounds, until
-one works:
-
-1. the centred board, nothing else changed;
-2. the corners and the edge midpoints of the frequency-amplitude band, centred;
-3. halfway between two settings of which one has too few impacts on a stop and the other not, from
-   the nominal orbit and then from the attractor of the better one (as on the bench, where the
-   state carries over);
-4. what a path from the nominal board leads to, which follows the wanted orbit and keeps the setting
-   in the middle of its window (``yields.window_path``); then three more such paths.
-
-Nothing is random. No board is asked more than ``MOST_TRIES`` times, and no more than
-``MOST_FOLLOWED`` orbits are followed for it.
+The rounds are those of "Tuned" in docs/definitions.md: the centred board, its bands' corners,
+settings halved, paths from the nominal board. Nothing is random. No board is asked more than
+``MOST_TRIES`` times, and no more than ``MOST_FOLLOWED`` orbits are followed for it.
 """
 
 from __future__ import annotations
@@ -31,9 +20,10 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
 from designer.yields import window_path
-from designer.yields.generator_offsets import AS_BUILT, Adjustment
-from designer.yields.verdict import Question, Verdict, judge
-from designer.yields.window_path import PathTrail, find_window
+from designer.yields.adjustment import AS_BUILT, Adjustment, widths
+from designer.yields.exact_rung import Case, settled
+from designer.yields.verdict import Question, Verdict
+from designer.yields.window_path import PathSetting, find_window
 
 HALVED = 4
 """Pairs of settings halved at once."""
@@ -57,8 +47,6 @@ class Try:
     """The orbit that it settled on."""
     verdict: Verdict
     """What became of the board."""
-    reason: str
-    """Why it is not ok, or ""."""
 
     @property
     def margin(self) -> float:
@@ -88,12 +76,6 @@ class BoardCase:
         return max(good, key=lambda t: t.margin) if good else None
 
     @property
-    def wanted(self) -> tuple[int, int, int]:
-        """n, p and q."""
-        spec, nominal = self.question.spec.expect, self.question.start
-        return (nominal.n, nominal.p, nominal.q) if spec is None else (spec.n, spec.p, spec.q)
-
-    @property
     def unanswered(self) -> int:
         """Tries that gave no answer."""
         return sum(t.verdict is Verdict.FAILED for t in self.tries)
@@ -111,17 +93,13 @@ def seek(
         left = [case for case in cases if case.found is None]
         proposed = zip(left, parallel(propose, left, jobs), strict=True)
         asked = [(case, setting, start) for case, some in proposed for setting, start in some]
-        if not asked:
-            continue
-        orbits = ensemble.settle(
-            [case.board for case, _, _ in asked],
-            [setting.of(case.question.excitation).drive for case, setting, _ in asked],
-            np.array([start for _, _, start in asked]),
-            jobs=jobs,
-        )
-        for (case, setting, _), orbit in zip(asked, orbits, strict=True):
-            verdict, reason = judge(orbit, case.question.spec, case.question.start)
-            case.tries.append(Try(setting, orbit, verdict, reason))
+        trials: list[Case] = [
+            (case.board, case.question, setting.of(case.question.excitation), start)
+            for case, setting, start in asked
+        ]
+        rows = settled(ensemble, trials, jobs)
+        for (case, setting, _), (orbit, verdict, _) in zip(asked, rows, strict=True):
+            case.tries.append(Try(setting, orbit, verdict))
     return cases
 
 
@@ -134,7 +112,9 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
 
         def propose(case: BoardCase) -> list[Asked]:
             settings = [
-                Adjustment(bands.frequency * f, bands.amplitude * a, case.centre).within(bands)
+                Adjustment.at(
+                    np.array([bands.frequency * f, bands.amplitude * a, case.centre]), bands
+                )
                 for f, a in points
             ]
             return [(s, case.question.start.start) for s in _new(case, settings, bands)]
@@ -147,9 +127,9 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
     def path(first: float, tied: bool) -> Round:
         def propose(case: BoardCase) -> list[Asked]:
             board = boards.take([case.board])
-            trail = find_window(board, case.question, bands, first, tied=tied)
-            case.followed += trail.followed
-            return [(s, case.question.start.start) for s in _deepest(trail, case, bands)]
+            spots, followed = find_window(board, case.question, bands, first, tied=tied)
+            case.followed += followed
+            return [(s, case.question.start.start) for s in _deepest(spots, case, bands)]
 
         return propose
 
@@ -164,7 +144,7 @@ def _rounds(boards: Boards, bands: Bands) -> list[Round]:
     ]
 
 
-def _deepest(trail: PathTrail, case: BoardCase, bands: Bands) -> list[Adjustment]:
+def _deepest(spots: Sequence[PathSetting], case: BoardCase, bands: Bands) -> list[Adjustment]:
     """Settings of a path, the one deepest inside the window first, and none twice.
 
     A window may be smaller than ``APART``, so a setting is left out only where the very same was
@@ -172,7 +152,7 @@ def _deepest(trail: PathTrail, case: BoardCase, bands: Bands) -> list[Adjustment
     """
     known = [AS_BUILT, *(t.setting for t in case.tries)]
     chosen: list[Adjustment] = []
-    for spot in sorted(trail.spots, key=lambda spot: -spot.radius):
+    for spot in sorted(spots, key=lambda spot: -spot.radius):
         here = spot.setting
         if here not in known and all(_distance(here, s, bands) > APART for s in chosen):
             chosen.append(here)
@@ -186,7 +166,7 @@ def _halfway(case: BoardCase, bands: Bands, follow: bool) -> list[Asked]:
     """
     chosen: list[Asked] = []
     for better, worse in _brackets(case, bands):
-        middle = _middle(better.setting, worse.setting)
+        middle = Adjustment(*(0.5 * (better.setting.vector + worse.setting.vector)).tolist())
         known = [setting for setting, _ in chosen]
         if not _new(case, [*known, middle], bands)[len(known) :]:
             continue
@@ -200,9 +180,11 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
     """Pairs of tries, the better one of each first, by how far their counts are off and then by
     their distance. A pair leaves the wanted count of a stop between it if not both have too many
     impacts there, or both too few; one stop of which that holds is enough, two are better."""
-    n, p, q = case.wanted
+    expect = case.question.wanted.expect
+    assert expect is not None
+    n, p, q = expect.n, expect.p, expect.q
     counted = [t for t in case.tries if t.orbit.n]
-    found = []
+    pairs = []
     for wanted in {(p, q), (q, p)}:
         off = [
             (t.orbit.p / t.orbit.n - wanted[0] / n, t.orbit.q / t.orbit.n - wanted[1] / n)
@@ -218,8 +200,8 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
                 continue
             i, j = (i, j) if cost[i] <= cost[j] else (j, i)
             apart = _distance(counted[i].setting, counted[j].setting, bands)
-            found.append((cost[i] + cost[j] + outside, apart, i, j))
-    return [(counted[i], counted[j]) for _, _, i, j in sorted(found)]
+            pairs.append((cost[i] + cost[j] + outside, apart, i, j))
+    return [(counted[i], counted[j]) for _, _, i, j in sorted(pairs)]
 
 
 def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[Adjustment]:
@@ -232,19 +214,8 @@ def _new(case: BoardCase, settings: Sequence[Adjustment], bands: Bands) -> list[
     return fresh
 
 
-def _middle(a: Adjustment, b: Adjustment) -> Adjustment:
-    return Adjustment(
-        0.5 * (a.frequency + b.frequency),
-        0.5 * (a.amplitude + b.amplitude),
-        0.5 * (a.offset + b.offset),
-    )
-
-
 def _distance(a: Adjustment, b: Adjustment, bands: Bands) -> float:
     """Largest difference over the half-band; a band of no width has only one value."""
-    pairs = (
-        (a.frequency - b.frequency, bands.frequency),
-        (a.amplitude - b.amplitude, bands.amplitude),
-        (a.offset - b.offset, bands.offset),
-    )
-    return max((abs(d) / width for d, width in pairs if width > 0.0), default=0.0)
+    width = widths(bands)
+    wide = width > 0.0
+    return float((np.abs(a.vector - b.vector)[wide] / width[wide]).max(initial=0.0))

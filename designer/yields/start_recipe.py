@@ -93,12 +93,6 @@ class Recipe:
     def wait_seconds(self) -> float:
         return self.wait / self.target.frequency
 
-    @property
-    def rate(self) -> float:
-        """Of all trials, those that reached it."""
-        trials = self.trials + self.board_trials
-        return (self.reached + self.board_reached) / trials if trials else 0.0
-
     def refined(self, slower: int = 1) -> Recipe:
         """The same sweep in steps ``FINER`` times as fine, ``slower`` times as long in all."""
         return replace(
@@ -108,20 +102,21 @@ class Recipe:
     @property
     def text(self) -> str:
         """The recipe in words, for ``setup.csv``: what a person sets on a generator."""
-        said = [f"wait {seconds(self.wait_seconds)} or longer", *self._success()]
+        end = [f"wait {_seconds(self.wait_seconds)} or longer", *self._success()]
         if self.way is RecipeKind.DIRECT:
-            return "; ".join(["switch on at this setting", *said])
-        return "; ".join([f"set {self._setting(self.first)}, switch on", self._sweep(), *said])
+            return "; ".join(["switch on at this setting", *end])
+        first = f"set {self._hertz(self.first)}, {volts(self.first.amplitude)} V peak, switch on"
+        return "; ".join([first, self._sweep(), *end])
 
     def _sweep(self) -> str:
         """What is turned, to where, in what time."""
-        took = seconds(self.sweep_seconds)
+        took = _seconds(self.sweep_seconds)
         steps = f"in {self.steps} steps of equal ratio, {self.hold} periods each ({took} in all)"
         slower = f" (up to {SLOWER} times slower is fine)" if self.slower else ""
         if self.way is RecipeKind.AMPLITUDE:
             how = f"in {took}" if self.smooth else steps
             return f"raise the amplitude to {volts(self.target.amplitude)} V peak {how}{slower}"
-        to = f"{self._hertz(self.target)}"
+        to = self._hertz(self.target)
         if not self.smooth:
             return f"step to {to} {steps}, without a break in phase{slower}"
         return f"sweep logarithmically to {to} in {took}, once, then hold{slower}"
@@ -141,18 +136,16 @@ class Recipe:
             shows = self.able or "none"
             yield f"caution: {shows} of {self.boards} sample boards can show it at this setting"
 
-    def _setting(self, at: Excitation) -> str:
-        return f"{self._hertz(at)}, {volts(at.amplitude)} V peak"
-
     def _hertz(self, at: Excitation) -> str:
         """In Hz and dimensionless."""
-        said = f"{hertz(at.frequency)} Hz"
+        text = f"{hertz(at.frequency)} Hz"
         if self.omega is None:
-            return said
-        return f"{said} (omega {self.omega * at.frequency / self.target.frequency:.4g})"
+            return text
+        return f"{text} (omega {self.omega * at.frequency / self.target.frequency:.4g})"
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: settings in Hz and V, times in drive periods and seconds."""
+        counts = ("reached", "trials", "board_reached", "board_trials", "boards", "able")
         return {
             "way": str(self.way),
             "frequency_hz": self.first.frequency,
@@ -164,15 +157,7 @@ class Recipe:
             "wait_periods": self.wait,
             "sweep_seconds": self.sweep_seconds,
             "wait_seconds": self.wait_seconds,
-            "reached": self.reached,
-            "trials": self.trials,
-            "board_reached": self.board_reached,
-            "board_trials": self.board_trials,
-            "boards": self.boards,
-            "able": self.able,
-            "smooth": self.smooth,
-            "slower": self.slower,
-            "text": self.text,
+            **{name: getattr(self, name) for name in (*counts, "smooth", "slower", "text")},
         }
 
 
@@ -190,6 +175,6 @@ def volts(value: float) -> str:
     return f"{float(f'{value:.5g}'):.12g}"
 
 
-def seconds(value: float) -> str:
+def _seconds(value: float) -> str:
     """A time on the bench: two digits are enough."""
     return f"{float(f'{value:.2g}'):.12g} s"

@@ -22,9 +22,10 @@ from designer.circuit.netlist import Excitation, nominal_board
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
-from designer.yields.power_up_yield import switched_on
+from designer.yields.exact_rung import Case, settled
+from designer.yields.power_up import switched_on
 from designer.yields.start_recipe import SLOWER, Recipe, RecipeKind
-from designer.yields.verdict import Question, StudyPlan, Verdict, judge
+from designer.yields.verdict import Question, StudyPlan, Verdict
 
 TRIALS = 12
 """Phases at which the nominal circuit is switched on."""
@@ -56,11 +57,11 @@ def find_recipes(plan: StudyPlan, jobs: int = 1) -> tuple[Recipe, ...]:
     """A recipe for each question of the plan; its seed and number of samples do not matter."""
     nominal = Ensemble(Boards.of(plan.circuit, [nominal_board(plan.circuit)]))
     sample = Ensemble(draw_many(plan.circuit, plan.spread, 0, range(BOARDS), TRIAL))
-    found = []
+    recipes = []
     for number, question in enumerate(plan.questions, start=1):
         with part(f"start recipe of response {number} of {len(plan.questions)}"):
-            found.append(_find(question, nominal, sample, jobs))
-    return tuple(found)
+            recipes.append(_find(question, nominal, sample, jobs))
+    return tuple(recipes)
 
 
 def candidates(question: Question, system: PiecewiseLinearSystem) -> Iterator[Recipe]:
@@ -153,18 +154,15 @@ class _Bench:
     def _worked(
         self, ensemble: Ensemble, starts: Sequence[tuple[int, Question, Recipe, float]]
     ) -> tuple[bool, ...]:
-        ended = switched_on(ensemble, starts, self.jobs)
-        return tuple(e.verdict is Verdict.OK for e in ended)
+        ends = switched_on(ensemble, starts, self.jobs)
+        return tuple(end.verdict is Verdict.OK for end in ends)
 
 
 def _find(question: Question, nominal: Ensemble, sample: Ensemble, jobs: int) -> Recipe:
-    as_built = sample.settle(
-        range(BOARDS),
-        [question.excitation.drive] * BOARDS,
-        np.tile(question.start.start, (BOARDS, 1)),
-        jobs=jobs,
-    )
-    able = [i for i, o in enumerate(as_built) if judge(o, question.spec, question.start)[0] == "ok"]
+    start = question.start.start
+    cases: list[Case] = [(i, question, question.excitation, start) for i in range(BOARDS)]
+    as_built = settled(sample, cases, jobs)
+    able = [i for i, (_, verdict, _) in enumerate(as_built) if verdict is Verdict.OK]
     bench = _Bench(question, nominal, sample, tuple(able), jobs)
     tried: list[_Trials] = []
     for option in candidates(question, nominal.reduction(0).system()):

@@ -1,26 +1,33 @@
-"""The tolerance study of a design: which responses can be asked, and what became of each board."""
+"""The tolerance study of a design: which responses are asked, and what became of each board."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED
 from designer.base.frames import frame, table_html
+from designer.base.reason import Reason
+from designer.catalog.catalog import Catalog
 from designer.check.checked_design import CheckedResponse
-from designer.yields import two_engine_yield as combined
-from designer.yields.blame_analysis import Blame
-from designer.yields.blame_status import BlameStatus
-from designer.yields.joint_yield import all_on_one
-from designer.yields.ngspice_sampling import Hearing
-from designer.yields.power_up_yield import PowerUpAnswer
+from designer.check.trust import Trust
+from designer.circuit.design import Design
+from designer.model.find_responses import ModelResponse
+from designer.model.model_file import ModelFile
+from designer.spice.equation_check import EquationCheck
+from designer.spread.part_rules import spread_of
+from designer.yields import two_engine_yield
+from designer.yields.blame_analysis import Blame, BlameStatus
+from designer.yields.cross_check import CrossCheck
+from designer.yields.power_up import PowerUp
+from designer.yields.row_store import Row
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
-from designer.yields.verdict import Answer, StudyPlan, Yield, count
+from designer.yields.verdict import Answer, BoardRow, Question, StudyPlan, Yield, all_on_one, count
 from designer.yields.yield_maps import YieldMap
 
 if TYPE_CHECKING:
@@ -31,6 +38,38 @@ BOARD_COLUMNS = tuple(
     "asymmetry periods waveform".split()
 )
 """Of the table of boards."""
+_COUNTS = ("ok", "lost", "grazing", "failed", "samples", "rate")
+
+
+def plan_study(
+    modelfile: ModelFile,
+    design: Design,
+    checked: Sequence[CheckedResponse],
+    catalog: Catalog,
+    *,
+    samples: int,
+    seed: int,
+) -> StudyPlan:
+    """The Monte Carlo study of these responses, boards as the model file says.
+
+    Every one of ``checked`` is a question: leave out what the nominal circuit does not show
+    periodically, since there is no nominal orbit to start from.
+    """
+    return StudyPlan(
+        circuit=design.circuit,
+        spread=spread_of(modelfile, design.circuit, catalog),
+        seed=seed,
+        samples=samples,
+        questions=tuple(
+            Question(
+                c.model.spec,
+                c.excitation,
+                c.circuit,
+                c.gate.settings if c.gate is not None and c.gate.passed else None,
+            )
+            for c in checked
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -47,8 +86,8 @@ class Study:
     """Why a response is no question, by index."""
     answers: tuple[Answer, ...]
     """Rows of the boards as built."""
-    heard: tuple[Hearing, ...] = ()
-    """What ngspice said about boards of the study."""
+    cross_checks: tuple[CrossCheck, ...] = ()
+    """What ngspice answered about boards of the study."""
     until: float | None = None
     """Width of the intervals that was asked for; None for none."""
     narrow: bool | None = None
@@ -57,7 +96,7 @@ class Study:
     """Rows of the boards with the generator tuned; None where these were not asked for."""
     trimmed: tuple[Trimmed, ...] | None = None
     """Rows of the boards with the trimmer set; None where no trimmer is fitted."""
-    reached: tuple[PowerUpAnswer, ...] | None = None
+    power_ups: tuple[PowerUp, ...] | None = None
     """Rows of the boards powered up; None where these were not asked for."""
     recipes: tuple[Recipe, ...] | None = None
     """Recipes of power-up, one for each question."""
@@ -72,21 +111,9 @@ class Study:
         """The answers for response number ``index``, by sample."""
         return self._answers.get(index, ())
 
-    def heard_of(self, index: int) -> tuple[Hearing, ...]:
-        """What ngspice said about response number ``index``, by sample."""
-        return tuple(h for h in self.heard if self.asked[h.question] == index)
-
-    def tuned_of(self, index: int) -> tuple[Tuned, ...]:
-        """The rows of the tuned layer of response number ``index``."""
-        return tuple(t for t in self.tuned or () if self.asked[t.question] == index)
-
-    def trimmed_of(self, index: int) -> tuple[Trimmed, ...]:
-        """The rows of the trimmed layer of response number ``index``."""
-        return tuple(t for t in self.trimmed or () if self.asked[t.question] == index)
-
-    def reached_of(self, index: int) -> tuple[PowerUpAnswer, ...]:
-        """The rows of the reached layer of response number ``index``."""
-        return tuple(r for r in self.reached or () if self.asked[r.question] == index)
+    def rows_of(self, index: int, rows: Sequence[Row] | None) -> tuple[Row, ...]:
+        """Those of these rows of a layer that are about response number ``index``, by sample."""
+        return tuple(row for row in rows or () if self.asked[row.question] == index)
 
     def boards(self) -> pd.DataFrame:
         """A row for each board and response, as built.
@@ -103,23 +130,24 @@ class Study:
 
     def _board(self, answer: Answer) -> dict[str, Any]:
         index = self.asked[answer.question]
-        model = self.checked[index].model
-        values = asdict(answer) | {
-            "board": self.plan.label(answer.sample) if self.plan.labels else None,
-            "number": index + 1,
-            "omega": model.omega,
-            "expected": model.expected,
-            "verdict": str(answer.verdict),
-        }
+        values = asdict(answer) | self._head(index) | {"verdict": str(answer.verdict)}
+        values["board"] = self.plan.label(answer.sample) if self.plan.labels else None
         return {name: values[name] for name in BOARD_COLUMNS}
+
+    def _head(self, index: int) -> dict[str, Any]:
+        model = self.checked[index].model
+        return {"number": index + 1, "omega": model.omega, "expected": model.expected}
 
     def yield_rows(self) -> list[dict[str, Any]]:
         """The rows of ``yields_table``."""
         rows = []
-        for index, (checked, counted) in enumerate(zip(self.checked, self.yields, strict=True)):
-            model = checked.model
-            head = {"number": index + 1, "omega": model.omega, "expected": model.expected}
-            rows.append({**head, **_counts(counted), "left_out": self.left_out.get(index, "")})
+        for index, counted in enumerate(self.yields):
+            low, high = (None, None) if counted is None else counted.interval
+            counts = {name: getattr(counted, name, None) for name in _COUNTS}
+            left_out = self.left_out.get(index, "")
+            rows.append(
+                {**self._head(index), **counts, "low": low, "high": high, "left_out": left_out}
+            )
         return rows
 
     def _repr_html_(self) -> str:
@@ -137,9 +165,9 @@ class Study:
     def combined(self) -> tuple[Combined | None, ...]:
         """For each response: both engines together; None where ngspice has no answer."""
         return tuple(
-            combined.combine(
+            two_engine_yield.combine(
                 self.answers_to(i),
-                self.heard_of(i),
+                self.rows_of(i, self.cross_checks),
                 self.plan.questions[self.asked.index(i)],
                 census=self.plan.census,
             )
@@ -155,28 +183,12 @@ class Study:
 
     @property
     def all_on_one_board(self) -> Yield | None:
-        """Boards that show every response as built; None unless there are two at least and each
-        was asked."""
-        return self._on_one(self.answers)
+        """Boards that show every response as built; as ``on_one_board``."""
+        return self.on_one_board(self.answers)
 
-    @property
-    def all_tuned(self) -> Yield | None:
-        """The same with the generator free within the bands, for each response its own."""
-        return self._on_one(self.tuned)
-
-    @property
-    def all_trimmed(self) -> Yield | None:
-        """The same with the trimmer at its one setting, the generator as built."""
-        return self._on_one(self.trimmed)
-
-    @property
-    def all_reached(self) -> Yield | None:
-        """The same from power-up by the recipes."""
-        return self._on_one(self.reached)
-
-    def _on_one(
-        self, rows: Sequence[Answer | Tuned | Trimmed | PowerUpAnswer] | None
-    ) -> Yield | None:
+    def on_one_board(self, rows: Sequence[BoardRow] | None) -> Yield | None:
+        """Boards that show every response by these rows of a layer; None unless there are two
+        responses at least and each was asked."""
         if not rows or len(self.asked) < max(len(self.checked), 2):
             return None
         return all_on_one(rows, self.plan.census)
@@ -189,10 +201,66 @@ class Study:
         return {index: tuple(rows) for index, rows in by.items()}
 
 
-def _counts(counted: Yield | None) -> dict[str, Any]:
-    """The counts of a yield, and its rate; None where it was not asked."""
-    names = ("ok", "lost", "grazing", "failed", "samples", "rate")
-    if counted is None:
-        return dict.fromkeys((*names, "low", "high"))
-    low, high = counted.interval
-    return {**{name: getattr(counted, name) for name in names}, "low": low, "high": high}
+def trust_of_yield(counted: Yield, nominal: Trust) -> Trust:
+    """Of a yield: not better than the nominal orbit's that each board starts on, nor with so many
+    boards without an answer that they could move it out of its own interval."""
+    doubts = [Reason(f"the nominal response: {d.words}", d.figures) for d in nominal.doubts]
+    if counted.failed:
+        least = counted.ok / counted.samples
+        most = (counted.ok + counted.failed) / counted.samples
+        low, high = counted.interval
+        if counted.failed == counted.samples or least < low or most > high:
+            # Counts of boards, which the study's rows have: no measured figures.
+            reason = (
+                f"{counted.failed} of {counted.samples} boards have no answer; whatever they "
+                f"were, the yield lies between {100 * least:.3g} and {100 * most:.3g} %"
+            )
+            doubts.append(Reason(reason))
+    return Trust(error=nominal.error, doubts=tuple(doubts), answered=True)
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What the main job answers."""
+
+    modelfile: ModelFile
+    """The model file."""
+    catalog: Catalog
+    """The catalogue."""
+    found: tuple[ModelResponse, ...]
+    """What the model shows of the wanted responses."""
+    design: Design
+    """The design."""
+    checked: tuple[CheckedResponse, ...]
+    """The wanted responses on all engines."""
+    study: Study
+    """The tolerance study."""
+    provenance: dict[str, Any] = field(default_factory=dict)
+    """Versions, seed and settings."""
+    cost: dict[str, float] = field(default_factory=dict)
+    """Wall times [s] by stage."""
+    equations: EquationCheck | None = None
+    """The equation check; None where it was not made."""
+
+    @property
+    def plan(self) -> StudyPlan:
+        return self.study.plan
+
+    @property
+    def answers(self) -> tuple[Answer, ...]:
+        return self.study.answers
+
+    @property
+    def yields(self) -> tuple[Yield | None, ...]:
+        """For each response; None where it was left out of the study."""
+        return self.study.yields
+
+    def _repr_html_(self) -> str:
+        return table_html(self.modelfile.title, self.study.yield_rows())
+
+    @property
+    def satisfied(self) -> bool:
+        """Whether every wanted response was found, every engine shows it and can be trusted there,
+        and the netlist computes the model's equation."""
+        right = self.equations is None or self.equations.passed
+        return right and all(c.model.found and c.agrees and c.trusted for c in self.checked)

@@ -11,8 +11,8 @@ from typing import Any
 from designer.base.plain_json import plain
 from designer.base.version import __version__
 from designer.circuit.netlist import Part
-from designer.yields import ngspice_runs, ngspice_sampling
-from designer.yields.verdict import StudyPlan, kept
+from designer.yields import cross_check, ngspice_runs
+from designer.yields.verdict import StudyPlan, rounded
 
 RULES = {
     "samples": 1,
@@ -39,11 +39,11 @@ def study_hash(
     What is computed (settings of the generator and of ngspice, starts, recipes) counts to nine
     digits: the last ones depend on the machine's linear algebra.
     """
-    said = _samples(plan)
+    inputs = _samples(plan)
     if layer != "samples":
-        said["layer"] = [layer, RULES[layer], nine_digits(plain(more or {}))]
+        inputs["layer"] = [layer, RULES[layer], nine_digits(plain(more or {}))]
     if layer == "ngspice":
-        said["ngspice"] = {
+        inputs["ngspice"] = {
             "refinements": [ngspice_runs.OWN_REFINEMENTS, ngspice_runs.NOMINAL_REFINEMENTS],
             "periods": [
                 ngspice_runs.UNKNOWN_PERIODS,
@@ -53,13 +53,13 @@ def study_hash(
                 ngspice_runs.LONG,
                 ngspice_runs.MOST_AGAIN,
             ],
-            "undecided": ngspice_sampling.UNDECIDED,
+            "undecided": cross_check.UNDECIDED,
             "settings": [
                 None if q.settings is None else nine_digits(plain(q.settings.as_dict()))
                 for q in plan.questions
             ],
         }
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode("ascii")).hexdigest()
+    return _hash(inputs)
 
 
 def blame_hash(plan: StudyPlan) -> str:
@@ -68,21 +68,24 @@ def blame_hash(plan: StudyPlan) -> str:
 
 
 def checks_hash(design: str | None, ngspice: str | None) -> str:
-    """Hash of everything that decides what ngspice says of a design's nominal board.
+    """Hash of everything that decides ngspice's answers about a design's nominal board.
 
     design : hash of ``design.json``. ngspice : its version.
     """
-    said = [__version__, RULES["checks"], design, ngspice]
-    return hashlib.sha256(json.dumps(said).encode("ascii")).hexdigest()
+    return _hash([__version__, RULES["checks"], design, ngspice])
 
 
 def nine_digits(value: Any) -> Any:
     """JSON data with every number in it to nine digits."""
     if isinstance(value, float):
-        return kept(value)
+        return rounded(value)
     if isinstance(value, Mapping):
         return {key: nine_digits(v) for key, v in value.items()}
     return [nine_digits(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+def _hash(inputs: Any) -> str:
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode("ascii")).hexdigest()
 
 
 def _simulated(part: Part) -> dict[str, Any]:

@@ -1,9 +1,11 @@
-"""Run a tolerance study."""
+"""Run a tolerance study, layer by layer: how far it grows and who is asked what."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Literal
 
 from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED, at_least, cores
 from designer.base.progress import Progress
@@ -12,16 +14,61 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model_file import need_responses
+from designer.model.tuning_bands import Bands
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spread.spread import NO_BANDWIDTH
-from designer.yields import layers, study_plan
-from designer.yields.blame_extent import BUDGET
-from designer.yields.layers import Runner
-from designer.yields.study import Study
-from designer.yields.study_layers import RungName, Stores, Work
-from designer.yields.trimmed_yield import dc_trim
-from designer.yields.yield_maps import Over
+from designer.yields import cross_check, layers
+from designer.yields.blame_analysis import Blame, blame
+from designer.yields.blame_replay import BUDGET, extent_of
+from designer.yields.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
+from designer.yields.layers import LayerName, Runner, Task
+from designer.yields.power_up import power_up_block
+from designer.yields.row_store import BlockStore
+from designer.yields.setting_search import MOST_TRIES
+from designer.yields.start_recipe_search import find_recipes
+from designer.yields.stored_parts import StoredParts
+from designer.yields.study import Study, plan_study
+from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
+from designer.yields.tuned_yield import tuned_block
+from designer.yields.verdict import BLOCK, StudyPlan
+from designer.yields.yield_maps import Over, yield_map
+
+MOST_UNTIL = 100_000
+"""Samples at which a study that grows until its intervals are narrow gives up."""
+MOST_NOMINAL = 1000
+"""Boards of each response that ngspice starts from the nominal orbit in such a study, at most."""
+MORE_NOMINAL = 50
+"""By how many their number grows."""
+
+StudyEngine = Literal["exact", "auto", "ngspice"]
+"""Which engine decides; "auto": the exact circuit, and ngspice is asked about a sample."""
+STUDY_ENGINES: tuple[StudyEngine, ...] = ("exact", "auto", "ngspice")
+
+
+class Stores:
+    """Where the layers of a study are kept, and its blame; this one keeps nothing."""
+
+    def rows(
+        self, layer: LayerName, plan: StudyPlan, more: Mapping[str, Any] | None = None
+    ) -> BlockStore[Any] | None:
+        """The blocks of a layer. more : what decides its rows beside the plan."""
+        return None
+
+    def blame(self, plan: StudyPlan, budget: int) -> Blame | None:
+        """The whole blame, or one of this budget at least."""
+        return None
+
+    def put_blame(self, plan: StudyPlan, blame: Blame) -> None:
+        pass
+
+    def blame_parts(self, plan: StudyPlan) -> StoredParts:
+        """Where the finished parts of a blame are."""
+        return StoredParts()
+
+    def maps(self, plan: StudyPlan) -> StoredParts:
+        """Where the finished yield maps are."""
+        return StoredParts()
 
 
 def check(
@@ -34,11 +81,7 @@ def check(
 
     gates : see ``checked_design.check``.
     """
-    said = Progress() if progress is None else progress
-
-    def stage(text: str) -> None:
-        said.stage(text)
-
+    stage = (Progress() if progress is None else progress).stage
     return checked_design.check(synthesis.design, synthesis.found, pool, stage, gates=gates)
 
 
@@ -47,7 +90,7 @@ def tolerance(
     *,
     samples: int = SAMPLES,
     until: float | None = None,
-    rung: RungName = "auto",
+    rung: StudyEngine = "auto",
     tuned: bool = False,
     reached: bool = False,
     blamed: bool = True,
@@ -66,9 +109,9 @@ def tolerance(
     """How many boards show each response, under the spread of the model file.
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
-    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``yields.ngspice_sampling``
+    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``yields.cross_check``
     says, ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted; a fitted
-    trimmer is always asked for. blame_budget : steps of the blame (``blame_extent``). maps :
+    trimmer is always asked for. blame_budget : steps of the blame (``blame_replay``). maps :
     settings over which the yield is wanted (``yield_maps.OVERS``). checked : of the same design, to
     save the time of the gate. pool : where ngspice runs; without one ngspice is not asked. stores :
     where rows are read from and written to. runner : who computes blocks; this process if None.
@@ -77,16 +120,16 @@ def tolerance(
     worked out.
     """
     need_responses(synthesis.modelfile)
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     at_least("--samples", samples, 1)
     at_least("--seed", seed, 0)
     at_least("--jobs", jobs, 1)
     pool = None if rung == "exact" else pool
-    checked = check(synthesis, pool, said) if checked is None else checked
+    checked = check(synthesis, pool, progress) if checked is None else checked
     left_out = {i: why for i, c in enumerate(checked) if (why := _why_not(c))}
     asked = tuple(i for i in range(len(checked)) if i not in left_out)
-    plan = study_plan.plan_study(
+    plan = plan_study(
         synthesis.modelfile,
         synthesis.design,
         [checked[i] for i in asked],
@@ -95,7 +138,7 @@ def tolerance(
         seed=seed,
     )
     if plan.spread.gain_bandwidth is not None:
-        said.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
+        progress.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
     study = Study(checked, plan, asked, left_out, (), until=until, blame_wanted=blamed)
     if not asked:
         return study
@@ -104,7 +147,7 @@ def tolerance(
         pool,
         Stores() if stores is None else stores,
         layers.Here(jobs) if runner is None else runner,
-        said,
+        progress,
         rung,
         blame_budget,
     )
@@ -112,7 +155,7 @@ def tolerance(
         study = work.sampled(study)
         if pool is not None:
             sampled(study)
-        study = work.heard(study)
+        study = work.cross_checked(study)
     else:
         study = work.grown(study)
     if tuned:
@@ -121,9 +164,9 @@ def tolerance(
     if trim is not None:
         study = work.trimmed(study, trim)
     if reached:
-        study = work.reached(study)
+        study = work.powered_up(study)
     if blamed:
-        study = replace(study, blame=work.known_blame(study))
+        study = replace(study, blame=work.stores.blame(study.plan, blame_budget))
     if standing is not None and (maps or (blamed and study.blame is None)):
         standing(study)
     if blamed and study.blame is None:
@@ -138,3 +181,231 @@ def _why_not(checked: CheckedResponse) -> str:
     if checked.circuit.status is not OrbitStatus.PERIODIC:
         return f"the nominal circuit is {checked.circuit.response}"
     return ""
+
+
+@dataclass(frozen=True)
+class Work:
+    """Who does the work of a study, and where it goes. Each step takes a study and gives it back
+    with more in it."""
+
+    jobs: int
+    """Number of workers."""
+    pool: SpicePool | None
+    """Runs ngspice; None where it is not asked."""
+    stores: Stores
+    """Where rows are kept."""
+    runner: Runner
+    """Who computes blocks."""
+    progress: Progress
+    """Told how far the work is."""
+    engine: StudyEngine
+    """Which engine decides."""
+    blame_budget: int = BUDGET
+    """Steps that the blame may take."""
+
+    def sampled(self, study: Study) -> Study:
+        """With the exact circuit's answers of the plan's samples."""
+        return self._with_samples(study, study.plan.samples)
+
+    def cross_checked(self, study: Study) -> Study:
+        """With ngspice's answers about some of the boards, or all."""
+        return self._with_all_checks(study, NOMINAL_SAMPLES)
+
+    def grown(self, study: Study) -> Study:
+        """With as many samples as it takes; it stops at edges of blocks only."""
+        until = study.until
+        assert until is not None
+        samples = -(-study.plan.samples // BLOCK) * BLOCK
+        nominal = NOMINAL_SAMPLES
+        study = self._with_samples(study, samples)
+        both_engines = self.pool is not None and self.engine == "auto"
+        known: tuple[CrossCheck, ...] = ()
+        while any(_decided(study)):
+            asks = self._random(study, nominal)
+            study = replace(study, cross_checks=self._checks(study, asks, last=False))
+            if _widest(study) < until and both_engines:
+                # The boards at a boundary are a stratum of their own and may widen it again. They
+                # are others once there are more samples, so these are not kept.
+                asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
+                known = self._checks(study, asks, known=known, store=False)
+                study = replace(study, cross_checks=known)
+            if _widest(study) < until:
+                break
+            # Exact samples narrow the first part of an interval, boards in ngspice the second.
+            exact = _widest(replace(study, cross_checks=()))
+            if exact >= 0.7 * until and samples < MOST_UNTIL:
+                samples = min(samples + BLOCK, MOST_UNTIL)
+                study = self._with_samples(study, samples)
+            elif both_engines and nominal < min(MOST_NOMINAL, samples):
+                nominal += MORE_NOMINAL
+            elif samples < MOST_UNTIL and (exact >= until or nominal < MOST_NOMINAL):
+                samples = min(samples + BLOCK, MOST_UNTIL)
+                study = self._with_samples(study, samples)
+            else:
+                break
+        study = self._with_all_checks(study, nominal)
+        return replace(study, narrow=self._narrow(study, until))
+
+    def _narrow(self, study: Study, until: float) -> bool:
+        """Whether every interval is; says which is not, and why there are no more samples."""
+        silent = [i + 1 for i in study.asked if not _decided(study)[i]]
+        if silent:
+            self.progress.note(
+                f"no board has an answer to response {', '.join(map(str, silent))}: "
+                "more samples would not narrow its interval"
+            )
+        if not _widest(study) < until:
+            self.progress.note(
+                f"the intervals are still wider than {until:g}: a study grows to "
+                f"{MOST_UNTIL} samples at most, and to {MOST_NOMINAL} boards in ngspice"
+            )
+        return not silent and _widest(study) < until
+
+    def tuned(self, study: Study, bands: Bands) -> Study:
+        """With the generator free within the bands."""
+        plan, count = study.plan, len(study.plan.questions)
+        more = {"bands": bands.as_dict(), "tries": MOST_TRIES}
+
+        def task(block: range) -> Task:
+            as_built = study.answers[block.start * count : block.stop * count]
+            return partial(tuned_block, plan, block, as_built, bands)
+
+        return replace(study, tuned=self._rows("tuned", "tuned boards", plan, task, more))
+
+    def trimmed(self, study: Study, trim: DcTrim) -> Study:
+        """With the trimmer of each board set once."""
+        plan = study.plan
+
+        def task(block: range) -> Task:
+            return partial(trimmed_block, trim, plan, block)
+
+        rows = self._rows("trimmed", "trimmed boards", plan, task, trim.as_dict())
+        return replace(study, trimmed=rows)
+
+    def powered_up(self, study: Study) -> Study:
+        """From power-up, by the recipes that the nominal circuit and a few boards suggest."""
+        plan = study.plan
+        self.progress.stage("start recipes")
+        recipes = find_recipes(plan, self.jobs)
+
+        def task(block: range) -> Task:
+            return partial(power_up_block, plan, block, recipes)
+
+        more = {"recipes": [r.as_dict() for r in recipes]}
+        rows = self._rows("reached", "boards from power-up", plan, task, more)
+        return replace(study, power_ups=rows, recipes=recipes)
+
+    def blamed(self, study: Study) -> Study:
+        """With the parts that the losses come from."""
+        plan, answers, budget = study.plan, study.answers, self.blame_budget
+        result = blame(
+            plan,
+            answers,
+            budget=budget,
+            jobs=self.jobs,
+            progress=self.progress.stage("blame", extent_of(plan, answers, budget).steps),
+            parts=self.stores.blame_parts(plan),
+        )
+        self.stores.put_blame(plan, result)
+        return replace(study, blame=result)
+
+    def mapped(self, study: Study, overs: Sequence[Over]) -> Study:
+        """With a yield map of each response over each of these settings."""
+        maps, parts = [], self.stores.maps(study.plan)
+        for over in overs:
+            for number, index in enumerate(study.asked):
+                b = study.checked[index].model.b
+                name = f"map {over} {number} {b!r}"
+                found = parts.get(name)
+                if found is None:
+                    step = self.progress.stage(f"yield map over {over}, response {index + 1}")
+                    found = yield_map(study.plan, number, over, b, jobs=self.jobs, progress=step)
+                    parts.put({name: replace(found, seconds=0.0)})
+                maps.append(found)
+        return replace(study, maps=tuple(maps))
+
+    def _rows(
+        self,
+        layer: LayerName,
+        stage: str,
+        plan: StudyPlan,
+        task: Callable[[range], Task],
+        more: Mapping[str, Any] | None = None,
+        first: int = 0,
+    ) -> tuple[Any, ...]:
+        """The rows of a layer from sample ``first`` on, under a stage of this name."""
+        step = self.progress.stage(stage, (plan.samples - first) * len(plan.questions))
+        store = self.stores.rows(layer, plan, more)
+        size = layers.LAYERS[layer][1]
+        return tuple(layers.fill(plan, store, size, task, self.runner, step, first))
+
+    def _with_samples(self, study: Study, samples: int) -> Study:
+        """With the answers of so many samples; those that it has are at an edge of a block."""
+        plan = replace(study.plan, samples=samples)
+        stage = f"tolerance study, {samples} boards, responses: {len(plan.questions)}"
+        task = partial(layers.samples_task, plan)
+        first = len(study.answers) // len(plan.questions)
+        rows = self._rows("samples", stage, plan, task, first=first)
+        return replace(study, plan=plan, answers=(*study.answers, *rows))
+
+    def _random(self, study: Study, nominal: int) -> list[Ask]:
+        if self.engine == "ngspice":
+            return cross_check.ask_all(study.answers)
+        return cross_check.ask_random(study.answers, nominal)
+
+    def _with_all_checks(self, study: Study, nominal: int) -> Study:
+        """With the boards at a boundary, which are known only once there is no more sample, and
+        those on which the engines differ, once that is known."""
+        asks = self._random(study, nominal)
+        if self.engine == "auto":
+            asks += cross_check.ask_boundary(study.answers, study.plan.questions, asks)
+        study = replace(study, cross_checks=self._checks(study, asks, last=False))
+        asks += cross_check.ask_differing(study.answers, study.cross_checks, asks)
+        return replace(study, cross_checks=self._checks(study, asks))
+
+    def _checks(
+        self,
+        study: Study,
+        asks: Sequence[Ask],
+        *,
+        last: bool = True,
+        known: Sequence[CrossCheck] = (),
+        store: bool = True,
+    ) -> tuple[CrossCheck, ...]:
+        """ngspice's answers. known : beside what the study has. store : whether to store them."""
+        plan = study.plan
+        asks = [a for a in asks if plan.questions[a.question].settings is not None]
+        if self.pool is None or not asks:
+            return ()
+        rows = self.stores.rows("ngspice", plan) if store else None
+        known = (*known, *study.cross_checks)
+        new = len(asks) - layers.known_checks(asks, rows, known)
+        old = f", {len(asks) - new} more are there" if new < len(asks) else ""
+        step: layers.Step = _no_step
+        if new:
+            step = self.progress.stage(f"ngspice, {new} runs{old}", len(asks))
+        return tuple(
+            layers.fill_cross_checks(
+                plan, asks, rows, self.pool, self.jobs, step, known=known, last=last
+            )
+        )
+
+
+def _no_step() -> None:
+    pass
+
+
+def _decided(study: Study) -> list[bool]:
+    """For each response, whether any board has an answer."""
+    return [y is not None and y.samples > y.failed for y in study.yields]
+
+
+def _widest(study: Study) -> float:
+    """Width of the widest interval, the combined one where there is one, of the responses to which
+    any board has an answer."""
+    intervals = [
+        (c.low, c.high) if c is not None else y.interval
+        for c, y, some in zip(study.combined, study.yields, _decided(study), strict=True)
+        if y is not None and some
+    ]
+    return max((high - low for low, high in intervals), default=0.0)

@@ -11,7 +11,7 @@ switches the generator off and turns until v1 rests as far from them as it does 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from designer.circuit.working_modes import at_rest
 from designer.spread.spread import draw_many
 from designer.yields import exact_rung
 from designer.yields.bench_procedure import BITS, READINGS
-from designer.yields.verdict import Answer, StudyPlan, Verdict, kept
+from designer.yields.verdict import Answer, BoardRow, StudyPlan, rounded
 
 if TYPE_CHECKING:
     from designer.check.synthesis_result import Synthesis
@@ -86,19 +86,9 @@ class DcTrim:
 
 
 @dataclass(frozen=True)
-class Trimmed:
-    """One sample of one response at the board's one setting of the trimmer."""
+class Trimmed(BoardRow):
+    """A board at its one setting of the trimmer."""
 
-    sample: int
-    """Number of the board."""
-    question: int
-    """Number of the question of the plan."""
-    verdict: Verdict
-    """What became of the board."""
-    response: str
-    """n-p-q or status on the exact circuit."""
-    reason: str
-    """Why it is not ok, or ""."""
     position: float
     """Position of the wiper, 0 at the negative rail and 1 at the positive one."""
     at_end: bool
@@ -163,23 +153,14 @@ def trimmed_block(
 ) -> list[Trimmed]:
     """A row for every board and every question, in order; arguments as ``trimmed_answers``."""
     answers, position = trimmed_answers(trim, plan, indices, jobs, progress)
-    return [
-        Trimmed(
-            sample=a.sample,
-            question=a.question,
-            verdict=a.verdict,
-            response=a.response,
-            reason=a.reason,
-            position=kept(float(here)),
-            at_end=bool(min(here, 1.0 - here) < END * (1.0 + 1e-9)),
-            radius=a.radius,
-            penetration=a.penetration,
-            miss=a.miss,
-            asymmetry=a.asymmetry,
-        )
-        for a in answers
-        for here in [position[a.sample - indices.start]]
-    ]
+    names = [f.name for f in fields(Trimmed) if f.name not in ("position", "at_end")]
+    rows = []
+    for answer in answers:
+        here = float(position[answer.sample - indices.start])
+        at_end = min(here, 1.0 - here) < END * (1.0 + 1e-9)
+        columns = {name: getattr(answer, name) for name in names}
+        rows.append(Trimmed(**columns, position=rounded(here), at_end=at_end))
+    return rows
 
 
 def settings(trim: DcTrim, boards: Boards, seed: int, indices: range) -> Array:

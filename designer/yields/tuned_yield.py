@@ -20,11 +20,11 @@ from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import draw_many
+from designer.yields.adjustment import AS_BUILT, Adjustment, centring_offset
 from designer.yields.bench_procedure import BenchResult, find_on_bench
-from designer.yields.centring import centring_offset
-from designer.yields.generator_offsets import AS_BUILT, Adjustment
+from designer.yields.exact_rung import Case, settled
 from designer.yields.setting_search import BoardCase, seek
-from designer.yields.verdict import Answer, StudyPlan, Verdict, judge, kept
+from designer.yields.verdict import Answer, BoardRow, StudyPlan, Verdict, rounded
 
 DIGITS = 6
 """Decimals of the centring DC offset over the amplitude."""
@@ -32,21 +32,15 @@ _NAN = float("nan")
 
 
 @dataclass(frozen=True)
-class Tuned:
-    """One sample of one response, with the generator free within the bands."""
+class Tuned(BoardRow):
+    """A board with the generator free within the bands.
 
-    sample: int
-    """Number of the board."""
-    question: int
-    """Number of the question of the plan."""
-    verdict: Verdict
-    """Ok where some setting works; failed where none is known to and at least half of those asked,
-    as built among them, gave no answer; else grazing where one is undecided, and lost where none
-    was found, which is no proof that there is none."""
-    response: str
-    """n-p-q or status at the setting, or as built where nothing was found."""
-    reason: str
-    """Why it is not ok, or ""."""
+    ``verdict`` : ok where some setting works; failed where none is known to and at least half of
+    those asked, as built among them, gave no answer; else grazing where one is undecided, and lost
+    where none was found, which is no proof that there is none. ``response`` : at the setting, or as
+    built where nothing was found.
+    """
+
     frequency: float
     """Change of the frequency at the setting, a fraction; 0 as built and where nothing was
     found."""
@@ -110,46 +104,23 @@ def tuned_block(
     ------
     KeyError : the answer as built of a board is missing.
     """
-    known = {(a.sample, a.question): a for a in answers}
-    ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
-    asked = [(i, number) for i in range(len(indices)) for number in range(len(plan.questions))]
-    bad = [
-        (i, number) for i, number in asked if known[indices[i], number].verdict is not Verdict.OK
-    ]
+    ensemble, asked = _asked(plan, indices, answers)
     nominal = Reduction(plan.circuit, nominal_board(plan.circuit)).system()
 
-    def centre(board: int, number: int) -> float:
+    def case_of(answer: Answer) -> BoardCase:
+        board, question = answer.sample - indices.start, plan.questions[answer.question]
         try:
             volts = centring_offset(ensemble.reduction(board).system(), nominal)
         except FloatingCircuit:
-            return 0.0
-        return round(volts / plan.questions[number].excitation.amplitude, DIGITS)
+            volts = 0.0
+        return BoardCase(board, question, round(volts / question.excitation.amplitude, DIGITS))
 
-    cases = {
-        (i, number): BoardCase(i, plan.questions[number], centre(i, number)) for i, number in bad
-    }
+    cases = {k: case_of(a) for k, a in enumerate(asked) if a.verdict is not Verdict.OK}
     seek(ensemble, list(cases.values()), bands, jobs=jobs)
-    benches = _on_bench(
-        plan, indices, ensemble, [known[indices[i], number] for i, number in asked], bands, jobs
-    )
     rows = []
-    for (i, number), (result, verdict, response, reason) in zip(asked, benches, strict=True):
-        answer, case = known[indices[i], number], cases.get((i, number))
-        rows.append(
-            Tuned(
-                sample=indices[i],
-                question=number,
-                **_outcome(answer, case),
-                bench_verdict=verdict,
-                bench_response=response,
-                bench_reason=reason,
-                bench_seen=result.seen,
-                bench_frequency=result.setting.frequency,
-                bench_amplitude=result.setting.amplitude,
-                bench_offset=result.setting.offset,
-                bench_steps=result.steps,
-            )
-        )
+    for k, bench in enumerate(_on_bench(plan, indices, ensemble, asked, bands, jobs)):
+        outcome = _outcome(asked[k], cases.get(k))
+        rows.append(Tuned(asked[k].sample, asked[k].question, **outcome, **bench))
         progress()
     return rows
 
@@ -167,83 +138,71 @@ def benched_block(
     ------
     KeyError : the answer as built of a board is missing.
     """
+    ensemble, asked = _asked(plan, indices, answers)
+    rows = _on_bench(plan, indices, ensemble, asked, bands, jobs)
+    return [row["bench_verdict"] for row in rows]
+
+
+def _asked(
+    plan: StudyPlan, indices: range, answers: Sequence[Answer]
+) -> tuple[Ensemble, list[Answer]]:
+    """The boards of a block, and their answers as built in the order of its rows."""
     known = {(a.sample, a.question): a for a in answers}
     ensemble = Ensemble(draw_many(plan.circuit, plan.spread, plan.seed, indices))
-    asked = [known[i, number] for i in indices for number in range(len(plan.questions))]
-    return [row[1] for row in _on_bench(plan, indices, ensemble, asked, bands, jobs)]
+    return ensemble, [known[indices[i], number] for i, number in plan.asked(indices)]
 
 
 def _outcome(answer: Answer, case: BoardCase | None) -> dict[str, Any]:
     """The columns of what exists: the search's where there was one, else the board's as built."""
-    if case is None or case.found is None:
-        verdict, reason = answer.verdict, answer.reason
-        if case is not None:
-            verdict, reason = _not_found(answer, case)
-        works = verdict is Verdict.OK
-        return _columns(
-            AS_BUILT, case, verdict, answer.response, reason,
-            *((answer.radius, answer.penetration, answer.miss) if works else (_NAN, _NAN, _NAN)),
-        )  # fmt: skip
-    orbit = case.found.orbit
-    return _columns(
-        case.found.setting, case, Verdict.OK, orbit.response, "",
-        orbit.radius, orbit.penetration, orbit.miss,
-    )  # fmt: skip
-
-
-def _not_found(answer: Answer, case: BoardCase) -> tuple[Verdict, str]:
-    met = [answer.verdict, *(t.verdict for t in case.tries)]
-    silent = met.count(Verdict.FAILED)
-    if silent == len(met):
-        return Verdict.FAILED, answer.reason
-    if 2 * silent >= len(met):
-        return Verdict.FAILED, f"{silent} of {len(met)} settings gave no answer"
-    reason = f"not found among {len(case.tries)} tries"
-    if silent:
-        reason += f", {silent} of {len(met)} settings gave no answer"
-    return (Verdict.GRAZING if Verdict.GRAZING in met else Verdict.LOST), reason
-
-
-def _columns(
-    setting: Adjustment,
-    case: BoardCase | None,
-    verdict: Verdict,
-    response: str,
-    reason: str,
-    radius: float,
-    penetration: float,
-    miss: float,
-) -> dict[str, Any]:
+    setting, response = AS_BUILT, answer.response
+    verdict, reason = answer.verdict, answer.reason
+    shown: Answer | Orbit | None = answer
+    if case is not None and case.found is not None:
+        setting, shown = case.found.setting, case.found.orbit
+        verdict, response, reason = Verdict.OK, shown.response, ""
+    elif case is not None:
+        verdict, reason = _not_found(answer, case)
+        shown = None
     return {
         "verdict": verdict,
         "response": response,
         "reason": reason,
-        "frequency": setting.frequency,
-        "amplitude": setting.amplitude,
-        "offset": setting.offset,
+        **vars(setting),
         "tries": 0 if case is None else len(case.tries),
         "unanswered": 0 if case is None else case.unanswered,
         "followed": 0 if case is None else case.followed,
-        "radius": kept(radius),
-        "penetration": kept(penetration),
-        "miss": kept(miss),
+        **{name: rounded(getattr(shown, name, _NAN)) for name in ("radius", "penetration", "miss")},
     }
+
+
+def _not_found(answer: Answer, case: BoardCase) -> tuple[Verdict, str]:
+    verdicts = [answer.verdict, *(t.verdict for t in case.tries)]
+    failed = verdicts.count(Verdict.FAILED)
+    if failed == len(verdicts):
+        return Verdict.FAILED, answer.reason
+    if 2 * failed >= len(verdicts):
+        return Verdict.FAILED, f"{failed} of {len(verdicts)} settings gave no answer"
+    reason = f"not found among {len(case.tries)} tries"
+    if failed:
+        reason += f", {failed} of {len(verdicts)} settings gave no answer"
+    return (Verdict.GRAZING if Verdict.GRAZING in verdicts else Verdict.LOST), reason
 
 
 def _on_bench(
     plan: StudyPlan,
     indices: range,
     ensemble: Ensemble,
-    known: Sequence[Answer],
+    asked: Sequence[Answer],
     bands: Bands,
     jobs: int,
-) -> list[tuple[BenchResult, Verdict, str, str]]:
-    """What the person finds on each board, and what it really is (verdict, response, reason):
-    ``known`` are the answers as built, in the rows' order."""
+) -> list[dict[str, Any]]:
+    """The columns of what the person finds on each board, and of what it really is.
+
+    asked : the answers as built, in the rows' order.
+    """
 
     def play(answer: Answer) -> BenchResult:
-        board = answer.sample - indices.start
-        question = plan.questions[answer.question]
+        board, question = answer.sample - indices.start, plan.questions[answer.question]
         try:
             system = ensemble.reduction(board).system()
             stream = crc32(question.stream.encode("utf-8"))
@@ -252,31 +211,30 @@ def _on_bench(
             failure = f"{type(error).__name__}: {error}"
             return BenchResult(AS_BUILT, question.start.start, False, 0, failure)
 
-    results = list(parallel(play, known, jobs))
+    results = list(parallel(play, asked, jobs))
     moved = [k for k, r in enumerate(results) if r.seen and r.setting != AS_BUILT]
-    orbits: dict[int, Orbit] = {}
-    if moved:
-        settled = ensemble.settle(
-            [known[k].sample - indices.start for k in moved],
-            [
-                results[k].setting.of(plan.questions[known[k].question].excitation).drive
-                for k in moved
-            ],
-            np.array([results[k].state for k in moved]),
-            jobs=jobs,
+    questions = [plan.questions[answer.question] for answer in asked]
+    cases: list[Case] = [
+        (
+            asked[k].sample - indices.start,
+            questions[k],
+            results[k].setting.of(questions[k].excitation),
+            results[k].state,
         )
-        orbits = dict(zip(moved, settled, strict=True))
-    out = []
-    for k, (answer, result) in enumerate(zip(known, results, strict=True)):
-        question = plan.questions[answer.question]
-        if k in orbits:
-            verdict, reason = judge(orbits[k], question.spec, question.start)
-            out.append((result, verdict, orbits[k].response, reason))
-        elif result.seen or (answer.verdict is Verdict.FAILED and not result.failure):
-            out.append((result, answer.verdict, answer.response, answer.reason))
+        for k in moved
+    ]
+    judged = iter(settled(ensemble, cases, jobs))
+    rows = []
+    for k, (answer, result) in enumerate(zip(asked, results, strict=True)):
+        verdict, response, reason = answer.verdict, answer.response, answer.reason
+        if k in moved:
+            orbit, verdict, reason = next(judged)
+            response = orbit.response
         elif result.failure:
-            out.append((result, Verdict.FAILED, answer.response, result.failure))
-        else:
-            reason = f"not seen at {result.steps} settings"
-            out.append((result, Verdict.LOST, answer.response, reason))
-    return out
+            verdict, reason = Verdict.FAILED, result.failure
+        elif not result.seen and verdict is not Verdict.FAILED:
+            verdict, reason = Verdict.LOST, f"not seen at {result.steps} settings"
+        columns: dict[str, Any] = {"verdict": verdict, "response": response, "reason": reason}
+        columns |= {"seen": result.seen, **vars(result.setting), "steps": result.steps}
+        rows.append({f"bench_{name}": value for name, value in columns.items()})
+    return rows

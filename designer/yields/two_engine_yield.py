@@ -32,13 +32,13 @@ import numpy as np
 from designer.base.proportion import wilson
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.read_orbit import STROBE_TOLERANCE
-from designer.yields.ngspice_sampling import (
+from designer.yields.cross_check import (
     BOUNDARY_SAMPLES,
     SLOW,
-    Hearing,
+    CrossCheck,
     StartKind,
     Why,
-    distance,
+    margin_share,
 )
 from designer.yields.verdict import Answer, Question, Verdict
 
@@ -57,7 +57,7 @@ class Explanation(StrEnum):
 
 @dataclass(frozen=True)
 class Disagreement:
-    """One board on which ngspice says another response than the exact rung."""
+    """One board on which ngspice shows another response than the exact rung."""
 
     sample: int
     """Number of the board."""
@@ -70,7 +70,7 @@ class Disagreement:
     ngspice: str
     """n-p-q or status in ngspice."""
     distance: float
-    """How far the board is from losing the response (``ngspice_sampling.distance``)."""
+    """How far the board is from losing the response (``cross_check.margin_share``)."""
     explanation: Explanation
     """What explains the difference."""
 
@@ -139,51 +139,45 @@ class Combined:
 
 def combine(
     answers: Sequence[Answer],
-    heard: Sequence[Hearing],
+    checks: Sequence[CrossCheck],
     question: Question,
     *,
     census: bool = False,
 ) -> Combined | None:
     """Both engines on one question; None where ngspice has no answer from the nominal orbit.
 
-    answers, heard : of this question, by sample. census : whether these are all the boards there
+    answers, checks : of this question, by sample. census : whether these are all the boards there
     are; what ngspice was not asked is then all that is uncertain.
     """
     mine = {a.sample: a for a in answers if a.verdict is not Verdict.FAILED}
-    theirs = {
-        h.sample: said
-        for h in heard
-        if h.kind is StartKind.NOMINAL and (said := h.survives(question)) is not None
-    }
-    theirs = {sample: said for sample, said in theirs.items() if sample in mine}
+    nominal = [c for c in checks if c.kind is StartKind.NOMINAL and c.sample in mine]
+    survives = {c.sample: c.survives(question) for c in nominal}
+    theirs = {sample: ok for sample, ok in survives.items() if ok is not None}
     if not theirs:
         return None
     ok = sum(a.verdict is Verdict.OK for a in mine.values())
-    strata = tuple(_strata(list(mine.values()), theirs, heard, question))
+    undecided = [sample for sample, answer in survives.items() if answer is None]
+
+    def strata_of(known: dict[int, bool]) -> list[Stratum]:
+        return _strata(list(mine.values()), known, checks, question)
+
+    def estimate_if(verdict: bool) -> float:
+        return interval(ok, strata_of({**theirs, **dict.fromkeys(undecided, verdict)}))[0]
+
+    strata = tuple(strata_of(theirs))
     estimate, low, high = interval(ok, strata, census)
-    silent = {
-        h.sample
-        for h in heard
-        if h.kind is StartKind.NOMINAL and h.sample in mine and h.survives(question) is None
-    }
-
-    def if_all(said: bool) -> float:
-        whole = {**theirs, **dict.fromkeys(silent, said)}
-        return interval(ok, _strata(list(mine.values()), whole, heard, question))[0]
-
-    random = [h for h in heard if h.kind is StartKind.NOMINAL and h.why in (Why.RANDOM, Why.ALL)]
-    known = {a.sample: a for a in answers}
-    agreed = [h.agrees(known[h.sample]) for h in random if h.sample in known]
+    random = [c for c in nominal if c.why in (Why.RANDOM, Why.ALL)]
+    agreed = [c.agrees(mine[c.sample]) for c in random]
     return Combined(
         estimate,
         low,
         high,
         Rate(sum(a is False for a in agreed), sum(a is not None for a in agreed)),
-        len(silent),
-        if_all(False),
-        if_all(True),
+        len(undecided),
+        estimate_if(False),
+        estimate_if(True),
         strata,
-        tuple(differences(answers, heard, question)),
+        tuple(differences(answers, checks, question)),
     )
 
 
@@ -229,13 +223,13 @@ def _off(count: int, could: int, stratum: Stratum) -> tuple[float, float]:
 def _strata(
     answers: Sequence[Answer],
     theirs: dict[int, bool],
-    heard: Iterable[Hearing],
+    checks: Iterable[CrossCheck],
     question: Question,
 ) -> list[Stratum]:
     """Boundary, slow, rest; one without an answer goes with the rest, the rest with another."""
     near = set[int]()
-    if any(h.why is Why.BOUNDARY for h in heard):
-        far = sorted((distance(a, question.start), a.sample) for a in answers)
+    if any(c.why is Why.BOUNDARY for c in checks):
+        far = sorted((margin_share(a, question.start), a.sample) for a in answers)
         near = {sample for d, sample in far[:BOUNDARY_SAMPLES] if d < math.inf}
     groups: dict[str, list[Answer]] = {"boundary": [], "slow": [], "rest": []}
     for a in answers:
@@ -264,40 +258,40 @@ def _stratum(name: str, answers: Sequence[Answer], theirs: dict[int, bool]) -> S
 
 
 def differences(
-    answers: Sequence[Answer], heard: Sequence[Hearing], question: Question
+    answers: Sequence[Answer], checks: Sequence[CrossCheck], question: Question
 ) -> list[Disagreement]:
-    """Every board on which ngspice says another n-p-q, or two others at two step sizes, with what
+    """Every board on which ngspice shows another n-p-q, or two others at two step sizes, with what
     explains it, if anything does."""
     known = {a.sample: a for a in answers}
     stayed = {
-        h.sample
-        for h in heard
-        if h.kind is StartKind.OWN and h.sample in known and h.agrees(known[h.sample])
+        c.sample
+        for c in checks
+        if c.kind is StartKind.OWN and c.sample in known and c.agrees(known[c.sample])
     }
     return [
         Disagreement(
-            h.sample,
-            h.kind,
-            h.why,
-            known[h.sample].response,
-            h.either or h.response,
-            distance(known[h.sample], question.start),
-            _explain(known[h.sample], h, question, h.sample in stayed),
+            c.sample,
+            c.kind,
+            c.why,
+            known[c.sample].response,
+            c.either or c.response,
+            margin_share(known[c.sample], question.start),
+            _explain(known[c.sample], c, question, c.sample in stayed),
         )
-        for h in heard
-        if h.sample in known and h.agrees(known[h.sample]) is False
+        for c in checks
+        if c.sample in known and c.agrees(known[c.sample]) is False
     ]
 
 
-def _explain(answer: Answer, said: Hearing, question: Question, stayed: bool) -> Explanation:
+def _explain(answer: Answer, check: CrossCheck, question: Question, stayed: bool) -> Explanation:
     """The first that applies: what ngspice cannot resolve comes before what is only unlikely."""
     extremes = question.start.extremes
     peak = float(np.abs(extremes[0]).max()) if len(extremes) else math.nan
-    grazes = OrbitStatus.GRAZING in (answer.response, said.response)
+    grazes = OrbitStatus.GRAZING in (answer.response, check.response)
     if grazes or min(answer.penetration, answer.miss) < STROBE_TOLERANCE * peak:
         return Explanation.GRAZING
     if answer.response == OrbitStatus.CLIPPED:
         return Explanation.CLIPPED
-    if said.kind is StartKind.NOMINAL and stayed:
+    if check.kind is StartKind.NOMINAL and stayed:
         return Explanation.BASIN
     return Explanation.NONE

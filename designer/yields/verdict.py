@@ -7,7 +7,7 @@ A verdict is decided on the exact circuit rung, started on the nominal design's 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
@@ -32,6 +32,10 @@ class Verdict(StrEnum):
     FAILED = "failed"
 
 
+WORST_FIRST = (Verdict.LOST, Verdict.GRAZING, Verdict.FAILED, Verdict.OK)
+"""What decides for a board: one response lost is one too many, whatever the others are."""
+
+
 @dataclass(frozen=True)
 class Question:
     """One wanted response of the nominal design: what every board is asked."""
@@ -52,10 +56,19 @@ class Question:
         assert self.spec.omega is not None
         return f"{self.spec.omega:.9g}:{self.spec.expect}"
 
+    @property
+    def wanted(self) -> Response:
+        """The wanted response; without an expected n-p-q, the nominal orbit's is wanted."""
+        return self.spec.completed(self.start)
+
+    def judge(self, orbit: Orbit) -> tuple[Verdict, str]:
+        """Verdict and reason of a board with this orbit."""
+        return judge(orbit, self.spec, self.start)
+
 
 @dataclass(frozen=True)
-class Answer:
-    """One sample of one response. The margins are those of the exact circuit."""
+class BoardRow:
+    """What every layer of a study says about one sample and one response."""
 
     sample: int
     """Number of the board."""
@@ -67,6 +80,12 @@ class Answer:
     """n-p-q or status on the exact circuit."""
     reason: str
     """Why it is not ok, or ""."""
+
+
+@dataclass(frozen=True)
+class Answer(BoardRow):
+    """A board as built. The margins are those of the exact circuit."""
+
     radius: float
     """Largest modulus of the orbit's multipliers."""
     penetration: float
@@ -149,17 +168,28 @@ class StudyPlan:
         for first in range(0, self.samples, size):
             yield range(first, min(first + size, self.samples))
 
+    def asked(self, indices: range) -> list[tuple[int, int]]:
+        """(place among these samples, question) of every row of a block, in order."""
+        return [(i, k) for i in range(len(indices)) for k in range(len(self.questions))]
 
-class Judged(Protocol):
-    """A row with a verdict, such as an `Answer`."""
 
+class JudgedSample(Protocol):
+    """A verdict on one response of one sample, such as a `BoardRow`."""
+
+    @property
+    def sample(self) -> int: ...
     @property
     def verdict(self) -> Verdict: ...
 
 
-def count(answers: Iterable[Judged], census: bool = False) -> Yield:
-    """The yield of a set of answers to one question. census : see ``Yield``."""
-    tally = Counter(a.verdict for a in answers)
+def count(rows: Iterable[JudgedSample], census: bool = False) -> Yield:
+    """The yield of a set of rows of one question. census : see ``Yield``."""
+    return count_verdicts((row.verdict for row in rows), census)
+
+
+def count_verdicts(verdicts: Iterable[Verdict], census: bool = False) -> Yield:
+    """The yield of boards with these verdicts. census : see ``Yield``."""
+    tally = Counter(verdicts)
     return Yield(
         tally[Verdict.OK],
         tally[Verdict.LOST],
@@ -167,6 +197,23 @@ def count(answers: Iterable[Judged], census: bool = False) -> Yield:
         tally[Verdict.FAILED],
         census=census,
     )
+
+
+def all_on_one(rows: Iterable[JudgedSample], census: bool = False) -> Yield:
+    """Boards by the worst verdict among their rows, which hold every wanted response once: the
+    parts are the same for all, the generator's settings are each response's own.
+
+    census : see ``Yield``.
+    """
+    boards: dict[int, set[Verdict]] = {}
+    for row in rows:
+        boards.setdefault(row.sample, set()).add(row.verdict)
+    return count_verdicts(map(worst, boards.values()), census)
+
+
+def worst(verdicts: Collection[Verdict]) -> Verdict:
+    """What becomes of a board with these verdicts."""
+    return next(v for v in WORST_FIRST if v in verdicts)
 
 
 def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
@@ -177,20 +224,31 @@ def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
         return Verdict.FAILED, orbit.reason or str(orbit.status)
     if orbit.status is not OrbitStatus.PERIODIC:
         return Verdict.LOST, str(orbit.status)
-    n, p, q = orbit.n, orbit.p, orbit.q
-    wanted = (
-        spec.accepts(n, p, q)
-        if spec.expect is not None
-        else (n, p, q) in ((nominal.n, nominal.p, nominal.q), (nominal.n, nominal.q, nominal.p))
+    difference = spec.completed(nominal).difference(orbit)
+    return (Verdict.LOST if difference else Verdict.OK), difference
+
+
+def reasons(rows: Iterable[tuple[Verdict, str]]) -> dict[str, int]:
+    """How many boards are not ok for the same reason, by "verdict: reason", most frequent first.
+
+    Reasons that differ only in their figures are one.
+    """
+    counts = Counter(
+        f"{verdict}: {_without_figures(reason)}" if reason else str(verdict)
+        for verdict, reason in rows
+        if verdict is not Verdict.OK
     )
-    if not wanted:
-        return Verdict.LOST, f"to {orbit.response}"
-    if spec.symmetric and not orbit.symmetric:
-        return Verdict.LOST, f"asymmetric by {orbit.asymmetry:.2g} of the peak"
-    return Verdict.OK, ""
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
-def kept(value: float) -> float:
+def _without_figures(reason: str) -> str:
+    for kind in ("asymmetric", "not found", "not seen"):
+        if reason.startswith(f"{kind} "):
+            return kind
+    return "most settings gave no answer" if reason.endswith("settings gave no answer") else reason
+
+
+def rounded(value: float) -> float:
     """A figure to nine digits: its last few depend on how a process lies in memory (which loops of
     the numerical libraries run), and equal studies are equal files."""
     return float(f"{value:.9g}")

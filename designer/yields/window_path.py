@@ -28,7 +28,7 @@ from designer.dynamics.continued_orbit import ContinuedOrbit, Function, follow, 
 from designer.dynamics.flow import Flow
 from designer.model.tuning_bands import Bands
 from designer.spread.board_quantities import between
-from designer.yields.generator_offsets import Adjustment
+from designer.yields.adjustment import Adjustment, widths
 from designer.yields.verdict import Question
 
 PROBE = 0.01
@@ -60,17 +60,6 @@ class PathSetting:
 
 
 @dataclass(frozen=True)
-class PathTrail:
-    """What a path met."""
-
-    spots: tuple[PathSetting, ...]
-    """Settings met on the board itself, in order, or the one spot where the path ended on the
-    way."""
-    followed: int
-    """Orbits that were shot for."""
-
-
-@dataclass(frozen=True)
 class _Point:
     """share of the way and setting (3,) in half-bands, the orbit there, and the functions with
     their values (k,)."""
@@ -93,8 +82,9 @@ class _Slopes:
 
 def find_window(
     board: Boards, question: Question, bands: Bands, first: float = 0.0, *, tied: bool = True
-) -> PathTrail:
-    """Follow the question's orbit to a board (``Boards`` of one).
+) -> tuple[list[PathSetting], int]:
+    """Follow the question's orbit to a board (``Boards`` of one): the settings met on the board
+    itself, in order, or the one where the path ended on the way; and how many orbits were followed.
 
     first : half-bands of DC offset at which the path sets out on the nominal board. Where a window
     lies on either side of the symmetric setting, it says to which one the path goes. tied : where
@@ -102,13 +92,13 @@ def find_window(
     far. Neither leads into every window that the other does.
     """
     path = _Path(board, question, bands)
-    return PathTrail(tuple(path.walk(first, tied)), path.followed)
+    return path.walk(first, tied), path.followed
 
 
 class _Path:
     def __init__(self, board: Boards, question: Question, bands: Bands) -> None:
         self.board, self.question, self.bands = board, question, bands
-        self.widths = np.array([bands.frequency, bands.amplitude, bands.offset])
+        self.widths = widths(bands)
         self.followed = 0
         self._reduced = (np.nan, Ensemble(board, fast=False))
 
@@ -208,8 +198,7 @@ class _Path:
             return None
 
     def _adjustment(self, setting: Array) -> Adjustment:
-        frequency, amplitude, offset = (float(v) for v in setting * self.widths)
-        return Adjustment(frequency, amplitude, offset).within(self.bands)
+        return Adjustment.at(setting * self.widths, self.bands)
 
     def _slopes(self, here: _Point) -> _Slopes:
         """Difference quotients; 0 where there is none."""
@@ -238,13 +227,13 @@ class _Path:
         without : a kind of function that has no say.
         """
         values, size = here.values + ahead * slopes.values[:, 3], _size(slopes.values)
-        heard = np.array([f.kind != without for f in here.wanted]) & (size > 0.0)
-        rows = np.column_stack([-slopes.values[heard, :3], size[heard]])
+        used = np.array([f.kind != without for f in here.wanted]) & (size > 0.0)
+        rows = np.column_stack([-slopes.values[used, :3], size[used]])
         low = np.maximum(-1.0 - here.setting, -trust)
         high = np.minimum(1.0 - here.setting, trust)
         box = [*zip(low, high, strict=True), (None, 1.0)]
-        found = linprog([0.0, 0.0, 0.0, -1.0], rows, values[heard], bounds=box)
-        return np.zeros(3) if found.x is None else np.asarray(found.x[:3])
+        program = linprog([0.0, 0.0, 0.0, -1.0], rows, values[used], bounds=box)
+        return np.zeros(3) if program.x is None else np.asarray(program.x[:3])
 
 
 def _near(found: Sequence[Function]) -> tuple[Function, ...]:
@@ -255,8 +244,7 @@ def _near(found: Sequence[Function]) -> tuple[Function, ...]:
 
 def _values(orbit: ContinuedOrbit, wanted: Sequence[Function]) -> Array:
     """(k,) of these functions on an orbit; nan where one is not found."""
-    found = [f.on(orbit) for f in wanted]
-    return np.array([np.nan if v is None else v for v in found])
+    return np.array([np.nan if (value := f.on(orbit)) is None else value for f in wanted])
 
 
 def _size(slopes: Array) -> Array:

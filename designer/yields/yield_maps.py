@@ -27,7 +27,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.spread import draw_many
-from designer.yields.verdict import Question, StudyPlan, Verdict, Yield, judge
+from designer.yields.verdict import Question, StudyPlan, Verdict, Yield
 
 Over = Literal["omega", "b", "grade", "omega-grade"]
 OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade")
@@ -154,14 +154,12 @@ class YieldMap:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
+        arrays = ("there", *_COUNTS, "low", "high")
         return {
             "over": self.over,
             "question": self.question,
             "axes": [{"name": a.name, "values": list(a.values)} for a in self.axes],
-            "there": self.there.tolist(),
-            **{name: getattr(self, name).tolist() for name in _COUNTS},
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
+            **{name: getattr(self, name).tolist() for name in arrays},
             "samples": self.samples,
             "seed": self.seed,
             "used": self.used,
@@ -220,59 +218,59 @@ def yield_map(
     question, seed = plan.questions[number], plan.seed + SEED_SHIFT
     assert question.spec.omega is not None
     used = b if over == "b" else question.spec.omega
-    walk = _Walk(plan, question, over, used, progress)
-    window, open_ = None, (False, False)
+    nominal = _NominalOrbits(plan, question, over, used, progress)
+    window: tuple[float, float] | None = None
+    open_ = (False, False)
     settings = [used]
-    if over != "grade":
-        if values is None:
-            (low, high), open_ = walk.window()
-            window = (low, high)
-            settings = sorted({used, *np.linspace(low, high, points).tolist()})
-        else:
-            settings = sorted(set(map(float, values)))
-    orbits = walk.orbits(settings)
+    if over != "grade" and values is not None:
+        settings = sorted(set(map(float, values)))
+    elif over != "grade":
+        window, open_ = nominal.window()
+        settings = sorted({used, *np.linspace(*window, points).tolist()})
+    orbits = nominal.orbits(settings)
     chosen: tuple[float | None, ...] = tuple(grades) if "grade" in over else (None,)
-    shape = (len(settings), len(chosen))
-    counts = {name: np.zeros(shape, dtype=np.int64) for name in _COUNTS}
+    counts = {name: np.zeros((len(settings), len(chosen)), dtype=np.int64) for name in _COUNTS}
     for column, grade in enumerate(chosen):
         spread = plan.spread.with_grades(resistor=grade, capacitor=grade)
         ensemble = Ensemble(draw_many(plan.circuit, spread, seed, range(samples)))
-        drives = [walk.drive(value) for value in settings]
         tasks = [
-            _Task(i, k, drives[i], o.start)
-            for k in range(samples)
-            for i, o in enumerate(orbits)
-            if o is not None
+            _Task(i, board, nominal.drive(value), orbit.start)
+            for board in range(samples)
+            for i, (value, orbit) in enumerate(zip(settings, orbits, strict=True))
+            if orbit is not None
         ]
-        found = _answered(ensemble, tasks, quick, question, jobs, progress)
-        for task, verdict in zip(tasks, found, strict=True):
+        verdicts = _answered(ensemble, tasks, quick, question, jobs, progress)
+        for task, verdict in zip(tasks, verdicts, strict=True):
             counts[str(verdict or Verdict.LOST)][task.setting, column] += 1
-        walk.spent += len(tasks)
-    there = np.tile(np.array([[o is not None] for o in orbits]), (1, len(chosen)))
-    axes: tuple[Axis, ...] = (Axis("b" if over == "b" else "omega", tuple(settings)),)
-    if over == "grade":
-        axes = (Axis("grade", tuple(grades)),)
-    elif over == "omega-grade":
-        axes = (*axes, Axis("grade", tuple(grades)))
-    size = tuple(len(a.values) for a in axes)
+        nominal.spent += len(tasks)
+    axes = [] if over == "grade" else [Axis("b" if over == "b" else "omega", tuple(settings))]
+    axes += [Axis("grade", tuple(grades))] if "grade" in over else []
+    size = tuple(len(axis.values) for axis in axes)
+    there = np.tile(np.array([[orbit is not None] for orbit in orbits]), (1, len(chosen)))
     return YieldMap(
         over=over,
         question=number,
-        axes=axes,
+        axes=tuple(axes),
         there=there.reshape(size),
-        ok=counts["ok"].reshape(size),
-        lost=counts["lost"].reshape(size),
-        grazing=counts["grazing"].reshape(size),
-        failed=counts["failed"].reshape(size),
+        **{name: counts[name].reshape(size) for name in _COUNTS},
         samples=samples,
         seed=seed,
         used=used,
         window=window,
         open=open_,
-        attractors=walk.spent,
+        attractors=nominal.spent,
         seconds=time.perf_counter() - began,
         frequency=question.excitation.frequency,
     )
+
+
+class _Task(NamedTuple):
+    """A board to be asked, at a setting of this number."""
+
+    setting: int
+    board: int
+    drive: Drive
+    start: Array
 
 
 def _answered(
@@ -285,61 +283,44 @@ def _answered(
 ) -> list[Verdict | None]:
     """Of each task; None where a forecast left it open to the last."""
 
-    def settle(some: Sequence[int]) -> list[Verdict | None]:
-        return _verdicts(ensemble.settle, [tasks[t] for t in some], question, jobs, progress)
+    def judged(
+        ask: Callable[..., Sequence[Orbit | None]], some: Sequence[int]
+    ) -> list[Verdict | None]:
+        orbits = ask(
+            [tasks[t].board for t in some],
+            [tasks[t].drive for t in some],
+            np.array([tasks[t].start for t in some]),
+            jobs=jobs,
+            progress=progress,
+        )
+        return [None if orbit is None else question.judge(orbit)[0] for orbit in orbits]
 
+    everything = range(len(tasks))
     if not quick:
-        return settle(range(len(tasks)))
-    found = _verdicts(ensemble.quick, tasks, question, jobs, progress)
+        return judged(ensemble.settle, everything)
+    verdicts = judged(ensemble.quick, everything)
     for setting in dict.fromkeys(task.setting for task in tasks):
-        left = [t for t, task in enumerate(tasks) if task.setting == setting and found[t] is None]
-        settle_open(found, left, settle)
-    return found
+        left = [t for t in everything if tasks[t].setting == setting and verdicts[t] is None]
+        settle_open(verdicts, left, lambda some: judged(ensemble.settle, some))
+    return verdicts
 
 
 def settle_open(
-    found: list[Verdict | None],
+    verdicts: list[Verdict | None],
     left: Sequence[int],
     settle: Callable[[Sequence[int]], Sequence[Verdict | None]],
 ) -> None:
     """Of the verdicts that a forecast leaves open, at these places, the first `DOUBTED` are put in
     by ``settle``; the others too if one of those is ok."""
     for some in (left[:DOUBTED], left[DOUBTED:]):
-        said = settle(some) if some else []
-        for k, verdict in zip(some, said, strict=True):
-            found[k] = verdict
-        if Verdict.OK not in said:
+        settled = settle(some) if some else []
+        for k, verdict in zip(some, settled, strict=True):
+            verdicts[k] = verdict
+        if Verdict.OK not in settled:
             break
 
 
-class _Task(NamedTuple):
-    """A board to be asked, at a setting of this number."""
-
-    setting: int
-    board: int
-    drive: Drive
-    start: Array
-
-
-def _verdicts(
-    ask: Callable[..., Sequence[Orbit | None]],
-    tasks: Sequence[_Task],
-    question: Question,
-    jobs: int,
-    progress: Callable[[], None],
-) -> list[Verdict | None]:
-    """Of each task; None where ``ask`` leaves it open."""
-    found = ask(
-        [t.board for t in tasks],
-        [t.drive for t in tasks],
-        np.array([t.start for t in tasks]),
-        jobs=jobs,
-        progress=progress,
-    )
-    return [None if o is None else judge(o, question.spec, question.start)[0] for o in found]
-
-
-class _Walk:
+class _NominalOrbits:
     """The nominal circuit's wanted orbit along ω or b. spent : attractors sought."""
 
     def __init__(
@@ -384,10 +365,9 @@ class _Walk:
             orbit = settle(Flow(self._system, self.drive(value)), self._known[near].start)
         except ArithmeticError:
             return None
-        spec = self.question.spec
-        if judge(orbit, spec, self.question.start)[0] is not Verdict.OK:
+        if self.question.judge(orbit)[0] is not Verdict.OK:
             return None
-        if spec.symmetric is False and orbit.asymmetry < NEARLY_SYMMETRIC:
+        if self.question.spec.symmetric is False and orbit.asymmetry < NEARLY_SYMMETRIC:
             return None
         self._known[value] = orbit
         return orbit

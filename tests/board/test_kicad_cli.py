@@ -12,7 +12,7 @@ import pytest
 from designer.base.sexpr import read
 from designer.board.kicad_project import files
 from designer.check import checked_design
-from designer.check.first_responses import FirstRun
+from designer.check.deck_runs import FirstRun
 from designer.circuit import nominal
 from designer.circuit.netlist import nominal_board
 from designer.dynamics.orbit import Orbit

@@ -10,7 +10,7 @@ import pytest
 
 from designer.board.kicad_project import files
 from designer.catalog.entries import Mounting
-from designer.check.first_responses import FirstRun
+from designer.check.deck_runs import FirstRun
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Circuit, Excitation, nominal_board

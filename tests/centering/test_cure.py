@@ -46,7 +46,7 @@ from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
 from designer.yields import exact_rung
 from designer.yields.margins import Limit, Margin
-from designer.yields.study_layers import RungName
+from designer.yields.tolerance_study import StudyEngine
 from designer.yields.trimmed_yield import trimmed_block
 from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
 from designer.yields.yield_maps import Axis, YieldMap
@@ -427,7 +427,7 @@ class _Notes(Progress):
 
 @pytest.mark.parametrize(("rung", "told"), [("auto", 0), ("ngspice", 1)])
 def test_a_trade_that_sends_every_board_to_ngspice_is_told(
-    design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rung: RungName, told: int
+    design: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rung: StudyEngine, told: int
 ) -> None:
     folder = Path(shutil.copytree(design, tmp_path / "design"))
     choice = rung_choice.RungChoice(rung, "rung by trade.json: because")

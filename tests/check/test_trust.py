@@ -36,8 +36,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
-from designer.yields import study_plan
-from designer.yields.run_result import RunResult
+from designer.yields.study import RunResult, trust_of_yield
 from designer.yields.verdict import Yield
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
@@ -167,7 +166,7 @@ def test_a_verdict_has_no_measured_figures() -> None:
         assert one.trusted is False
         assert one.verdict() == other.verdict()
         assert one.as_dict()["reasons"] != other.as_dict()["reasons"]
-        boards = [study_plan.of_yield(Yield(200, 0, 0, 0), nominal) for nominal in (one, other)]
+        boards = [trust_of_yield(Yield(200, 0, 0, 0), nominal) for nominal in (one, other)]
         assert boards[0].verdict() == boards[1].verdict()
         # The bounds that are asked for, the multiplier's 1, and nothing else.
         figures = re.findall(r"[0-9][0-9.e-]*", " ".join(one.reasons))
@@ -186,13 +185,13 @@ def test_a_verdict_has_no_measured_figures() -> None:
     ],
 )
 def test_a_yield_that_boards_without_an_answer_could_move(counted: Yield, trusted: bool) -> None:
-    said = study_plan.of_yield(counted, Trust(answered=True))
+    said = trust_of_yield(counted, Trust(answered=True))
     assert said.trusted is trusted
     assert any("boards have no answer" in reason for reason in said.reasons) is not trusted
 
 
 def test_a_yield_is_no_better_than_the_nominal_response() -> None:
-    said = study_plan.of_yield(Yield(200, 0, 0, 0), Trust(doubts=(Reason("so it is", "by 2"),)))
+    said = trust_of_yield(Yield(200, 0, 0, 0), Trust(doubts=(Reason("so it is", "by 2"),)))
     assert said.reasons == ("the nominal response: so it is",)
     assert said.as_dict()["reasons"] == ["the nominal response: so it is (by 2)"]
 

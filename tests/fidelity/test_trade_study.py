@@ -55,7 +55,7 @@ from designer.spice.numerics_gate import BOUND, RELTOL
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
-from designer.yields import ngspice_sampling
+from designer.yields import cross_check
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 
@@ -570,8 +570,8 @@ def test_ngspice_is_asked_about_forty_boards_at_least() -> None:
     answers: Any = [
         SimpleNamespace(sample=i, question=0, verdict="ok", radius=0.1) for i in range(200)
     ]
-    for kind in ngspice_sampling.StartKind:
-        asked = [a for a in ngspice_sampling.ask_random(answers) if a.kind is kind]
+    for kind in cross_check.StartKind:
+        asked = [a for a in cross_check.ask_random(answers) if a.kind is kind]
         assert len(asked) >= rung_choice.LEAST
 
 

@@ -27,15 +27,15 @@ from designer.catalog.read import read_catalog_file
 from designer.catalog.vendor_model import read_vendor_model
 from designer.jobs.design_files import load, starts
 from designer.jobs.design_source import read_design
+from designer.jobs.study_cache import StudyCache
 from designer.model.find_responses import peaks
 from designer.model.measured_values import read_measured
 from designer.model.model_file import read_model_file
-from designer.yields.study_cache import Kept
 from tests.catalog.test_catalog import CSV
 from tests.catalog.test_vendor_model import MODEL as VENDOR, ORDER
+from tests.jobs.test_study_cache import BLAME, kept
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder
-from tests.yields.test_study_cache import BLAME, kept
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 
@@ -98,7 +98,10 @@ READERS: dict[str, tuple[str, Reader]] = {
     "vendor model": ("part.lib", lambda p: read_vendor_model(p.name, "part", ORDER, p.parent)),
     "board": ("some.kicad_pcb", read_board),
     "Parquet": ("block-000000.parquet", parquet),
-    "archive": ("kept.npz", lambda p: Kept(p, nothing, vouch=lambda *_: True).get("blame", "key")),
+    "archive": (
+        "kept.npz",
+        lambda p: StudyCache(p, nothing, vouch=lambda *_: True).get("blame", "key"),
+    ),
     "JSON": ("some.json", read_json),
     "manifest": (MANIFEST, lambda p: Folder(p.parent)),
     "setup table": ("setup.csv", lambda p: starts(Folder(p.parent / "none")) or p),

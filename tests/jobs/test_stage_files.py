@@ -24,12 +24,10 @@ from designer.model.model_file import ModelFile, read_model_file
 from designer.report.data import ReportData
 from designer.report.write import render_html, render_markdown
 from designer.spice.pool import SpicePool
-from designer.yields import study_plan
-from designer.yields.layers import Samples
-from designer.yields.ngspice_runs import hear
-from designer.yields.ngspice_sampling import ask_random
-from designer.yields.run_result import RunResult
-from designer.yields.study import Study
+from designer.yields.cross_check import ask_random
+from designer.yields.layers import samples_task
+from designer.yields.ngspice_runs import cross_checks
+from designer.yields.study import RunResult, Study, plan_study
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
 
@@ -105,12 +103,10 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
     first = made(name, tmp_path)
     with SpicePool(2) as pool:
         checked = checked_design.check(first.design, first.found, pool)
-        plan = study_plan.plan_study(
-            first.modelfile, first.design, checked, CATALOG, samples=2, seed=1
-        )
-        answers = Samples(plan, range(2))(2, lambda: None)
+        plan = plan_study(first.modelfile, first.design, checked, CATALOG, samples=2, seed=1)
+        answers = samples_task(plan, range(2))(2, lambda: None)
         asks = ask_random(answers)
-        heard = hear(plan, asks, pool, 2)
+        heard = cross_checks(plan, asks, pool, 2)
     for c in checked:
         assert c.gate is not None
         assert c.gate.passed
@@ -118,7 +114,9 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
     known = {(a.sample, a.question): a for a in answers}
     assert len(heard) == len(asks) >= len(answers)
     assert all(h.agrees(known[h.sample, h.question]) is not False for h in heard)
-    study = Study(checked, plan, tuple(range(len(checked))), {}, tuple(answers), heard=tuple(heard))
+    study = Study(
+        checked, plan, tuple(range(len(checked))), {}, tuple(answers), cross_checks=tuple(heard)
+    )
     source = provenance(first.modelfile, CATALOG.hash, seed=1, spread={})
     result = RunResult(first.modelfile, CATALOG, first.found, first.design, checked, study, source)
     data = ReportData(result, "designer run model.toml")

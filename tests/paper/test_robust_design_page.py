@@ -151,12 +151,12 @@ def test_a_second_look_where_the_first_decides_nothing(layer: str, ok: int, deci
         ]
 
     study = SimpleNamespace(
-        reached_of=lambda _: rows(ok if layer == "reached" else 500),
-        tuned_of=lambda _: rows(ok if layer == "tuned" else 500),
-        all_reached=Yield(ok if layer == "all" else 500, 500 - ok if layer == "all" else 0, 0, 0),
-        all_tuned=None,
+        power_ups=rows(ok if layer == "reached" else 500),
+        tuned=rows(ok) if layer == "tuned" else None,
+        rows_of=lambda _, rows: rows,
+        on_one_board=lambda _: Yield(*((ok, 500 - ok) if layer == "all" else (500, 0)), 0, 0),
     )
-    assert _decided(study, 1, tuned=layer == "tuned") is decided  # type: ignore[arg-type]
+    assert _decided(study, 1) is decided  # type: ignore[arg-type]
 
 
 def test_two_responses_with_one_n_p_q_have_a_column_each() -> None:

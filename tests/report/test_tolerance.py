@@ -25,16 +25,13 @@ from designer.report.tolerance_tables import (
     recipes,
 )
 from designer.report.write import render_html, render_markdown
-from designer.yields import study_plan
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
-from designer.yields.corners import Corner
 from designer.yields.exact_rung import block
 from designer.yields.margins import Prediction
-from designer.yields.run_result import RunResult
-from designer.yields.sobol import Index
-from designer.yields.study import Study
+from designer.yields.study import RunResult, Study, plan_study
 from designer.yields.verdict import Verdict
+from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.report.test_write import Page
 from tests.shared.paper_cases import synthesised
@@ -91,7 +88,7 @@ def plain() -> ReportData:
     design, found = made.design, made.found[0:3:2]
     modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
     checked = checked_design.check(design, found, None)
-    plan = study_plan.plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
+    plan = plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)
     answers = tuple(block(plan, range(3), 2))
     study = Study(checked, plan, (0, 1), {}, answers)
     return ReportData(RunResult(modelfile, made.catalog, found, design, checked, study), "designer")
@@ -137,7 +134,7 @@ def full(plain: ReportData) -> ReportData:
     return changed(
         plain,
         tuned=tuple(tuned),
-        reached=tuple(reached),
+        power_ups=tuple(reached),
         combined=(Together(), None),
         recipes=(Recipe(), Recipe("dwell for 2 s")),
         blame=Blame((blamed(0, 10), blamed(1, 0)), 100, 1, 500, 300, 1.0),
@@ -178,7 +175,7 @@ def test_each_kind_of_yield_stands_beside_the_others(full: ReportData) -> None:
 
 
 def test_the_heading_names_the_kinds_that_there_are(full: ReportData) -> None:
-    data = changed(full, tuned=None, reached=None, combined=(Together(), None))
+    data = changed(full, tuned=None, power_ups=None, combined=(Together(), None))
     assert "### As built and both engines together" in render_markdown(data)
 
 

@@ -23,7 +23,7 @@ from designer.report.map_plots import map_chart
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Prediction
-from designer.yields.sobol import Index
+from designer.yields.worst_corner import Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared.figure_text import clipped, overlapping
 

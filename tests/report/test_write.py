@@ -15,6 +15,7 @@ from designer.base.errors import InputError
 from designer.base.page import Table
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
+from designer.check.synthesis_result import synthesise
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
 from designer.model.ascii_sketch import sketch
@@ -26,12 +27,10 @@ from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.yields import study_plan
-from designer.yields.layers import Samples
-from designer.yields.ngspice_runs import hear
-from designer.yields.ngspice_sampling import Hearing, StartKind, ask_random
-from designer.yields.run_result import RunResult
-from designer.yields.study import Study
+from designer.yields.cross_check import CrossCheck, StartKind, ask_random
+from designer.yields.layers import samples_task
+from designer.yields.ngspice_runs import cross_checks
+from designer.yields.study import RunResult, Study, plan_study
 from designer.yields.verdict import Verdict
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed
@@ -53,10 +52,10 @@ def whole(catalog: Catalog) -> ReportData:
     found, design = made.found[:3], made.design
     with SpicePool(2) as pool:
         checked = checked_design.check(design, found, pool)
-        plan = study_plan.plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
-        answers = Samples(plan, range(4))(2, lambda: None)
-        heard = hear(plan, ask_random(answers), pool, 2)
-    study = Study(checked, plan, (0, 1, 2), {}, tuple(answers), heard=tuple(heard))
+        plan = plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
+        answers = samples_task(plan, range(4))(2, lambda: None)
+        heard = cross_checks(plan, ask_random(answers), pool, 2)
+    study = Study(checked, plan, (0, 1, 2), {}, tuple(answers), cross_checks=tuple(heard))
     source = provenance(modelfile, catalog.hash, seed=1, spread=plan.spread.as_dict())
     result = RunResult(modelfile, catalog, found, design, checked, study, source)
     return ReportData(result, "designer run model.toml --samples 4 --seed 1 --out out")
@@ -338,8 +337,10 @@ def test_lost_boards_are_counted_by_reason(whole: ReportData) -> None:
         lost = a.question == 2
         reason, met = kinds[a.sample % 2]
         answers.append(replace(a, verdict=Verdict.LOST, reason=reason, response=met) if lost else a)
-    heard = [replace(h, response="1-9-9") if h.question == 2 else h for h in whole.study.heard]
-    data = changed(whole, answers=tuple(answers), heard=tuple(heard))
+    heard = [
+        replace(h, response="1-9-9") if h.question == 2 else h for h in whole.study.cross_checks
+    ]
+    data = changed(whole, answers=tuple(answers), cross_checks=tuple(heard))
     text = render_markdown(data)
     assert "lost to 1-3-3 (2), lost: asymmetric (2)" in text
     assert "1-2-2 but 1-9-9 (2), 1-3-3 but 1-9-9 (2)" in text
@@ -375,11 +376,11 @@ def test_where_no_board_was_lost_nothing_is_told_of_losses(whole: ReportData) ->
     answers = [replace(a, verdict=Verdict.OK, reason="") for a in whole.study.answers]
     agreed = [
         replace(h, response=a.response, reason="")
-        for h in whole.study.heard
+        for h in whole.study.cross_checks
         for a in answers
         if (a.sample, a.question) == (h.sample, h.question)
     ]
-    data = changed(whole, answers=tuple(answers), heard=tuple(agreed))
+    data = changed(whole, answers=tuple(answers), cross_checks=tuple(agreed))
     text = render_markdown(data)
     assert "every one shows all 3 responses: of a thousand, about 1000" in text
     assert "on one and the same board" not in text  # said already
@@ -395,7 +396,7 @@ def test_an_exact_match_does_not_read_as_an_error(whole: ReportData) -> None:
 
 def test_without_ngspice(whole: ReportData) -> None:
     checked = tuple(replace(c, gate=None) for c in whole.checked)
-    text = Page(render_html(changed(whole, checked=checked, heard=()))).text
+    text = Page(render_html(changed(whole, checked=checked, cross_checks=()))).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text
     assert "steps per period" not in text
@@ -405,12 +406,13 @@ def test_without_ngspice(whole: ReportData) -> None:
 
 
 def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportData) -> None:
-    def said(h: Hearing) -> Hearing:
+    def said(h: CrossCheck) -> CrossCheck:
         word = {0: "undecided", 1: "failed", 2: "9-9-9"}.get(h.sample, h.response)
         return replace(h, response=word, reason=f"why {word}")
 
     data = changed(
-        whole, heard=tuple(said(h) for h in whole.study.heard if h.kind is StartKind.OWN)
+        whole,
+        cross_checks=tuple(said(h) for h in whole.study.cross_checks if h.kind is StartKind.OWN),
     )
     table = ngspice_table(data)
     assert table is not None
@@ -422,7 +424,7 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
 
 def test_without_responses(whole: ReportData) -> None:
     plan = replace(whole.plan, questions=())
-    data = changed(whole, checked=(), answers=(), heard=(), asked=(), plan=plan)
+    data = changed(whole, checked=(), answers=(), cross_checks=(), asked=(), plan=plan)
     for text in (Page(render_html(data)).text, render_markdown(data)):
         assert "no response is named" in text
         assert "None was asked for." in text
@@ -466,9 +468,10 @@ def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
         expect = "1-0-0"
     """
     modelfile = parse_model_file(text)
-    found, design = checked_design.design_for(modelfile, catalog)
+    made = synthesise(modelfile, catalog)
+    found, design = made.found, made.design
     checked = checked_design.check(design, found, None)
-    plan = study_plan.plan_study(modelfile, design, (), catalog, samples=1, seed=1)
+    plan = plan_study(modelfile, design, (), catalog, samples=1, seed=1)
     study = Study(checked, plan, (), {0: "not asked"}, ())
     data = ReportData(
         RunResult(modelfile, catalog, found, design, checked, study), "designer run x"

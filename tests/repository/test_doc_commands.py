@@ -56,14 +56,14 @@ NOT_RUN = {
     # the beginning of a command: why no test runs it here
     "make": "targets of the Makefile: the whole environment, or all the tests",
     "pip": "installs a package",
-    "dask": "several machines; tests/yields/test_dask_runner.py has two processes",
+    "dask": "several machines; tests/jobs/test_dask_runner.py has two processes",
     "python -m designer.paper.robust_design": "hours; it is `make reports`",
     "reproduce": "hours; tests/paper has smaller ones",
     "search examples/robust.toml": "minutes; tests/jobs/test_search_job.py has a smaller one",
     "search out/paper --yield": "minutes; tests/jobs/test_cure_whole.py has a smaller one",
     "trade out/paper": "minutes in ngspice; tests/fidelity/test_trade_study.py has a smaller one",
     "trade examples/paper.toml": "the same, of 400 boards",
-    "tolerance out/paper --samples 100000": "a cluster; tests/yields/test_dask_runner.py",
+    "tolerance out/paper --samples 100000": "a cluster; tests/jobs/test_dask_runner.py",
     "rules out/paper --board": "KiCad and a board: tests/design_rules/test_rules_board.py",
 }
 LONG = ("README.md", "docs/bifurcations.md", "docs/compare.md", "docs/tolerance.md")

@@ -15,18 +15,18 @@ from designer.centering import ngspice_check, places
 from designer.cli import command_line
 from designer.dynamics.steady_state import Course
 from designer.jobs import bifurcation_request, board_files, trade_job
+from designer.jobs.study_cache import CACHE
 from designer.model import find_responses, si_units
 from designer.model.board_table import BoardSpec
 from designer.spice import numerics_gate
 from designer.yields import (
     blame_replay,
+    cross_check,
     layers,
     ngspice_runs,
-    ngspice_sampling,
-    sobol,
-    study_layers,
+    tolerance_study,
+    worst_corner,
 )
-from designer.yields.study_cache import KEPT
 from designer.yields.verdict import BLOCK
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -116,25 +116,25 @@ SAID: list[tuple[str, str, object]] = [
     ("contract.md", r"at least every (\w+) seconds", {10.0: "ten"}[SILENCE]),
     ("trade.md", r"spread \((\d+) of each response if", defaults.TRADE_BOARDS),
     ("tolerance.md", r"`--samples N` says it, (\d+) if", defaults.SAMPLES),
-    ("tolerance.md", r"of the first (\d+) boards of each", ngspice_sampling.OWN_SAMPLES),
-    ("tolerance.md", r"- the first (\d+) boards of each", ngspice_sampling.NOMINAL_SAMPLES),
-    ("tolerance.md", r"the (\d+) boards that are nearest", ngspice_sampling.BOUNDARY_SAMPLES),
+    ("tolerance.md", r"of the first (\d+) boards of each", cross_check.OWN_SAMPLES),
+    ("tolerance.md", r"- the first (\d+) boards of each", cross_check.NOMINAL_SAMPLES),
+    ("tolerance.md", r"the (\d+) boards that are nearest", cross_check.BOUNDARY_SAMPLES),
     ("tolerance.md", r"up to (\d+) periods are run", ngspice_runs.MOST_PERIODS),
     ("tolerance.md", r"in blocks of (\d+) until", BLOCK),
-    ("tolerance.md", r"ngspice are added (\d+) at a time", study_layers.MORE_NOMINAL),
-    ("tolerance.md", r"It ends at ([\d ]+) boards", study_layers.MOST_UNTIL),
-    ("tolerance.md", r"boards and (\d+) of them in ngspice", study_layers.MOST_NOMINAL),
+    ("tolerance.md", r"ngspice are added (\d+) at a time", tolerance_study.MORE_NOMINAL),
+    ("tolerance.md", r"It ends at ([\d ]+) boards", tolerance_study.MOST_UNTIL),
+    ("tolerance.md", r"boards and (\d+) of them in ngspice", tolerance_study.MOST_NOMINAL),
     ("tolerance.md", r"are on disk at once: (\d+) boards", BLOCK),
     ("tolerance.md", r"trimmed one, (\d+) in ngspice", layers.CHUNK),
     ("tolerance.md", r"in ngspice, (\d+) of the others", layers.SEARCH),
-    ("ngspice.md", r"Of the first (\d+) boards of each response", ngspice_sampling.OWN_SAMPLES),
-    ("ngspice.md", r"is defined: the first (\d+) boards", ngspice_sampling.NOMINAL_SAMPLES),
+    ("ngspice.md", r"Of the first (\d+) boards of each response", cross_check.OWN_SAMPLES),
+    ("ngspice.md", r"is defined: the first (\d+) boards", cross_check.NOMINAL_SAMPLES),
     ("ngspice.md", r"A way of more than (\d+) periods", ngspice_runs.MOST_PERIODS),
     ("ngspice.md", r"as many steps as (\d+) periods", ngspice_runs.MOST_AGAIN),
     ("ngspice.md", r"`discarded_periods`\), at most (\d+)", numerics_gate.MOST_DISCARDED),
     ("blame.md", r"the first (\d+) of a response, in order", blame_replay.LOST),
     ("blame.md", r"Up to (\d+) boards that were ok", blame_replay.KEPT),
-    ("blame.md", r"on (\d+) base samples", sobol.CUBE),
+    ("blame.md", r"on (\d+) base samples", worst_corner.CUBE),
     ("search.md", r"scanned with (\d+) boards", places.SCAN),
     ("search.md", r"again with (\d+), and around", places.SOME),
     ("search.md", r"with (\d+) boards as long as", places.MANY),
@@ -196,7 +196,7 @@ def test_the_files_that_are_written_are_listed() -> None:
         board_files.NOTES,
         board_files.DRAWING,
         board_files.PICTURE,
-        KEPT,
+        CACHE,
         file_of("NAME"),
         *trade_job.NAMES,
     }

@@ -39,7 +39,7 @@ LAZY = {
         ("jobs.json_answers", "circuit.design"),
         ("jobs.json_answers", "model.model"),
         ("jobs.origin", "spice.batch_backend"),
-        ("jobs.study_stage", "yields.dask_runner"),
+        ("jobs.study_stage", "jobs.dask_runner"),
     },
 }
 """Imports inside functions, outside the command line, each with its reason."""

@@ -13,7 +13,7 @@ from designer.circuit.netlist import Board
 from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread
 from designer.yields import exact_rung
-from designer.yields.verdict import Answer, Question, StudyPlan
+from designer.yields.verdict import Answer, Question, StudyPlan, Yield, count
 from tests.shared.paper_cases import OMEGA, subject
 
 SPREAD = Spread(0.01, 0.01, 1e-3, 4e-3)
@@ -29,6 +29,11 @@ def question(p: int) -> Question:
 def plan(*ps: int, spread: Spread = SPREAD, seed: int = 11, samples: int = 25) -> StudyPlan:
     """A study of these 1-p-p responses."""
     return StudyPlan(subject(ps[0]).circuit, spread, seed, samples, tuple(map(question, ps)))
+
+
+def study_yields(of: StudyPlan, rows: Sequence[Answer]) -> tuple[Yield, ...]:
+    """The yield of each question of the plan."""
+    return tuple(count(a for a in rows if a.question == k) for k in range(len(of.questions)))
 
 
 def answers(of: StudyPlan, indices: range) -> list[Answer]:

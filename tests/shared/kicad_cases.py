@@ -14,7 +14,7 @@ from designer.board.component import components
 from designer.board.kicad_project import Project, files
 from designer.board.kicad_rules import board_rules, rules_text
 from designer.catalog.entries import Mounting
-from designer.check.first_responses import FirstRun
+from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import Circuit, Excitation
 from designer.model.board_table import BoardChoice, BoardSpec
 from designer.spice.deck import SolverSettings

@@ -11,7 +11,7 @@ import pytest
 
 from designer.base.netlist_guard import check_netlist
 from designer.catalog.catalog import load_catalog
-from designer.check import checked_design
+from designer.check.synthesis_result import synthesise
 from designer.circuit import nominal
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Excitation, nominal_board
@@ -213,7 +213,8 @@ def test_a_board_for_low_rails() -> None:
     text = (EXAMPLES / "paper.toml").read_text(encoding="utf-8")
     text = text.replace('"TL074C"', '"MCP6004"').replace("supply = 15.0", "supply = 2.5")
     text = "\n".join(line for line in text.splitlines() if not line.startswith("saturation"))
-    found, design = checked_design.design_for(parse_model_file(text), load_catalog())
+    made = synthesise(parse_model_file(text), load_catalog())
+    found, design = made.found, made.design
     circuit = design.circuit
     assert (circuit.supply, circuit.saturation) == (2.5, 2.475)
     assert design.errors.max_error < 0.02

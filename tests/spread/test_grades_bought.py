@@ -33,9 +33,7 @@ from designer.report.write import render_markdown
 from designer.spread.part_grades import better_grades, better_grades_text, bought, once_otherwise
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
-from designer.yields.run_result import RunResult
-from designer.yields.study import Study
-from designer.yields.study_plan import plan_study
+from designer.yields.study import RunResult, Study, plan_study
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.jobs.test_stage_files import design_of
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE

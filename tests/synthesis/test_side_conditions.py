@@ -11,7 +11,7 @@ import pytest
 
 from designer.base.errors import Unreachable
 from designer.catalog.catalog import load_catalog
-from designer.check.checked_design import design_for
+from designer.check.synthesis_result import synthesise as synthesise_file
 from designer.circuit import build
 from designer.circuit.dead_zone_parts import dead_zone_stage, idle_limits
 from designer.circuit.design import ConditionCheck, Design
@@ -348,7 +348,7 @@ def test_a_rectifier_on_high_rails_is_scaled_down(monkeypatch: pytest.MonkeyPatc
     modelfile = parse_model_file(text)
 
     def fv() -> ConditionCheck:
-        _, made = design_for(modelfile, CATALOG)
+        made = synthesise_file(modelfile, CATALOG).design
         return next(c for c in made.checks if c.quantity == "rectifier_fv_v")
 
     assert fv().holds

@@ -12,8 +12,8 @@ from designer.dynamics.flow import Flow
 from designer.model.response_table import Expect
 from designer.model.tuning_bands import Bands
 from designer.yields import bench_procedure
+from designer.yields.adjustment import AS_BUILT, Adjustment
 from designer.yields.bench_procedure import find_on_bench
-from designer.yields.generator_offsets import AS_BUILT, Adjustment
 from tests.shared.bench_plans import question, shifted
 from tests.shared.paper_cases import subject
 
@@ -84,7 +84,7 @@ def test_the_procedure_ends_and_stays_inside_the_bands(monkeypatch: pytest.Monke
     assert not found.seen
     assert found.setting == AS_BUILT
     assert found.steps == len(visited) <= bench_procedure.MOST_STEPS
-    assert all(setting.within(bands) == setting for setting in visited)
+    assert all(Adjustment.at(setting.vector, bands) == setting for setting in visited)
     rows = {(round(s.frequency, 9), round(s.amplitude, 9)) for s in visited}
     assert len(rows) == 11 * 5  # every frequency at every amplitude
 

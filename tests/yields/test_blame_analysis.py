@@ -23,15 +23,12 @@ from designer.spread.board_quantities import Quantity, between, column, quantiti
 from designer.spread.spread import Group, Spread, draw_many
 from designer.yields import blame_replay
 from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
-from designer.yields.blame_extent import extent_of
-from designer.yields.blame_pieces import StoredParts
-from designer.yields.blame_replay import PROBE
-from designer.yields.corners import worst_corners
-from designer.yields.crossings import crossings
+from designer.yields.blame_replay import PROBE, extent_of
 from designer.yields.exact_rung import block
-from designer.yields.margins import Limit, Margin, Prediction
-from designer.yields.sobol import Index, sobol
+from designer.yields.margins import Limit, Margin, Prediction, crossings
+from designer.yields.stored_parts import StoredParts
 from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, judge
+from designer.yields.worst_corner import Index, sobol, worst_corners
 from tests.shared import paper_cases
 
 NO_SPREAD = Spread(0.0, 0.0, 0.0, 0.0, saturation=0.0)
@@ -177,7 +174,7 @@ def test_a_crossing_is_where_the_response_ends_along_the_line() -> None:
     nominal = Boards.of(circuit, [nominal_board(circuit)])
     q = Quantity("U2C", "offset", 0.0, 3e-3)
     board = with_column(nominal, q, np.array([40e-3]))
-    met = crossings(board, [0], [0], study.questions, jobs=1)[0]
+    met = crossings(board, [(0, 0)], study.questions)[0]
     assert 0.0 < met.inside < met.outside <= 1.0
     assert met.outside - met.inside < 0.01
 
@@ -359,7 +356,7 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
 
     monkeypatch.setattr(blame_replay, "TOGETHER", 1)
     with pytest.raises(_Stopped):
-        blame(few, some, lost=2, kept=1, jobs=1, progress=stop_late, pieces=pieces)
+        blame(few, some, lost=2, kept=1, jobs=1, progress=stop_late, parts=pieces)
     before = dict(pieces.known)
     assert {name.split()[0] for name in before} >= {"replay", "crossing"}
     replayed: list[object] = []
@@ -376,7 +373,7 @@ def test_a_blame_that_was_interrupted_goes_on_where_it_was(
         nonlocal steps
         steps += 1
 
-    again = blame(few, some, lost=2, kept=1, jobs=1, progress=step, pieces=pieces)
+    again = blame(few, some, lost=2, kept=1, jobs=1, progress=step, parts=pieces)
     assert replace(again, seconds=0.0) == replace(whole, seconds=0.0)
     assert replayed == []
     assert steps == total
@@ -392,7 +389,7 @@ def test_a_budget_leaves_out_boards_and_says_what_share_was_done() -> None:
     assert half.share == half.steps / whole.steps
     assert half.replays == whole.replays[: len(half.replays)]
     assert {r.before for r in half.replays} == {Verdict.LOST, Verdict.OK}
-    assert half.made == whole.made
+    assert half.changes == whole.changes
     least = extent_of(study, rows, 1)
     assert len(least.replays) == len(least.crossings) == 1
     assert extent_of(study, rows, whole.steps).share == 1.0
@@ -406,10 +403,10 @@ def test_a_larger_budget_does_the_rest() -> None:
     few = replace(plan(2, "offsets"), samples=12)
     some = [a for a in answers(2, "offsets") if a.sample < 12]
     pieces = _Memory()
-    part = blame(few, some, lost=2, kept=1, budget=1, jobs=2, pieces=pieces)
+    part = blame(few, some, lost=2, kept=1, budget=1, jobs=2, parts=pieces)
     assert part.share < 1.0
     assert part.budget == 1
-    more = blame(few, some, lost=2, kept=1, budget=10**6, jobs=2, pieces=pieces)
+    more = blame(few, some, lost=2, kept=1, budget=10**6, jobs=2, parts=pieces)
     whole = blame(few, some, lost=2, kept=1, jobs=2)
     assert replace(more, seconds=0.0) == replace(whole, seconds=0.0)
 

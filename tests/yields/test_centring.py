@@ -15,8 +15,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.model.model_file import parse_model_file
 from designer.model.tuning_bands import Bands
-from designer.yields.centring import centring_offset, rest_distances
-from designer.yields.generator_offsets import Adjustment
+from designer.yields.adjustment import Adjustment, centring_offset, rest_distances
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.bench_plans import question
 from tests.shared.paper_cases import subject
@@ -103,7 +102,7 @@ def test_adjustments_change_what_they_say() -> None:
     turned = Adjustment(0.02, -0.1, 0.03).of(Excitation(100.0, 5.0, 0.5))
     assert (turned.frequency, turned.amplitude) == (102.0, 4.5)
     assert turned.offset == pytest.approx(0.65)
-    assert Adjustment(0.2, -0.2, 0.0).within(Bands()) == Adjustment(0.05, -0.10, 0.0)
+    assert Adjustment.at(np.array([0.2, -0.2, 0.0]), Bands()) == Adjustment(0.05, -0.10, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -25,17 +25,26 @@ from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed, SpiceJob
 from designer.spread.spread import draw
 from designer.yields import ngspice_runs
-from designer.yields.layers import Samples, listen
+from designer.yields.cross_check import (
+    OR,
+    UNDECIDED,
+    Ask,
+    CrossCheck,
+    StartKind,
+    Why,
+    ask_random,
+    is_answer,
+)
+from designer.yields.layers import fill_cross_checks, samples_task
 from designer.yields.ngspice_runs import (
     MOST_PERIODS,
     REMAINDER,
     NgspiceAnswer,
     Query,
-    confirm,
-    hear,
+    cross_checks,
     periods_to_settle,
+    run_queries,
 )
-from designer.yields.ngspice_sampling import OR, UNDECIDED, Ask, Hearing, StartKind, Why, ask_random
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
 from designer.yields.verdict import StudyPlan, Verdict
@@ -141,7 +150,7 @@ def test_a_disagreement_is_asked_again_until_two_steps_say_the_same(
     counting = Counting(pool)
     query = Query(who, SolverSettings("trap", who.period / 400.0), expected, 3)
     progress: Callable[[], None] = lambda: calls.append(1)  # noqa: E731
-    (heard,) = confirm(counting, [query], progress)  # type: ignore[arg-type]
+    (heard,) = run_queries(counting, [query], progress)  # type: ignore[arg-type]
     assert heard.response == "1-1-1"
     assert heard.remedies == ""
     assert counting.jobs == runs
@@ -199,7 +208,7 @@ def test_only_two_answers_that_are_the_same_count(
 ) -> None:
     who, pool, calls = subject(1), Saying(*ends), []
     query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", refinements)
-    (heard,) = confirm(pool, [query], lambda: calls.append(1))  # type: ignore[arg-type]
+    (heard,) = run_queries(pool, [query], lambda: calls.append(1))  # type: ignore[arg-type]
     assert (heard.response, heard.reason) == (response, reason)
     both = OR.join(reason.split(", at a smaller step "))
     assert heard.either == (both if ", at a" in reason else "")
@@ -216,7 +225,7 @@ def test_a_board_still_on_its_way_gets_the_time_it_needs(pool: SpicePool) -> Non
         ((_, first),) = pool.map([numerics_gate.job(early, step)])
         assert not isinstance(first, SimulationFailed)
         assert first.orbit.status is OrbitStatus.NOT_SETTLED
-    (heard,) = confirm(pool, [Query(early, settings, "1-1-1", 1)])
+    (heard,) = run_queries(pool, [Query(early, settings, "1-1-1", 1)])
     assert heard.response == "1-1-1"
 
 
@@ -237,7 +246,7 @@ def test_a_long_way_is_not_gone_again_at_any_price(
 ) -> None:
     who, pool = replace(subject(1), discard=way), Saying(*ends)
     query = Query(who, SolverSettings("trap", who.period / 400.0), "1-1-1", 1)
-    (heard,) = confirm(pool, [query])  # type: ignore[arg-type]
+    (heard,) = run_queries(pool, [query])  # type: ignore[arg-type]
     assert heard.response == response
     assert pool.steps == runs
 
@@ -246,7 +255,7 @@ def test_a_run_that_fails_says_why(pool: SpicePool) -> None:
     who = subject(1)
     broken = replace(who, start=np.full(4, np.nan))
     query = Query(broken, SolverSettings("trap", who.period / 400.0), "1-1-1", 1)
-    (heard,) = confirm(pool, [query])
+    (heard,) = run_queries(pool, [query])
     assert heard.response == "failed"
     assert heard.reason
 
@@ -264,9 +273,9 @@ def both(samples: range, questions: int = 2) -> list[Ask]:
 def test_boards_from_the_nominal_orbit(pool: SpicePool) -> None:
     """Against runs made here: from the nominal start, of 60 periods, the last six judged."""
     p = asking()
-    answers = {(a.sample, a.question): a for a in Samples(p, range(2))(2, nothing)}
+    answers = {(a.sample, a.question): a for a in samples_task(p, range(2))(2, nothing)}
     asks = both(range(2))
-    heard = hear(p, asks, pool, 2)
+    heard = cross_checks(p, asks, pool, 2)
     assert [(h.sample, h.question, h.kind) for h in heard] == [
         (a.sample, a.question, a.kind) for a in asks
     ]
@@ -302,11 +311,11 @@ def test_how_often_the_step_is_halved_goes_with_the_start(monkeypatch: pytest.Mo
             asked.append(query.refinements)
             yield k, (query, NgspiceAnswer("1-1-1"))
 
-    monkeypatch.setattr(ngspice_runs, "confirmed", count)
+    monkeypatch.setattr(ngspice_runs, "queries_run", count)
     pool: Any = None
     asks = both(range(1), 1)
-    hear(asking(), asks, pool, 1)
-    hear(asking(), asks, pool, 1, refinements=5)
+    cross_checks(asking(), asks, pool, 1)
+    cross_checks(asking(), asks, pool, 1, refinements=5)
     assert [ask.kind for ask in asks] == [StartKind.NOMINAL, StartKind.OWN]
     assert asked == [1, 2, 5, 2]  # the longer run, from the nominal orbit, comes first
 
@@ -331,13 +340,13 @@ def test_too_long_a_way_is_left_out_by_name(
     monkeypatch.setattr(ngspice_runs, "MOST_PERIODS", 3)
     calls: list[int] = []
     p = asking()
-    heard = hear(p, both(range(1)), pool, 2, lambda: calls.append(1))
-    answers = {a.question: a for a in Samples(p, range(1))(1, nothing)}
+    heard = cross_checks(p, both(range(1)), pool, 2, lambda: calls.append(1))
+    answers = {a.question: a for a in samples_task(p, range(1))(1, nothing)}
     for h in heard:
         if h.kind is StartKind.OWN:
             assert h.agrees(answers[h.question]) is True
         else:
-            assert (h.response, h.periods, h.decided) == ("", 0, False)
+            assert (h.response, h.periods) == ("", 0)
             assert re.search(r"too long a way .*: \d+ drive periods, at most 3", h.reason)
             assert h.survives(p.questions[h.question]) is None
     assert len(calls) == len(heard) == 4
@@ -345,14 +354,14 @@ def test_too_long_a_way_is_left_out_by_name(
 
 def test_blocks_are_byte_equal_on_any_number_of_workers(pool: SpicePool, tmp_path: Path) -> None:
     p = asking(4)
-    answers = Samples(p, range(4))(2, nothing)
+    answers = samples_task(p, range(4))(2, nothing)
     asks = ask_random(answers)
     assert len(asks) == 16 - sum(a.response == "aperiodic" for a in answers) == 15
     contents, known = [], []
     with SpicePool(1) as one:
         for name, workers, jobs in (("one", one, 1), ("two", pool, 2)):
             (tmp_path / name).mkdir()
-            heard = listen(p, asks, _store(tmp_path / name, p), workers, jobs, nothing)
+            heard = fill_cross_checks(p, asks, _store(tmp_path / name, p), workers, jobs, nothing)
             (file,) = (tmp_path / name / "ngspice.parquet").iterdir()
             contents.append(file.read_bytes())
             known.append(_store(tmp_path / name, p).read(range(10)))
@@ -360,8 +369,8 @@ def test_blocks_are_byte_equal_on_any_number_of_workers(pool: SpicePool, tmp_pat
     assert contents[0] == contents[1]
 
 
-def _store(root: Path, p: StudyPlan) -> BlockStore[Hearing]:
-    return BlockStore(root, "ngspice.parquet", Hearing, study_hash(p, "ngspice"), size=10)
+def _store(root: Path, p: StudyPlan) -> BlockStore[CrossCheck]:
+    return BlockStore(root, "ngspice.parquet", CrossCheck, study_hash(p, "ngspice"), size=10)
 
 
 def test_what_was_heard_is_not_asked_again(pool: SpicePool, tmp_path: Path) -> None:
@@ -370,8 +379,8 @@ def test_what_was_heard_is_not_asked_again(pool: SpicePool, tmp_path: Path) -> N
     everything = both(range(3))
     counting = Counting(pool)
 
-    def said(asks: list[Ask], **more: Any) -> list[Hearing]:
-        return listen(p, asks, _store(tmp_path, p), counting, 1, nothing, **more)  # type: ignore[arg-type]
+    def said(asks: list[Ask], **more: Any) -> list[CrossCheck]:
+        return fill_cross_checks(p, asks, _store(tmp_path, p), counting, 1, nothing, **more)  # type: ignore[arg-type]
 
     first = said(both(range(2)))
     runs = counting.jobs
@@ -397,8 +406,8 @@ class Broken:
 
 
 def test_a_library_that_crashes_is_said() -> None:
-    heard = hear(asking(), both(range(2)), Broken(), 1)  # type: ignore[arg-type]
+    heard = cross_checks(asking(), both(range(2)), Broken(), 1)  # type: ignore[arg-type]
     assert len(heard) == 8
     for h in heard:
         assert (h.response, h.reason) == ("failed", "worker died (exit -11) twice")
-        assert not h.decided
+        assert not is_answer(h.response)

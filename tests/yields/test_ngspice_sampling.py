@@ -11,25 +11,25 @@ import pytest
 from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Expect, Response
-from designer.yields.ngspice_sampling import (
+from designer.yields.cross_check import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,
     OWN_SAMPLES,
     SUBSET,
     Ask,
-    Hearing,
+    CrossCheck,
     StartKind,
     Why,
     ask_all,
     ask_boundary,
     ask_differing,
     ask_random,
-    distance,
+    margin_share,
 )
 from designer.yields.verdict import Answer, Question, Verdict
 
 BLANK = Answer(0, 0, Verdict.OK, "1-2-2", "", 0.5, 1.0, 1.0, 0.0, 40)
-HEARD = Hearing(0, 0, StartKind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
+HEARD = CrossCheck(0, 0, StartKind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
 NOMINAL = Orbit(
     OrbitStatus.PERIODIC, n=1, p=2, q=2, multipliers=np.array([0.5 + 0j]), penetration=2.0, miss=4.0
 )
@@ -82,7 +82,7 @@ def test_the_distance_is_the_least_margin_over_the_nominal_one(
     radius: float, penetration: float, miss: float, expected: float
 ) -> None:
     answer = replace(BLANK, radius=radius, penetration=penetration, miss=miss)
-    assert distance(answer, NOMINAL) == pytest.approx(expected)
+    assert margin_share(answer, NOMINAL) == pytest.approx(expected)
 
 
 def test_the_nearest_to_a_boundary_are_asked_once() -> None:

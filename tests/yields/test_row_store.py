@@ -23,7 +23,7 @@ from designer.spread.spread import Spread
 from designer.yields.layers import Here, fill
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import RULES, study_hash
-from designer.yields.verdict import BLOCK, Answer, Question, StudyPlan, Verdict
+from designer.yields.verdict import BLOCK, Answer, BoardRow, Question, StudyPlan, Verdict
 
 
 @pytest.fixture
@@ -96,10 +96,9 @@ class Colour(StrEnum):
 
 
 @dataclass(frozen=True)
-class Flat:
-    """Every kind of field that a row may have, and no question."""
+class Flat(BoardRow):
+    """Every kind of field that a row may have."""
 
-    sample: int
     name: str
     colour: Colour
     size: float
@@ -107,7 +106,8 @@ class Flat:
 
 
 def test_any_flat_dataclass_is_a_row(tmp_path: Path) -> None:
-    rows = [Flat(i, "ω", Colour.RED, math.nan if i else -0.0, bool(i % 2)) for i in range(3)]
+    head = (0, Verdict.OK, "1-1-1", "")
+    rows = [Flat(i, *head, "ω", Colour.RED, math.nan if i else -0.0, bool(i % 2)) for i in range(3)]
     BlockStore(tmp_path, "flat.parquet", Flat, "x", size=3).put(range(3), rows)
     back = BlockStore(tmp_path, "flat.parquet", Flat, "x", size=3).read(range(3))
     assert [repr(row) for row in back] == [repr(row) for row in rows]

@@ -17,8 +17,14 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.spread.spread import draw, draw_many
 from designer.yields import start_recipe_search
-from designer.yields.power_up import until_strobe
-from designer.yields.power_up_yield import PowerUpAnswer, phases, reached_block, switched_on
+from designer.yields.power_up import (
+    PowerUp,
+    phases,
+    power_up_block,
+    switched_on,
+    until_strobe,
+    with_generator,
+)
 from designer.yields.start_recipe import FINER, SLOWER, Recipe, RecipeKind, hertz, volts
 from designer.yields.start_recipe_search import (
     ASIDE,
@@ -186,7 +192,7 @@ def test_recipes_found_keep_their_word_at_other_phases() -> None:
     assert found[1].way is RecipeKind.DIRECT
     for recipe, p in zip(found, (1, 3), strict=True):
         assert recipe.reached == recipe.trials > 0
-        assert recipe.rate == 1.0
+        assert recipe.reached + recipe.board_reached == recipe.trials + recipe.board_trials
         starts = [(0, question(p), recipe, 0.1 + 0.77 * k) for k in range(8)]
         assert {e.verdict for e in switched_on(nominal(p), starts)} == {Verdict.OK}
     # What the text allows a person to do, one period at a step, and ten times slower.
@@ -222,7 +228,7 @@ def test_what_a_recipe_promises_of_boards_holds_on_others() -> None:
     (found,) = find_recipes(of, 2)
     assert found.board_trials == start_recipe_search.STARTS * found.able > 36
     ok = [a.verdict is Verdict.OK for a in answers(of, range(40))]
-    rows = reached_block(of, range(40), [found], 2)
+    rows = power_up_block(of, range(40), [found], 2)
     worked = sum(r.verdict is Verdict.OK and able for r, able in zip(rows, ok, strict=True))
     promised, seen = wilson(found.board_reached, found.board_trials), wilson(worked, sum(ok))
     assert promised[0] < seen[1]
@@ -236,14 +242,14 @@ def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
     """900 periods from discharged capacitors, without sweep, counted by eye."""
     of = plan(2)
     direct = recipes(2)[RecipeKind.DIRECT]
-    rows = reached_block(of, range(6), [direct], 2)
+    rows = power_up_block(of, range(6), [direct], 2)
     assert [(r.sample, r.question) for r in rows] == [(i, 0) for i in range(6)]
     seen = 0
     for row in rows:
         board = draw(of.circuit, of.spread, of.seed, row.sample)
         system = Reduction(of.circuit, board).system()
         drive = direct.target.drive
-        met = until_strobe(system, drive, row.phase)
+        met = until_strobe(with_generator(system, drive), drive, row.phase)
         assert met is not None
         run = Flow(system, drive).run(met[0], 900)
         counted = period_counts(run.strobes, run.counts)
@@ -259,11 +265,11 @@ def test_neither_jobs_nor_blocks_change_what_is_reached() -> None:
     of = plan(1, 3)
     known = [recipes(1)[RecipeKind.FROM_ABOVE], recipes(3)[RecipeKind.DIRECT]]
     calls: list[int] = []
-    whole = reached_block(of, range(4), known, 2, lambda: calls.append(1))
+    whole = power_up_block(of, range(4), known, 2, lambda: calls.append(1))
     assert len(calls) == len(whole) == 8
-    parts: list[PowerUpAnswer] = []
+    parts: list[PowerUp] = []
     for block in (range(1), range(1, 4)):
-        parts += reached_block(of, block, known, 1)
+        parts += power_up_block(of, block, known, 1)
     assert parts == whole
 
 
@@ -279,8 +285,8 @@ def test_phases_are_drawn_from_seed_sample_and_response_alone() -> None:
 
 def test_a_response_in_front_changes_nothing_of_the_others() -> None:
     known = [recipes(1)[RecipeKind.DIRECT], recipes(3)[RecipeKind.DIRECT]]
-    alone = reached_block(plan(3), range(4), known[1:], 2)
-    both = reached_block(plan(1, 3), range(4), known, 2)
+    alone = power_up_block(plan(3), range(4), known[1:], 2)
+    both = power_up_block(plan(1, 3), range(4), known, 2)
     assert [replace(r, question=0) for r in both if r.question == 1] == alone
 
 
@@ -303,7 +309,7 @@ def test_recipes_are_tried_on_boards_that_no_study_has(
 def test_reached_agrees_with_as_built_where_one_attractor_is_left() -> None:
     """At ω = 0.54 the nominal circuit has one attractor: how it is started does not matter."""
     of = plan(3)
-    rows = reached_block(of, range(8), [recipes(3)[RecipeKind.DIRECT]], 2)
+    rows = power_up_block(of, range(8), [recipes(3)[RecipeKind.DIRECT]], 2)
     ok = [a.verdict is Verdict.OK for a in answers(of, range(8))]
     assert any(ok)
     assert sum(r.verdict is Verdict.OK for r in rows) == pytest.approx(sum(ok), abs=1)
@@ -316,7 +322,7 @@ def test_a_board_that_cannot_be_reduced_is_failed() -> None:
     (ended,) = switched_on(Ensemble(boards), [(0, question(1), recipes(1)[RecipeKind.DIRECT], 1.0)])
     assert ended.verdict is Verdict.FAILED
     assert ended.reason
-    (row,) = reached_block(
+    (row,) = power_up_block(
         replace(of, circuit=broken), range(1), [recipes(1)[RecipeKind.DIRECT]], 1
     )
     assert row.verdict is Verdict.FAILED

@@ -27,20 +27,19 @@ from designer.jobs import design_source, study_json
 from designer.jobs.study_folder import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
-from designer.yields import layers, ngspice_runs, study_layers, study_plan
+from designer.yields import exact_rung, layers, ngspice_runs, tolerance_study
 from designer.yields.blame_analysis import blame
-from designer.yields.blame_pieces import StoredParts
-from designer.yields.layers import CHUNK, Here, Samples
-from designer.yields.ngspice_sampling import Hearing, StartKind, Why, ask_random
+from designer.yields.cross_check import CrossCheck, StartKind, Why, ask_random
+from designer.yields.layers import CHUNK, Here
 from designer.yields.row_store import BlockStore
+from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
-from designer.yields.study_layers import Stores, Work
-from designer.yields.tolerance_study import tolerance
+from designer.yields.tolerance_study import Stores, Work, tolerance
 from designer.yields.verdict import BLOCK, Answer, Verdict
+from tests.jobs.test_study_cache import MAP
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
 from tests.yields.test_blame_analysis import _Memory
-from tests.yields.test_study_cache import MAP
 from tests.yields.test_verdict import plan
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
@@ -85,7 +84,7 @@ def test_quantiles_of_a_margin_say_how_many_boards_have_it() -> None:
 
 
 class Fixed:
-    """Stands for `Samples`: board i is ok but for every ``lost``-th."""
+    """Stands for `samples_task`: board i is ok but for every ``lost``-th."""
 
     def __init__(self, lost: int) -> None:
         self.lost = lost
@@ -102,7 +101,7 @@ class Fixed:
 
 
 def grown(until: float, monkeypatch: pytest.MonkeyPatch, lost: int = 10) -> Study:
-    monkeypatch.setattr(layers, "Samples", Fixed(lost))
+    monkeypatch.setattr(layers, "samples_task", Fixed(lost))
     work = Work(1, None, Stores(), Here(1), Progress(), "exact")
     checked: Any = (None, None)
     return work.grown(Study(checked, plan(200), (0, 1), {}, (), until=until))
@@ -129,7 +128,7 @@ def test_a_study_grows_to_the_first_edge_that_is_narrow(
 
 
 def test_a_study_that_stays_wide_ends_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study_layers, "MOST_UNTIL", 3 * BLOCK)
+    monkeypatch.setattr(tolerance_study, "MOST_UNTIL", 3 * BLOCK)
     study = grown(1e-3, monkeypatch)
     assert study.narrow is False
     assert study.plan.samples == 3 * BLOCK
@@ -148,8 +147,8 @@ def test_a_response_without_an_answer_does_not_drive_the_study(
                 for a in made(jobs, step)
             ]
 
-    monkeypatch.setattr(layers, "Samples", Silent(10))
-    monkeypatch.setattr(study_layers, "MOST_UNTIL", 6 * BLOCK)
+    monkeypatch.setattr(layers, "samples_task", Silent(10))
+    monkeypatch.setattr(tolerance_study, "MOST_UNTIL", 6 * BLOCK)
     notes: list[str] = []
     said = Progress()
     monkeypatch.setattr(said, "note", notes.append)
@@ -177,16 +176,16 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
                 for a in made(jobs, step)
             ]
 
-    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+    def fill_cross_checks(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[CrossCheck]:
         return [
-            Hearing(
+            CrossCheck(
                 a.sample, a.question, a.kind, a.why,
                 "1-1-2" if 100 <= a.sample < 110 else "1-1-1", "", "", 9, False,
             )
             for a in asks
         ]  # fmt: skip
 
-    monkeypatch.setattr(layers, "listen", listen)
+    monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     p = plan(200)
     nominal = replace(p.questions[0].start, penetration=1.0, miss=1.0)
     spec = replace(p.questions[0].spec, expect=None)
@@ -195,7 +194,7 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
     work = Work(1, pool, Stores(), Here(1), Progress(), "auto")
     checked: Any = (None,)
     study = Study(checked, replace(p, questions=(one,)), (0,), {}, (), until=until)
-    monkeypatch.setattr(layers, "Samples", _first(Near(10**9)))
+    monkeypatch.setattr(layers, "samples_task", _first(Near(10**9)))
     study = work.grown(study)
     (both,) = study.combined
     assert both is not None
@@ -211,9 +210,9 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
     """Board 45 is beyond those that are asked from their own orbit, and differs from the nominal
     one."""
 
-    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+    def fill_cross_checks(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[CrossCheck]:
         return [
-            Hearing(
+            CrossCheck(
                 a.sample, a.question, a.kind, a.why,
                 "3-3-3" if a.sample == 45 and a.kind is StartKind.NOMINAL else "1-1-1",
                 "", "", 9, False,
@@ -221,17 +220,16 @@ def test_boards_that_differ_are_explained_by_their_own_orbit(
             for a in asks
         ]  # fmt: skip
 
-    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
-    monkeypatch.setattr(layers, "listen", listen)
+    monkeypatch.setattr(layers, "samples_task", Fixed(10**9))
+    monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     p = plan(60)
     spec = replace(p.questions[0].spec, expect=None)
     questions = tuple(replace(p.questions[0], spec=spec, settings=object()) for _ in range(2))  # type: ignore[arg-type]
     pool: Any = object()
     checked: Any = (None, None)
     study = Study(checked, replace(p, questions=questions), (0, 1), {}, ())
-    study = Work(1, pool, Stores(), Here(1), Progress(), rung).heard(
-        Work(1, pool, Stores(), Here(1), Progress(), rung).sampled(study)
-    )
+    work = Work(1, pool, Stores(), Here(1), Progress(), rung)
+    study = work.cross_checked(work.sampled(study))
     for both in study.combined:
         assert both is not None
         (difference,) = both.differences
@@ -248,16 +246,16 @@ def _first(made: Fixed) -> Any:
 
 def test_with_ngspice_more_boards_are_asked_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """The combined interval counts: exact samples alone cannot make it narrow."""
-    monkeypatch.setattr(layers, "Samples", Fixed(10**9))
+    monkeypatch.setattr(layers, "samples_task", Fixed(10**9))
     asked: list[int] = []
 
-    def listen(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[Hearing]:
+    def fill_cross_checks(_plan: Any, asks: Any, *_: Any, **__: Any) -> list[CrossCheck]:
         asked.append(sum(a.kind is StartKind.NOMINAL and a.why is Why.RANDOM for a in asks))
         return [
-            Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
+            CrossCheck(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False) for a in asks
         ]
 
-    monkeypatch.setattr(layers, "listen", listen)
+    monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     p = plan(200)
     questions = tuple(
         replace(q, spec=replace(q.spec, expect=None), settings=object())  # type: ignore[arg-type]
@@ -281,7 +279,7 @@ def test_a_study_says_that_the_bandwidth_does_not_enter(
 ) -> None:
     p = plan(3)
     p = replace(p, spread=replace(p.spread, gain_bandwidth=spread))
-    monkeypatch.setattr(study_plan, "plan_study", lambda *_, **__: p)
+    monkeypatch.setattr(tolerance_study, "plan_study", lambda *_, **__: p)
     notes: list[str] = []
     said = Progress()
     monkeypatch.setattr(said, "note", notes.append)
@@ -316,27 +314,27 @@ def test_only_runs_that_are_not_on_disk_are_announced(
     setting: Any = object()
     p = replace(p, questions=tuple(replace(q, settings=setting) for q in p.questions))
     store = BlockStore(
-        tmp_path, NGSPICE, Hearing, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
+        tmp_path, NGSPICE, CrossCheck, "x", omegas=[q.spec.omega for q in p.questions], size=CHUNK
     )
 
-    def answered(_plan: Any, blocks: Any, *_: Any) -> Iterator[tuple[int, Hearing]]:
+    def checks_run(_plan: Any, blocks: Any, *_: Any) -> Iterator[tuple[int, CrossCheck]]:
         for k, a in enumerate(ask for block in blocks for ask in block):
-            yield k, Hearing(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False)
+            yield k, CrossCheck(a.sample, a.question, a.kind, a.why, "1-1-1", "", "", 9, False)
 
-    monkeypatch.setattr(ngspice_runs, "answered", answered)
+    monkeypatch.setattr(ngspice_runs, "checks_run", checks_run)
     answers = Fixed(10**9)(None, range(200))(1, None)
     asks = ask_random(answers)
-    layers.listen(p, [a for a in asks if a.sample < there], store, None, 1, lambda: None)  # type: ignore[arg-type]
+    layers.fill_cross_checks(p, [a for a in asks if a.sample < there], store, None, 1, lambda: None)  # type: ignore[arg-type]
 
     class Kept(Stores):
-        def ngspice(self, plan: Any) -> BlockStore[Hearing]:
+        def rows(self, *_: Any) -> BlockStore[Any]:
             return store
 
     progress, pool = Listener(), object()
     work = Work(1, pool, Kept(), Here(1), progress, "auto")  # type: ignore[arg-type]
     checked: Any = (None, None)
     study = Study(checked, p, (0, 1), {}, tuple(answers))
-    assert len(work._heard(study, asks)) == len(asks) == 120
+    assert len(work._checks(study, asks)) == len(asks) == 120
     assert progress.stages == said
 
 
@@ -358,7 +356,7 @@ def test_a_map_that_is_there_is_not_made_again(
         def maps(self, plan: Any) -> StoredParts:
             return pieces
 
-    monkeypatch.setattr(study_layers, "yield_map", yield_map)
+    monkeypatch.setattr(tolerance_study, "yield_map", yield_map)
     work = Work(1, None, Kept(), Here(1), Progress(), "exact")
     checked: Any = (SimpleNamespace(model=SimpleNamespace(b=0.25)),) * 2
     study = Study(checked, p, (0, 1), {}, ())
@@ -467,8 +465,8 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
         asked.append(len(args[1]))
         return blame(*args, **options)
 
-    monkeypatch.setattr(study_layers, "blame", counted)
-    monkeypatch.setattr(Work, "reached", lambda _, study: study)
+    monkeypatch.setattr(tolerance_study, "blame", counted)
+    monkeypatch.setattr(Work, "powered_up", lambda _, study: study)
     assert entry.status([*_words(home, out), "--reached", "-q"]) == 0
     assert asked == []
     assert json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"] == known
@@ -499,11 +497,11 @@ def test_yields_stand_before_the_blame_and_it_goes_on_after_an_interruption(
     (out / "manifest.json").write_text(json.dumps(manifest))
 
     def interrupted(*_: Any, **options: Any) -> Any:
-        options["pieces"].put({"nominal 0": ((), 0)})
+        options["parts"].put({"nominal 0": ((), 0)})
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(study_layers, "blame", interrupted)
+        patched.setattr(tolerance_study, "blame", interrupted)
         assert entry.status(["tolerance", str(out), "--resume"]) == 130
     assert "100.0   76–100" in capfd.readouterr().err
     early = json.loads((out / "tolerance.json").read_text())
@@ -529,7 +527,7 @@ def test_a_study_without_blame_gets_it_later_and_loses_it_never(
     out = tmp_path / "exact"
     shutil.copytree(exact, out)
     with monkeypatch.context() as patched:
-        patched.setattr(study_layers, "blame", _refused)
+        patched.setattr(tolerance_study, "blame", _refused)
         assert entry.status(["tolerance", str(out), "--no-blame", "--json"]) == 0
         assert json.loads(capfd.readouterr().out)["blame"]["status"] == "whole"
         assert _files(out) == _files(exact)
@@ -565,7 +563,7 @@ def test_another_layer_asks_ngspice_for_no_check_again_and_another_design_does(
     with monkeypatch.context() as patched:
         patched.setattr(numerics_gate, "check", _refused)
         patched.setattr(equation_check, "check", _refused)
-        patched.setattr(study_layers, "blame", _refused)
+        patched.setattr(tolerance_study, "blame", _refused)
         assert entry.status([*words, "--reached"]) == 0
     added = _files(out)
     once = tmp_path / "once" / "auto"
@@ -638,14 +636,14 @@ def test_a_deleted_folder_is_said_at_the_next_block(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    call = Samples.__call__
+    block = exact_rung.block
 
-    def deleted(self: Samples, jobs: int, progress: Any) -> Any:
-        rows = call(self, jobs, progress)
+    def deleted(plan: Any, indices: range, jobs: int, progress: Any) -> Any:
+        rows = block(plan, indices, jobs, progress)
         shutil.rmtree(out)
         return rows
 
-    monkeypatch.setattr(Samples, "__call__", deleted)
+    monkeypatch.setattr(exact_rung, "block", deleted)
     without_starts(monkeypatch)
     assert entry.status([*_words(home, out), "-q"]) == 2
     assert "the folder" in capfd.readouterr().err

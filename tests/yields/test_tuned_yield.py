@@ -18,11 +18,10 @@ from designer.jobs.study_json import tuned_json
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import Spread, draw
 from designer.yields import tuned_yield
-from designer.yields.generator_offsets import AS_BUILT, Adjustment
-from designer.yields.joint_yield import all_on_one
+from designer.yields.adjustment import AS_BUILT, Adjustment
 from designer.yields.setting_search import MOST_FOLLOWED, MOST_TRIES, BoardCase, Try, seek
 from designer.yields.tuned_yield import Tuned, benched_block, tuned_block
-from designer.yields.verdict import Answer, Question, Verdict, judge
+from designer.yields.verdict import Answer, Question, Verdict, all_on_one, judge
 from tests.shared.bench_plans import answers, ensemble, period_counts, plan, question, shifted
 from tests.shared.paper_cases import subject
 
@@ -105,7 +104,7 @@ def test_every_setting_found_lies_in_the_bands_and_works(
     for row in rough[1]:
         assert row.tries <= MOST_TRIES
         assert row.followed <= MOST_FOLLOWED
-        assert row.setting.within(bands) == row.setting
+        assert Adjustment.at(row.setting.vector, bands) == row.setting
         if row.verdict is not Verdict.OK or not 0 < row.tries <= 9:
             continue
         asked = of.questions[row.question]
@@ -221,8 +220,7 @@ def test_a_board_given_up_is_lost_only_where_most_settings_answered(
         for case in cases:
             for status in statuses.split():
                 orbit = Orbit(OrbitStatus(status))
-                verdict, reason = judge(orbit, case.question.spec, case.question.start)
-                case.tries.append(Try(AS_BUILT, orbit, verdict, reason))
+                case.tries.append(Try(AS_BUILT, orbit, case.question.judge(orbit)[0]))
 
     of = plan(1, samples=1)
     monkeypatch.setattr(tuned_yield, "seek", seek)

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from designer.yields.ngspice_sampling import (
+from designer.yields.cross_check import (
     BOUNDARY_SAMPLES,
     OR,
     Ask,
-    Hearing,
+    CrossCheck,
     StartKind,
     Why,
     ask_boundary,
     ask_random,
+    is_answer,
 )
 from designer.yields.two_engine_yield import (
     Combined,
@@ -59,7 +60,7 @@ def world(
     return answers, dict(enumerate(said.tolist()))
 
 
-def listened(answers: list[Answer], said: dict[int, bool], asks: list[Ask]) -> list[Hearing]:
+def listened(answers: list[Answer], said: dict[int, bool], asks: list[Ask]) -> list[CrossCheck]:
     return [
         replace(HEARD, sample=a.sample, kind=a.kind, why=a.why, response=OK if s else LOST)
         for a in asks
@@ -162,7 +163,7 @@ def test_boards_without_an_answer_are_bounded() -> None:
     assert both.estimate == pytest.approx(50 / 55)
     assert both.if_lost == pytest.approx(50 / 60)
     assert both.if_ok == pytest.approx(55 / 60)
-    all_answered = combine(answers, [h for h in heard if h.decided], QUESTION)
+    all_answered = combine(answers, [h for h in heard if is_answer(h.response)], QUESTION)
     assert all_answered is not None
     assert all_answered.if_lost == all_answered.if_ok == all_answered.estimate
 

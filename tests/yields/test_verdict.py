@@ -20,7 +20,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread, draw
-from designer.yields.layers import Samples
+from designer.yields.layers import samples_task
 from designer.yields.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield, count, judge
 from tests.circuit.test_coefficients import exact_for_paper
 from tests.circuit.test_reduction import circuit_of
@@ -152,17 +152,17 @@ def test_blocks_cover_every_sample_once(samples: int) -> None:
 
 
 def test_jobs_do_not_change_the_answers() -> None:
-    one = [a for block in plan().blocks() for a in Samples(plan(), block)(1, nothing)]
-    two = [a for block in plan().blocks() for a in Samples(plan(), block)(2, nothing)]
+    one = [a for block in plan().blocks() for a in samples_task(plan(), block)(1, nothing)]
+    two = [a for block in plan().blocks() for a in samples_task(plan(), block)(2, nothing)]
     assert [repr(a) for a in one] == [repr(a) for a in two]
     assert [(a.sample, a.question) for a in one] == [(i, q) for i in range(30) for q in range(2)]
-    longer = Samples(replace(plan(), samples=60), range(25))(2, nothing)
+    longer = samples_task(replace(plan(), samples=60), range(25))(2, nothing)
     assert [repr(a) for a in longer] == [repr(a) for a in one[:50]]
 
 
 def test_answers_are_those_of_the_boards_one_by_one() -> None:
     p = plan()
-    answers = Samples(p, range(5, 9))(2, nothing)
+    answers = samples_task(p, range(5, 9))(2, nothing)
     for a in answers:
         question = p.questions[a.question]
         board = draw(p.circuit, p.spread, p.seed, a.sample)
@@ -182,13 +182,13 @@ def test_answers_are_those_of_the_boards_one_by_one() -> None:
 
 def test_progress_is_called_once_an_answer() -> None:
     calls: list[int] = []
-    answers = Samples(plan(), range(4))(2, lambda: calls.append(1))
+    answers = samples_task(plan(), range(4))(2, lambda: calls.append(1))
     assert len(calls) == len(answers) == 8
 
 
 def test_a_board_that_cannot_be_reduced_is_failed_with_its_reason() -> None:
     p = plan()
     broken = replace(p.circuit, parts=(*p.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
-    answers = Samples(replace(p, circuit=broken), range(2))(1, nothing)
+    answers = samples_task(replace(p, circuit=broken), range(2))(1, nothing)
     assert {a.verdict for a in answers} <= {Verdict.FAILED}
     assert all(a.reason for a in answers)

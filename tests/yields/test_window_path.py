@@ -14,6 +14,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import Spread, draw_many
+from designer.yields.adjustment import Adjustment
 from designer.yields.window_path import MOST_FOLLOWED, PathSetting, find_window
 from tests.shared.bench_plans import period_counts, plan, question
 from tests.shared.paper_cases import MODEL, subject
@@ -39,20 +40,20 @@ def response(boards: Boards, p: int, spot: PathSetting) -> tuple[int, int, int] 
 def test_a_path_leads_into_a_window_that_is_hard_to_meet(p: int, sample: int) -> None:
     """Of an 11 x 11 x 11 grid over the bands, 8 and 10 settings show the response."""
     bands = Bands()
-    trail = find_window(board(p, sample), question(p), bands)
-    best = max(trail.spots, key=lambda spot: spot.radius)
+    spots, followed = find_window(board(p, sample), question(p), bands)
+    best = max(spots, key=lambda spot: spot.radius)
     assert best.radius > 0.0
-    assert best.setting.within(bands) == best.setting
+    assert Adjustment.at(best.setting.vector, bands) == best.setting
     assert response(board(p, sample), p, best) == (1, p, p)
-    assert trail.followed <= MOST_FOLLOWED
+    assert followed <= MOST_FOLLOWED
 
 
 def test_the_radius_says_where_the_window_ends() -> None:
     """Half of it away from the spot, in every direction, the board still shows the response; twice
     of it away, in some direction it does not."""
     p, boards, bands = 4, board(4, 9), Bands()
-    trail = find_window(boards, question(p), bands)
-    best = max(trail.spots, key=lambda spot: spot.radius)
+    spots, _ = find_window(boards, question(p), bands)
+    best = max(spots, key=lambda spot: spot.radius)
     widths = np.array([bands.frequency, bands.amplitude])
     here = np.array([best.setting.frequency, best.setting.amplitude])
     turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
@@ -72,24 +73,22 @@ def test_the_radius_says_where_the_window_ends() -> None:
 def test_the_nominal_board_is_in_its_window() -> None:
     circuit = subject(2).circuit
     nominal = Boards.of(circuit, [nominal_board(circuit)])
-    trail = find_window(nominal, question(2), Bands())
-    assert all(spot.radius > 0.0 for spot in trail.spots)
-    assert response(nominal, 2, trail.spots[-1]) == (1, 2, 2)
+    spots, _ = find_window(nominal, question(2), Bands())
+    assert all(spot.radius > 0.0 for spot in spots)
+    assert response(nominal, 2, spots[-1]) == (1, 2, 2)
 
 
 def test_a_path_is_the_same_twice_and_stays_in_its_bands() -> None:
     bands = Bands(0.02, 0.0, 0.01)
     first = find_window(board(4, 1), question(4), bands, 0.5)
     assert first == find_window(board(4, 1), question(4), bands, 0.5)
-    for spot in first.spots:
-        assert spot.setting.within(bands) == spot.setting
+    for spot in first[0]:
+        assert Adjustment.at(spot.setting.vector, bands) == spot.setting
 
 
 def test_bands_of_no_width_leave_the_setting() -> None:
-    trail = find_window(board(4, 3), question(4), Bands(0.0, 0.0, 0.0))
-    assert {spot.setting.of(question(4).excitation) for spot in trail.spots} == {
-        question(4).excitation
-    }
+    spots, _ = find_window(board(4, 3), question(4), Bands(0.0, 0.0, 0.0))
+    assert {spot.setting.of(question(4).excitation) for spot in spots} == {question(4).excitation}
 
 
 def test_valleys_are_the_displacement_between_contacts() -> None:

@@ -1,6 +1,7 @@
-"""The coordinates that matter most at the ends of their ranges, in every combination.
+"""Which coordinates of the spread move a margin most, and boards with those at the ends of their
+ranges, in every combination.
 
-The corners are those of the cube that boards are drawn from. So temperature, ageing and what parts
+Coordinates are those of the cube that boards are drawn from. So temperature, ageing and what parts
 have in common are coordinates like any other, and a part's value at a corner is one that a board
 can have: its temperature coefficient acts with the board's temperature, not beside it.
 """
@@ -9,24 +10,44 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
+from scipy.stats import sobol_indices, uniform
 
-from designer.base.arrays import Index as Places
+from designer.base.arrays import Array, Index as Places
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import column
-from designer.spread.spread import BOARD
-from designer.yields.blame_pieces import StoredParts, counted
+from designer.spread.spread import BOARD, Spread, part_of
+from designer.yields.exact_rung import Case, settled
 from designer.yields.margins import Margin
-from designer.yields.sobol import Index
-from designer.yields.verdict import StudyPlan, Verdict, judge
+from designer.yields.stored_parts import StoredParts, counted
+from designer.yields.verdict import StudyPlan, Verdict
 
+CUBE = 512
+"""Base samples of the Sobol indices; a power of two."""
 CORNER = 5
 """Coordinates that are put to the ends of their ranges."""
 LAST = 1.0 - 2.0**-53
 """End of a coordinate of the cube."""
+
+
+@dataclass(frozen=True)
+class Index:
+    """Sobol indices of the margin for one coordinate of the spread."""
+
+    coordinate: str
+    """Name of the coordinate."""
+    part: str
+    """Name of the part that it belongs to."""
+    first: float
+    """First-order Sobol index."""
+    total: float
+    """Total Sobol index."""
 
 
 @dataclass(frozen=True)
@@ -49,34 +70,63 @@ class Corner:
     """Corners that were asked."""
 
 
+def sobol(
+    circuit: Circuit, spread: Spread, margins: Sequence[Margin], seed: int, base: int = CUBE
+) -> list[tuple[Index, ...]]:
+    """Sobol indices of each margin over the spread's coordinates, largest total first.
+
+    Saltelli's estimators with ``base`` base samples on a scrambled Sobol set (scipy.stats). Empty
+    where nothing limits.
+    """
+    names = spread.coordinates(circuit)
+    limited = [k for k, margin in enumerate(margins) if margin.limits]
+    if not limited:
+        return [() for _ in margins]
+
+    def values(cube: Array) -> Array:
+        boards = spread.from_cube(circuit, np.minimum(cube.T, LAST))
+        return np.stack([margins[k].of(boards) for k in limited])
+
+    even: Any = uniform()  # scipy's own distribution is none by its type hints
+    indices = sobol_indices(
+        func=values,
+        n=base,
+        dists=[even] * len(names),
+        rng=np.random.default_rng([seed, base]),
+    )
+    shape = (len(limited), len(names))
+    ranked: list[tuple[Index, ...]] = [() for _ in margins]
+    for k, first, total in zip(
+        limited,
+        np.reshape(indices.first_order, shape).tolist(),
+        np.reshape(indices.total_order, shape).tolist(),
+        strict=True,
+    ):
+        rows = [Index(n, part_of(n), f, t) for n, f, t in zip(names, first, total, strict=True)]
+        ranked[k] = tuple(sorted(rows, key=lambda x: (-x.total, x.coordinate)))
+    return ranked
+
+
 def worst_corners(
     plan: StudyPlan,
     margins: Sequence[Margin],
     indices: Sequence[Sequence[Index]],
     jobs: int,
     progress: Callable[[], None],
-    pieces: StoredParts | None = None,
+    parts: StoredParts | None = None,
 ) -> list[Corner | None]:
     """For each question the corners of its ``CORNER`` largest indices, on the exact rung; None
-    where nothing limits. progress : called once an attractor. pieces : what is known already, and
-    where the rest goes.
+    where nothing limits. progress : called once an attractor. parts : the known ones, and where the
+    others go.
     """
-    pieces = StoredParts() if pieces is None else pieces
-    out: list[Corner | None] = []
+    parts = StoredParts() if parts is None else parts
+    corners: list[Corner | None] = []
     for number, (margin, ranked) in enumerate(zip(margins, indices, strict=True)):
-
-        def corner(
-            step: Callable[[], None],
-            number: int = number,
-            margin: Margin = margin,
-            ranked: Sequence[Index] = ranked,
-        ) -> Corner | None:
-            return _worst(plan, number, margin, ranked, jobs, step)
-
         # A margin of more crossings is another margin.
         name = f"corner {number} of {margin.sought}"
-        out.append(counted(pieces, name, progress, corner))
-    return out
+        compute = partial(_worst, plan, number, margin, ranked, jobs)
+        corners.append(counted(parts, name, progress, compute))
+    return corners
 
 
 def _worst(
@@ -96,25 +146,20 @@ def _worst(
     columns = [places[name] for name in chosen]
     picks = np.array(list(product((0, 1), repeat=len(chosen))), dtype=np.intp)
     boards = _at(plan, columns, picks)
-    falling = _falling(plan, columns, chosen, margin)
     question = plan.questions[number]
-    orbits = Ensemble(boards).settle(
-        range(len(boards)),
-        [question.excitation.drive] * len(boards),
-        np.tile(question.start.start, (len(boards), 1)),
-        jobs=jobs,
-        progress=progress,
-    )
-    verdicts = [judge(o, question.spec, question.start)[0] for o in orbits]
+    start = question.start.start
+    cases: list[Case] = [(i, question, question.excitation, start) for i in range(len(boards))]
+    rows = settled(Ensemble(boards), cases, jobs, progress)
     values = margin.of(boards)
     worst = int(np.argmin(values))
+    ends = picks[worst] ^ _falling(plan, columns, chosen, margin)
     return Corner(
         tuple(chosen),
-        tuple("low" if end == 0 else "high" for end in picks[worst] ^ falling),
+        tuple("low" if end == 0 else "high" for end in ends),
         float(values[worst]),
-        verdicts[worst],
-        orbits[worst].response,
-        sum(v is Verdict.OK for v in verdicts),
+        rows[worst][1],
+        rows[worst][0].response,
+        sum(verdict is Verdict.OK for _, verdict, _ in rows),
         len(boards),
     )
 

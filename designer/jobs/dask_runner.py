@@ -106,7 +106,7 @@ class Cluster:
 
     @contextmanager
     def _staying(self) -> Iterator[None]:
-        """A cluster that goes away in here is said as such; a block's own error stays as it is."""
+        """Turns the loss of the cluster into an error of its own; a block's own error stays."""
         from distributed.scheduler import KilledWorker
 
         try:
@@ -124,15 +124,15 @@ class Cluster:
         """The cluster has workers, and all of them make rows by the rules of this process."""
         try:
             self._client.wait_for_workers(1, timeout=PATIENCE)
-            found = self._client.run(_who)
+            found = self._client.run(_identity)
         except (OSError, TimeoutError) as error:
             raise EnvironmentMissing(f"no worker at {address}: {error}; {_HOW}") from None
         except ImportError as error:
             raise EnvironmentMissing(f"workers at {address} lack this tool: {error}") from None
-        for worker, said in sorted(found.items()):
-            if said != _who():
+        for worker, (version, rules) in sorted(found.items()):
+            if (version, rules) != _identity():
                 raise EnvironmentMissing(
-                    f"the worker {worker} has designer {said[0]} with rules {said[1]}, "
+                    f"the worker {worker} has designer {version} with rules {rules}, "
                     f"this machine {__version__} with {RULES}"
                 )
 
@@ -153,18 +153,14 @@ def _connected(address: str) -> Any:  # a Client, which has no types
 
 
 def _line(error: BaseException) -> str:
-    """What it says, on one line."""
+    """Its message on one line."""
     return " ".join(str(error).split())
 
 
-def _who() -> tuple[str, dict[str, int]]:
+def _identity() -> tuple[str, dict[str, int]]:
     return __version__, dict(RULES)
 
 
 def _rows(task: Task) -> Sequence[Any]:
     """A block, on a worker."""
-    return task(1, _nothing)
-
-
-def _nothing() -> None:
-    return None
+    return task(1, lambda: None)

@@ -1,4 +1,4 @@
-"""What ngspice said of a sample, and which samples it is asked about.
+"""The cross-check of samples in ngspice: what it answers, and which samples it is asked about.
 
 Two kinds of run (``yields.ngspice_runs`` says how long): on the sample's *own* orbit of the
 exact circuit rung ngspice only has to stay there; from the *nominal* design's orbit it finds its
@@ -35,7 +35,7 @@ more. Every slow one of it starts from the nominal orbit as well."""
 BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
 UNDECIDED = "undecided"
-"""What is heard where the last two step sizes still say different things."""
+"""The answer where the last two step sizes give different responses."""
 OR = " or "
 """Between the two answers of an undecided board."""
 
@@ -48,7 +48,7 @@ class StartKind(StrEnum):
 
 
 class NgspiceVerdict(StrEnum):
-    """What became of asking ngspice for the response that the exact rung names."""
+    """How ngspice's answer compares with the exact rung's."""
 
     AGREED = "agreed"
     DIFFERED = "differed"
@@ -79,22 +79,19 @@ class Ask:
     why: Why
     """Why the board was asked about."""
 
+    @property
+    def key(self) -> tuple[int, int, str]:
+        """Tells this run from all others; the order of rows."""
+        return self.sample, self.question, str(self.kind)
+
 
 @dataclass(frozen=True)
-class Hearing:
-    """What ngspice said about one sample of one response."""
+class CrossCheck(Ask):
+    """What ngspice answered about one sample of one response."""
 
-    sample: int
-    """Number of the board."""
-    question: int
-    """Number of the question of the plan."""
-    kind: StartKind
-    """Where the board was started."""
-    why: Why
-    """Why the board was asked about."""
     response: str
-    """n-p-q or status there, "undecided" where two step sizes differ to the last, "" where the way
-    was too long to be asked."""
+    """n-p-q or status, "undecided" where the last two step sizes differ, "" where the way was too
+    long to be asked."""
     reason: str
     """Why; how long the way was where it was too long."""
     remedies: str
@@ -106,18 +103,13 @@ class Hearing:
     either: str = ""
     """The last two answers of an undecided one, with `OR` between them."""
 
-    @property
-    def decided(self) -> bool:
-        """Whether ngspice gave an answer."""
-        return is_answer(self.response)
-
     def agrees(self, answer: Answer) -> bool | None:
         """Whether ngspice names the response that the exact rung names; None without an answer.
         Two step sizes that name different ones both differ from a third."""
-        if self.decided:
+        if is_answer(self.response):
             return self.response == answer.response
-        said = _both(self.either)
-        return False if said and answer.response not in said else None
+        both = _both(self.either)
+        return False if both and answer.response not in both else None
 
     def outcome(self, answer: Answer) -> NgspiceVerdict:
         """`FAILED` where there is no answer at all."""
@@ -127,57 +119,43 @@ class Hearing:
         return NgspiceVerdict.AGREED if same else NgspiceVerdict.DIFFERED
 
     def survives(self, question: Question) -> bool | None:
-        """Whether the board shows the wanted response in ngspice; None where it does not say."""
-        return survives(
-            question.spec, question.start, self.response, self.either, symmetric=self.symmetric
-        )
+        """Whether the board shows the wanted response in ngspice; None without an answer."""
+        return survives(question.wanted, self.response, self.either, symmetric=self.symmetric)
 
 
-def survives(
-    spec: Response, nominal: Orbit, response: str, either: str, *, symmetric: bool
-) -> bool | None:
-    """Whether a response that ngspice named is the wanted one, or the nominal orbit's where none
-    is; None without an answer, or where a contact is too near to grazing to be counted. Two step
-    sizes that name different ones (``either``) need not name the wanted one: then it is lost."""
+def survives(wanted: Response, response: str, either: str, *, symmetric: bool) -> bool | None:
+    """Whether a response that ngspice named is the wanted one; None without an answer, or where a
+    contact is too near to grazing to be counted.
+
+    Two step sizes that name different ones (``either``) need not name the wanted one: then it is
+    lost.
+    """
     if is_answer(response) and response != OrbitStatus.GRAZING:
-        return shows(spec, nominal, response, symmetric=symmetric)
-    said = _both(either)
-    wanted = any(shows(spec, nominal, one, symmetric=True) for one in said)
-    return False if said and not wanted else None
+        return wanted.accepts_text(response, symmetric=symmetric)
+    both = _both(either)
+    possible = any(wanted.accepts_text(one, symmetric=True) for one in both)
+    return False if both and not possible else None
 
 
 def _both(either: str) -> list[str]:
     """The two answers of an undecided board; none if one of them cannot be counted."""
-    said = either.split(OR) if either else []
-    return [] if OrbitStatus.GRAZING in said else said
+    answers = either.split(OR) if either else []
+    return [] if OrbitStatus.GRAZING in answers else answers
 
 
 def is_answer(response: str) -> bool:
-    """Whether what ngspice said is a response or a status of one: "" is no answer, nor is a run
-    that failed or has not settled, or two that differ."""
+    """Whether ngspice named a response or a status of one: "" is no answer, nor is a run that
+    failed or has not settled, or two that differ."""
     return response not in ("", OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED, UNDECIDED)
 
 
-def shows(spec: Response, nominal: Orbit, response: str, *, symmetric: bool) -> bool:
-    """Whether n-p-q as text is the wanted response, or the nominal orbit's where none is."""
-    parts = response.split("-")
-    if len(parts) != 3 or not all(part.isdigit() for part in parts):
-        return False
-    n, p, q = (int(part) for part in parts)
-    if spec.expect is not None:
-        wanted = spec.accepts(n, p, q)
-    else:
-        wanted = n == nominal.n and {p, q} == {nominal.p, nominal.q}
-    return wanted and (symmetric or not spec.symmetric)
+def margin_share(answer: Answer, nominal: Orbit) -> float:
+    """The margins of a board's own orbit over the nominal board's, the least of them: 0 at the next
+    boundary.
 
-
-def distance(answer: Answer, nominal: Orbit) -> float:
-    """How far a board is from the next boundary, by the exact margins: 0 there, 1 as far as the
-    nominal board.
-
-    The least of 1 - ρ (the orbit loses its stability), the smallest penetration and the nearest
-    miss (an impact goes or comes), each over the nominal board's. inf where there is no orbit, nan
-    margins do not count.
+    The margins are 1 - ρ (the orbit loses its stability), the least penetration and the nearest
+    miss (an impact goes or comes); nan margins do not count. inf without an orbit. It needs no
+    other board, unlike the distance in standard deviations of `yields.margins`.
     """
     pairs = (
         (1.0 - answer.radius, 1.0 - nominal.radius),
@@ -214,10 +192,10 @@ def ask_boundary(
     starts, without what is ``known``."""
     near: list[list[tuple[float, int]]] = [[] for _ in questions]
     for a in answers:
-        far = distance(a, questions[a.question].start) if _orbits(a) else math.inf
+        far = margin_share(a, questions[a.question].start) if _orbits(a) else math.inf
         if far < math.inf:
             near[a.question].append((far, a.sample))
-    have = {(k.sample, k.question, k.kind) for k in known}
+    have = {k.key for k in known}
     return [
         Ask(sample, question, kind, Why.BOUNDARY)
         for question, boards in enumerate(near)
@@ -228,18 +206,18 @@ def ask_boundary(
 
 
 def ask_differing(
-    answers: Iterable[Answer], heard: Iterable[Hearing], known: Iterable[Ask] = ()
+    answers: Iterable[Answer], checks: Iterable[CrossCheck], known: Iterable[Ask] = ()
 ) -> list[Ask]:
-    """From its own orbit, every board on which ngspice says another response from the nominal one,
+    """From its own orbit, every board on which ngspice finds another response from the nominal one,
     without what is ``known``: where it stays there, the difference is one of basins."""
     mine = {(a.sample, a.question): a for a in answers}
-    have = {(k.sample, k.question, k.kind) for k in known}
+    have = {k.key for k in known}
     return [
-        Ask(h.sample, h.question, StartKind.OWN, Why.DIFFERS)
-        for h in heard
-        if h.kind is StartKind.NOMINAL
-        and (h.sample, h.question, StartKind.OWN) not in have
-        and h.agrees(mine[h.sample, h.question]) is False
+        Ask(c.sample, c.question, StartKind.OWN, Why.DIFFERS)
+        for c in checks
+        if c.kind is StartKind.NOMINAL
+        and (c.sample, c.question, StartKind.OWN) not in have
+        and c.agrees(mine[c.sample, c.question]) is False
     ]
 
 

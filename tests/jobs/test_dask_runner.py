@@ -17,9 +17,9 @@ import pytest
 
 from designer.base.errors import EnvironmentMissing
 from designer.cli import entry
-from designer.yields import dask_runner
-from designer.yields.dask_runner import Cluster
-from designer.yields.layers import Here, Samples, fill
+from designer.jobs import dask_runner
+from designer.jobs.dask_runner import Cluster
+from designer.yields.layers import Here, fill, samples_task
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
 from designer.yields.verdict import Answer, StudyPlan
@@ -47,11 +47,11 @@ def test_a_cluster_gives_equal_files(address: str, tmp_path: Path) -> None:
     p = plan(22)
     for name in ("here", "there"):
         (tmp_path / name).mkdir()
-    rows = fill(p, _store(tmp_path / "here", p), 4, partial(Samples, p), Here(2), nothing)
+    rows = fill(p, _store(tmp_path / "here", p), 4, partial(samples_task, p), Here(2), nothing)
     calls: list[int] = []
     with Cluster(address) as there:
         again = fill(
-            p, _store(tmp_path / "there", p), 4, partial(Samples, p), there,
+            p, _store(tmp_path / "there", p), 4, partial(samples_task, p), there,
             lambda: calls.append(1),
         )  # fmt: skip
     assert [repr(row) for row in again] == [repr(row) for row in rows]

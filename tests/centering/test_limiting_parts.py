@@ -7,11 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from designer.check import checked_design
-from designer.spread.board_quantities import Quantity, quantities
-from designer.spread.spread import Group
-from designer.yields import exact_rung, study_plan
-from designer.yields.limiting_parts import (
+from designer.centering.limiting_parts import (
     COEFFICIENTS,
     COEXISTING,
     GRAZING,
@@ -26,7 +22,12 @@ from designer.yields.limiting_parts import (
     shares,
     together,
 )
+from designer.check import checked_design
+from designer.spread.board_quantities import Quantity, quantities
+from designer.spread.spread import Group
+from designer.yields import exact_rung
 from designer.yields.margins import Limit, Margin
+from designer.yields.study import plan_study
 from tests.shared import bench_plans, paper_cases
 from tests.shared.search_cases import catalog, made
 
@@ -139,9 +140,7 @@ def test_causes() -> None:
 def test_on_a_design_the_shares_add_up() -> None:
     synthesis = made()
     checked = checked_design.check(synthesis.design, synthesis.found, None)
-    plan = study_plan.plan_study(
-        synthesis.modelfile, synthesis.design, checked, catalog(), samples=40, seed=2
-    )
+    plan = plan_study(synthesis.modelfile, synthesis.design, checked, catalog(), samples=40, seed=2)
     (found,) = limitings(plan, exact_rung.block(plan, range(40), 1))
     assert found.distance > 0.0
     assert sum(found.shares.values()) == pytest.approx(1.0)

@@ -1,4 +1,5 @@
-"""The generator's DC offset that puts a board's rest point where the nominal board has it.
+"""How far a generator is turned from what ``setup.csv`` says, for one board, and the DC offset that
+puts the board's rest point where the nominal board has it.
 
 Input offsets, bias currents and unequal output limits push the displacement at rest towards one
 stop, or shift the stops: inside the clearance all of them act as one constant force. A DC offset of
@@ -7,10 +8,53 @@ the generator is another constant force, so one setting takes them away together
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.circuit.netlist import Excitation
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
+from designer.model.tuning_bands import Bands
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """Changes of the generator's setting, as fractions of what ``setup.csv`` says."""
+
+    frequency: float = 0.0
+    """Over the frequency."""
+    amplitude: float = 0.0
+    """Over the amplitude."""
+    offset: float = 0.0
+    """The DC offset, over the amplitude."""
+
+    def of(self, excitation: Excitation) -> Excitation:
+        """The generator's setting after the change."""
+        return Excitation(
+            excitation.frequency * (1.0 + self.frequency),
+            excitation.amplitude * (1.0 + self.amplitude),
+            excitation.offset + self.offset * excitation.amplitude,
+        )
+
+    @property
+    def vector(self) -> Array:
+        """(3,) frequency, amplitude, offset."""
+        return np.array([self.frequency, self.amplitude, self.offset])
+
+    @classmethod
+    def at(cls, vector: Array, bands: Bands) -> Adjustment:
+        """The nearest one inside the bands to frequency, amplitude, offset (3,)."""
+        width = widths(bands)
+        return cls(*np.clip(vector, -width, width).tolist())
+
+
+AS_BUILT = Adjustment()
+
+
+def widths(bands: Bands) -> Array:
+    """(3,) half-widths of the bands of frequency, amplitude and offset."""
+    return np.array([bands.frequency, bands.amplitude, bands.offset])
 
 
 def rest_distances(system: PiecewiseLinearSystem) -> tuple[Array, Array]:

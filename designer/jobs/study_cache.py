@@ -30,17 +30,15 @@ from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
-from designer.yields.corners import Corner
-from designer.yields.crossings import Crossing
-from designer.yields.margins import Limit, Prediction
-from designer.yields.sobol import Index
+from designer.yields.margins import Crossing, Limit, Prediction
 from designer.yields.verdict import Verdict
+from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 
-KEPT = "kept.npz"
+CACHE = "kept.npz"
 FORMAT = 1
 _KEY = {"format": FORMAT}
-_SAID = "items"
+_ITEMS = "items"
 _Items = Mapping[str, tuple[str, Any]]
 _RECORDS: dict[str, type[Any]] = {
     kind.__name__: kind
@@ -52,8 +50,8 @@ _RECORDS: dict[str, type[Any]] = {
 _WORDS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (OrbitStatus, Verdict)}
 
 
-class Kept:
-    """The items in the file at ``path``, and a way to keep more.
+class StudyCache:
+    """The items in the file at ``path``.
 
     write : puts the file of this name there. note, vouch : as of ``KeyedStore``.
     """
@@ -79,11 +77,11 @@ class Kept:
         return value
 
     def put(self, name: str, key: str, value: Any) -> None:
-        """Keep it, in the place of any other of this name."""
+        """Store it, in the place of any other of this name."""
         self.put_all({name: value}, key)
 
     def put_all(self, values: Mapping[str, Any], key: str) -> None:
-        """Keep several that one key decides."""
+        """Store several that one key decides."""
         self._items |= {name: (key, value) for name, value in values.items()}
         self._used.update(values)
         self._store.write(self._name, _KEY, self._items)
@@ -100,20 +98,20 @@ class _Npz:
 
     def encode(self, head: Mapping[str, Any], value: _Items) -> bytes:
         arrays: list[Array] = []
-        said = {name: [key, _plain(item, arrays)] for name, (key, item) in sorted(value.items())}
-        text = json.dumps({**head, _SAID: said}, sort_keys=True)
+        items = {name: [key, _plain(item, arrays)] for name, (key, item) in sorted(value.items())}
+        text = json.dumps({**head, _ITEMS: items}, sort_keys=True)
         stream = io.BytesIO()
         named = {f"array{k}": array for k, array in enumerate(arrays)}
-        np.savez_compressed(stream, **{_SAID: np.array(text)}, **named)  # type: ignore[arg-type]
+        np.savez_compressed(stream, **{_ITEMS: np.array(text)}, **named)  # type: ignore[arg-type]
         with ZipFile(stream, "a") as archive:
             archive.comment = BLANK.encode("ascii")
         return stream.getvalue()
 
     def decode(self, content: bytes) -> tuple[Mapping[str, Any], _Items]:
         with np.load(io.BytesIO(content), allow_pickle=False) as held:
-            said = json.loads(str(held[_SAID]))  # nan is a number here
-            items = {name: (key, _made(value, held)) for name, (key, value) in said[_SAID].items()}
-            return said, items
+            head = json.loads(str(held[_ITEMS]))  # nan is a number here
+            items = {name: (key, _built(v, held)) for name, (key, v) in head[_ITEMS].items()}
+            return head, items
 
 
 def _plain(value: Any, arrays: list[Array]) -> Any:
@@ -121,8 +119,8 @@ def _plain(value: Any, arrays: list[Array]) -> Any:
     if isinstance(value, Enum):
         return {"word": [type(value).__name__, value.value]}
     if is_dataclass(value) and _RECORDS.get(type(value).__name__) is type(value):
-        said = {f.name: _plain(getattr(value, f.name), arrays) for f in fields(value)}
-        return {"record": [type(value).__name__, said]}
+        named = {f.name: _plain(getattr(value, f.name), arrays) for f in fields(value)}
+        return {"record": [type(value).__name__, named]}
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": len(arrays) - 1}
@@ -132,17 +130,19 @@ def _plain(value: Any, arrays: list[Array]) -> Any:
         return {"tuple": [_plain(v, arrays) for v in value]}
     if value is None or isinstance(value, str | bool | int | float):
         return value
-    raise TypeError(f"{type(value).__name__} cannot be kept")
+    raise TypeError(f"{type(value).__name__} cannot be stored")
 
 
-def _made(value: Any, held: Mapping[str, Any]) -> Any:
+def _built(value: Any, held: Mapping[str, Any]) -> Any:
+    """The value of what ``_plain`` gave."""
     if not isinstance(value, dict):
         return value
-    ((kind, said),) = value.items()
+    ((kind, content),) = value.items()
     if kind == "word":
-        return _WORDS[said[0]](said[1])
+        return _WORDS[content[0]](content[1])
     if kind == "record":
-        return _RECORDS[said[0]](**{name: _made(v, held) for name, v in said[1].items()})
+        named = {name: _built(v, held) for name, v in content[1].items()}
+        return _RECORDS[content[0]](**named)
     if kind == "array":
-        return held[f"array{said}"]
-    return tuple(_made(v, held) for v in said)
+        return held[f"array{content}"]
+    return tuple(_built(v, held) for v in content)

@@ -1,4 +1,4 @@
-"""The parts of a blame that are done, so that interrupted work goes on where it was."""
+"""The finished parts of long work, so that interrupted work goes on where it was."""
 
 from __future__ import annotations
 
@@ -20,23 +20,22 @@ class StoredParts:
 
 
 def counted(
-    pieces: StoredParts,
+    parts: StoredParts,
     name: str,
     progress: Callable[[], None],
-    make: Callable[[Callable[[], None]], Value],
+    compute: Callable[[Callable[[], None]], Value],
 ) -> Value:
-    """What the part of this name holds, made by ``make`` where it is not there.
+    """The part of this name, computed and stored where it is not there.
 
-    make : takes the callback for its steps. progress : called once a step, also for those of a
-    part that is there, so that what a blame cost does not depend on interruptions.
+    compute : takes the callback for its steps. progress : called once a step, also for those of a
+    part that is there, so that the cost does not depend on interruptions.
     """
-    known = pieces.get(name)
-    if known is not None:
-        value, steps = known
+    stored: tuple[Value, int] | None = parts.get(name)
+    if stored is not None:
+        value, steps = stored
         for _ in range(steps):
             progress()
-        made: Value = value
-        return made
+        return value
     steps = 0
 
     def step() -> None:
@@ -44,6 +43,6 @@ def counted(
         steps += 1
         progress()
 
-    made = make(step)
-    pieces.put({name: (made, steps)})
-    return made
+    value = compute(step)
+    parts.put({name: (value, steps)})
+    return value

@@ -10,18 +10,16 @@ import numpy as np
 import pytest
 
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.jobs.study_cache import StudyCache
 from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
-from designer.yields.corners import Corner
-from designer.yields.crossings import Crossing
-from designer.yields.margins import Limit, Prediction
-from designer.yields.sobol import Index
-from designer.yields.study_cache import Kept
+from designer.yields.margins import Crossing, Limit, Prediction
 from designer.yields.verdict import Verdict
+from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared.bench_plans import question
 
@@ -52,11 +50,11 @@ MAP = YieldMap(
 BLAME = Blame((BLAMED,), 200, 1, 10, 20, 0.0)
 
 
-def kept(path: Path) -> Kept:
+def kept(path: Path) -> StudyCache:
     def write(name: str, content: bytes) -> None:
         (path.parent / name).write_bytes(content)
 
-    return Kept(path, write)
+    return StudyCache(path, write)
 
 
 def same(a: Any, b: Any) -> bool:
@@ -151,15 +149,15 @@ def test_a_file_without_a_seal_counts_where_somebody_vouches_for_it(tmp_path: Pa
     kept(path).put("it", "key", BLAME)
     content = unsealed(path)
     notes: list[str] = []
-    assert Kept(path, lambda *_: None, notes.append).get("it", "key") is None
+    assert StudyCache(path, lambda *_: None, notes.append).get("it", "key") is None
     assert [str(path) in note for note in notes] == [True]
 
     def vouch(name: str, there: bytes) -> bool:
         return name == "kept.npz" and there == content
 
-    assert same(Kept(path, lambda *_: None, vouch=vouch).get("it", "key"), BLAME)
+    assert same(StudyCache(path, lambda *_: None, vouch=vouch).get("it", "key"), BLAME)
     path.write_bytes(content[:-1] + b"x")
-    assert Kept(path, lambda *_: None, vouch=vouch).get("it", "key") is None
+    assert StudyCache(path, lambda *_: None, vouch=vouch).get("it", "key") is None
 
 
 def test_what_would_not_come_back_is_refused(tmp_path: Path) -> None:

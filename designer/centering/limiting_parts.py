@@ -21,8 +21,8 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import Quantity, column
 from designer.spread.spread import Spread, draw_many
-from designer.yields import margins as smooth
-from designer.yields.margins import Limit, Margin
+from designer.yields import margins
+from designer.yields.margins import DRAWN, Limit, Margin
 from designer.yields.verdict import Answer, StudyPlan
 
 OFFSET, NULL, RAILS = "offset", "null", "rails"
@@ -38,8 +38,6 @@ NAMES = {
 }
 HALF = 0.5
 """Of the variance, or of the lost boards: from here on a cause is the one that is named."""
-DRAWN = 256
-"""Boards, at least, from which standard deviations are taken."""
 TOGETHER = 4000
 """Boards from which a covariance is taken: a share is then known to about 2 %."""
 STREAM = "limiting:"
@@ -77,7 +75,9 @@ def limitings(
     count = max(max((a.sample for a in answers), default=0) + 1, DRAWN)
     boards = draw_many(plan.circuit, plan.spread, plan.seed, range(count))
     rows = [[a for a in answers if a.question == k] for k in range(len(plan.questions))]
-    found = smooth.margins(plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=progress)
+    found = margins.margins(
+        plan.circuit, plan.questions, boards, rows, jobs=jobs, progress=progress
+    )
     drawn = together(plan.circuit, plan.spread, plan.seed)
     return tuple(limiting(margin, drawn) for margin in found)
 
