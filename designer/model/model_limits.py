@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import fields
 
 from designer.base.errors import InputError
-from designer.base.schema import keys_of
 from designer.model.model import Dimensionless, Mechanical
 
 KNOWN = (
@@ -66,7 +66,7 @@ def check(data: Mapping[str, object], file: str | None) -> None:
             raise InputError(file, key, f"a table {key!r}", _unknown(key, what))
     for table, record in MODELS.items():
         content = data.get(table)
-        known = keys_of(record)
+        known = {field.name for field in fields(record)}
         for key in content if isinstance(content, Mapping) else ():
             for pattern, what in OF_A_MODEL:
                 if key not in known and re.fullmatch(pattern, key, re.ASCII):
