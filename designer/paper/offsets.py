@@ -22,6 +22,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse
+from designer.model.response_table import Response
 from designer.paper.circuits import Built
 from designer.yields.verdict import Verdict, Yield, judge
 
@@ -75,23 +76,23 @@ def shifts(
             starts = np.tile(own.start, (len(patterns), 1))
             drives = [drive] * len(patterns)
             orbits = ensemble.settle(range(len(patterns)), drives, starts, jobs=jobs)
-        verdicts = [judge(orbit, r.spec, own)[0] for orbit in orbits]
-        lost = Counter(
-            orbit.response for orbit, v in zip(orbits, verdicts, strict=True) if v is not Verdict.OK
-        )
-        tally = Counter(verdicts)
-        counted = Yield(
-            tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
-        )
-        rows.append(
-            {
-                "omega": r.omega,
-                "expected": r.expected,
-                "size": size,
-                "there": there,
-                "counted": asdict(counted),
-                "to": sorted(lost.items(), key=lambda item: (-item[1], item[0])),
-                "interval": counted.interval,
-            }
-        )
+        row = {"omega": r.omega, "expected": r.expected, "size": size, "there": there}
+        rows.append(row | _counts(orbits, r.spec, own))
     return rows
+
+
+def _counts(orbits: Sequence[Orbit], wanted: Response, own: Orbit) -> dict[str, Any]:
+    """What became of the boards. own : the nominal circuit's orbit."""
+    verdicts = [judge(orbit, wanted, own)[0] for orbit in orbits]
+    tally = Counter(verdicts)
+    lost = Counter(
+        orbit.response for orbit, v in zip(orbits, verdicts, strict=True) if v is not Verdict.OK
+    )
+    counted = Yield(
+        tally[Verdict.OK], tally[Verdict.LOST], tally[Verdict.GRAZING], tally[Verdict.FAILED]
+    )
+    return {
+        "counted": asdict(counted),
+        "to": sorted(lost.items(), key=lambda item: (-item[1], item[0])),
+        "interval": counted.interval,
+    }

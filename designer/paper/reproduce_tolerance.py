@@ -91,20 +91,23 @@ def reproduce(
     ]
     rows = tuple(YieldRow(**row) for piece in pieces for row in piece["rows"])
     settings = {"samples": samples, "short": short, "bands": Bands().as_dict()}
-    blames = {piece["circuit"]: piece["blame"] for piece in pieces if piece["blame"]}
-    document = {
-        "format": FORMAT,
-        "provenance": provenance(model_file(), catalog.hash, seed=seed, settings=settings),
-        "rows": [_with_interval(row) for row in rows],
-        "recipes": {piece["case"]: piece["recipes"] for piece in pieces},
-        "missing": {piece["case"]: piece["missing"] for piece in pieces if piece["missing"]},
-        "blame": blames,
-        "cost": {"seconds": sum(piece["cost"]["seconds"] for piece in pieces)},
-    }
-    page = tolerance_page(rows, blames, samples=samples, short=short, seed=seed)
+    source = provenance(model_file(), catalog.hash, seed=seed, settings=settings)
+    document = {"format": FORMAT, "provenance": source, **_answers(pieces, rows)}
+    page = tolerance_page(rows, document["blame"], samples=samples, short=short, seed=seed)
     write_files(out, (DATA, document), page, {"yields": yield_sheet(rows)})
     write(out / FRAME, pd.DataFrame([asdict(row) for row in rows]).to_parquet(index=False))
     return rows
+
+
+def _answers(pieces: Sequence[dict[str, Any]], rows: Sequence[YieldRow]) -> dict[str, Any]:
+    """What the data file says of all cases."""
+    return {
+        "rows": [_with_interval(row) for row in rows],
+        "recipes": {piece["case"]: piece["recipes"] for piece in pieces},
+        "missing": {piece["case"]: piece["missing"] for piece in pieces if piece["missing"]},
+        "blame": {piece["circuit"]: piece["blame"] for piece in pieces if piece["blame"]},
+        "cost": {"seconds": sum(piece["cost"]["seconds"] for piece in pieces)},
+    }
 
 
 def _case(case: SpreadCase, short: int, jobs: int, progress: Progress) -> dict[str, Any]:

@@ -39,9 +39,6 @@ BOTH = (1, -1)
 APERIODIC_PERIODS = 8
 """Drive periods of a response without a period that a time trace shows."""
 
-MOST_DOTS = 130
-"""Dots of ngspice in one picture: enough to see, few enough not to hide what lies below."""
-
 WIDEST_TITLE = 48
 """Characters of a panel's second line; statuses are longer than n-p-q and take a line each."""
 
