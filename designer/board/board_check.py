@@ -93,16 +93,16 @@ def _pads_refusal(opamp: OpAmp) -> InputError | None:
     lost = [number for number in pins if pads and number not in pads]
     if not lost:
         return None
-    found = f"{opamp.name}, with a pin {lost[0]} in {opamp.footprint}"
-    return InputError(None, "circuit.opamp", found, f"an op-amp with pins of its {len(pads)} pads")
+    pair = f"{opamp.name}, with a pin {lost[0]} in {opamp.footprint}"
+    return InputError(None, "circuit.opamp", pair, f"an op-amp with pins of its {len(pads)} pads")
 
 
 def _check_pads(component: Component) -> None:
     pads = _pads_of(component.footprint)
     for pin in component.pins:
         if pads and pin.number not in pads:
-            found = f"{component.value}, with a pin {pin.number} in {component.footprint}"
-            raise InputError(None, component.kind, found, "pins that are pads of the footprint")
+            pair = f"{component.value}, with a pin {pin.number} in {component.footprint}"
+            raise InputError(None, component.kind, pair, "pins that are pads of the footprint")
 
 
 def _pads_of(name: str) -> frozenset[str]:

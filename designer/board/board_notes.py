@@ -29,16 +29,16 @@ PROBE = 100e-12
 
 
 def markdown(
-    made: Synthesis, circuit: Circuit, choice: BoardChoice, found: Sequence[Component]
+    made: Synthesis, circuit: Circuit, choice: BoardChoice, components: Sequence[Component]
 ) -> str:
     """The notes as Markdown; nothing in them is text of the model file."""
     parts = [
         "# The board",
         "What to buy is in `bom.csv`, the drawing in `schematic.svg`. The generator is set as "
         "`setup.csv` says.",
-        _mounting(choice, found),
+        _mounting(choice, components),
         "## Connections",
-        _connections(circuit, found),
+        _connections(circuit, components),
         _supply(circuit, made.catalog),
         _outputs(circuit, choice),
         *_protection(made, circuit, choice),
@@ -52,33 +52,33 @@ def _q(value: float, unit: str, digits: int = 3) -> str:
     return format_quantity(value, unit, digits)
 
 
-def _mounting(choice: BoardChoice, found: Sequence[Component]) -> str:
-    said = {
+def _mounting(choice: BoardChoice, components: Sequence[Component]) -> str:
+    text = {
         "mixed": "Parts are in the cases that the catalogue names first, soldered on the surface "
         "or through holes.",
         "smd": "All but connectors are soldered on the surface.",
         "tht": "All parts are soldered through holes.",
     }[choice.spec.mounting]
-    pads = [c.reference for c in found if c.bought is None]
+    pads = [c.reference for c in components if c.bought is None]
     inside = {name for array in choice.arrays for name in array.parts}
-    bare = [c.reference for c in found if not c.fitted and c.reference not in inside]
+    bare = [c.reference for c in components if not c.fitted and c.reference not in inside]
     for array in choice.arrays:
-        said += (
+        text += (
             f" {array.name}, {array.bought.part_number}, takes the places of "
             f"{', '.join(array.parts)}: the board has their single pads, and its elements are "
             "wired to these."
         )
     if pads:
-        said += f" Bare pads: {', '.join(pads)}."
+        text += f" Bare pads: {', '.join(pads)}."
     if bare:
-        said += f" Not fitted: {', '.join(bare)}."
-    return said
+        text += f" Not fitted: {', '.join(bare)}."
+    return text
 
 
-def _connections(circuit: Circuit, found: Sequence[Component]) -> str:
+def _connections(circuit: Circuit, components: Sequence[Component]) -> str:
     rows = ["| connector | pin | net |", "|---|---|---|"]
     held = {p.name for p in circuit.fittings if isinstance(p, Connector)}
-    for component in found:
+    for component in components:
         if component.reference in held:
             for pin in component.pins:
                 net = "ground" if pin.net == "0" else pin.net
@@ -115,20 +115,20 @@ def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[
     for node in driven_nodes(circuit):
         ohms = drive_resistance(circuit, node)
         current = fault_current(circuit, node, GENERATOR_MOST)
-        said = (
+        text = (
             f"`{node}`: {_q(GENERATOR_MOST, 'V')} from the generator, the most that a usual one "
             f"gives, drive {_q(current, 'A')} through {_q(ohms, 'Ω')}."
         )
         if most is not None:
             word = "below" if current < most else "above"
-            said += f" That is {word} the {_q(most, 'A')} that an input of the op-amp stands."
+            text += f" That is {word} the {_q(most, 'A')} that an input of the op-amp stands."
         if choice.spec.input_protection:
             level = protection_offset(circuit, node, choice, made.catalog, opamp.offset_limit)
-            said += (
+            text += (
                 f" The two diodes take it to ground. With {_q(opamp.offset_limit, 'V')} of input "
                 f"offset across them they leak as much as {_q(level, 'V')} of DC at the generator."
             )
-        lines.append(f"- {said}")
+        lines.append(f"- {text}")
     if not lines:
         return []
     head = "If the generator is on while the supply is off, its current goes into the inputs."

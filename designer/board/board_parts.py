@@ -83,14 +83,14 @@ def fitted(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Circuit:
 
 
 def board_choice(
-    modelfile: ModelFile, design: Design, found: Sequence[ModelResponse] = ()
+    modelfile: ModelFile, design: Design, responses: Sequence[ModelResponse] = ()
 ) -> BoardChoice:
     """The choices of a model file for its design.
 
     The trim reaches as far as the DC offset that a bench may set at the largest amplitude of the
     wanted responses (``[tuning]``, ``offset``), and at least ``LEAST_TRIM`` of that amplitude.
     """
-    amplitude = max((design.amplitude(r.b) for r in found), default=design.amplitude())
+    amplitude = max((design.amplitude(r.b) for r in responses), default=design.amplitude())
     reach = amplitude * max(modelfile.tuning.offset, LEAST_TRIM)
     return replace(BoardChoice.of(modelfile.circuit, modelfile.board), trim=reach)
 
@@ -111,7 +111,7 @@ def outputs(circuit: Circuit) -> tuple[str, ...]:
 
 def driven_nodes(circuit: Circuit) -> dict[str, tuple[Resistor, ...]]:
     """The summing nodes that the generator drives, each with the resistors of its path."""
-    found: dict[str, tuple[Resistor, ...]] = {}
+    driven: dict[str, tuple[Resistor, ...]] = {}
     nodes = {s.inverting for s in circuit.sections}
     for first in circuit.resistors:
         if circuit.generator.net not in first.nets:
@@ -121,8 +121,8 @@ def driven_nodes(circuit: Circuit) -> dict[str, tuple[Resistor, ...]]:
             second = next(r for r in circuit.resistors if net in r.nets and r not in path)
             path.append(second)
             net = _far(second, net)
-        found[net] = (*found.get(net, ()), *path)
-    return found
+        driven[net] = (*driven.get(net, ()), *path)
+    return driven
 
 
 def _far(resistor: Resistor, net: str) -> str:

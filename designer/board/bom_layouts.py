@@ -115,8 +115,8 @@ def _read(name: str, path: Path) -> Layout:
     table = checked(_File, parse_toml(text, str(path)), str(path))
     for number, column in enumerate(table.columns, start=1):
         if (column.field is None) == (column.text is None):
-            found = "neither" if column.field is None else "both"
-            raise InputError(path, f"columns[{number}]", found, "field or text")
+            given = "neither" if column.field is None else "both"
+            raise InputError(path, f"columns[{number}]", given, "field or text")
     titles = [column.title for column in table.columns]
     twice = next((title for title in titles if titles.count(title) > 1), None)
     if twice is not None or not titles:

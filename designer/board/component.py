@@ -86,6 +86,14 @@ class Component:
         return View.BOM in self.views or self.bought is None
 
     @property
+    def units(self) -> dict[str, dict[str, str]]:
+        """Pad numbers by name of the pin, for each unit; see ``Pin.unit``."""
+        out: dict[str, dict[str, str]] = {}
+        for pin in self.pins:
+            out.setdefault(pin.unit, {})[pin.name] = pin.number
+        return out
+
+    @property
     def nets(self) -> dict[str, str]:
         """The net of each pad; "" where nothing may be connected."""
         return {pin.number: pin.net for pin in self.pins}
@@ -132,12 +140,12 @@ def designator(name: str) -> str:
 
 def pin_numbers(listed: Iterable[Component]) -> Numbers:
     """Those of the op-amps among a board's components."""
-    out: dict[str, dict[str, str]] = {}
-    for component in listed:
-        if component.kind == "op-amp":
-            for pin in component.pins:
-                out.setdefault(f"{component.reference}{pin.unit}", {})[pin.name] = pin.number
-    return out
+    return {
+        f"{component.reference}{unit}": numbers
+        for component in listed
+        if component.kind == "op-amp"
+        for unit, numbers in component.units.items()
+    }
 
 
 def to_buy(listed: Iterable[Component], choice: BoardChoice) -> tuple[Component, ...]:

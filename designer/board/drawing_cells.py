@@ -109,15 +109,15 @@ def chains(parts: Iterable[TwoPin], shown: frozenset[str]) -> list[Chain]:
         first = (ends or left)[0]
         left.remove(first)
         start, net = first.nets if first.nets[0] not in inner else first.nets[::-1]
-        found = [first]
+        series = [first]
         while net in inner:
             following = next((p for p in left if net in p.nets), None)
             if following is None:
                 break
             left.remove(following)
-            found.append(following)
+            series.append(following)
             net = following.nets[1] if following.nets[0] == net else following.nets[0]
-        out.append(Chain(start, net, tuple(found)))
+        out.append(Chain(start, net, tuple(series)))
     order = {part: i for i, part in enumerate(parts)} if isinstance(parts, Sequence) else {}
     return sorted(out, key=lambda chain: min((order.get(p, 0) for p in chain.parts), default=0))
 
@@ -198,7 +198,7 @@ def board_cells(
     pads = _pads(fittings)
     shown: list[Chain | str] = []
     drive: list[Chain | str] = []
-    said: list[str] = []
+    notes: list[str] = []
     for part in fittings:
         if isinstance(part, Resistor):
             (shown if part.b in pads else drive).append(Chain(part.a, part.b, (part,)))
@@ -206,22 +206,22 @@ def board_cells(
             drive.append(Chain(part.anode, part.cathode, (part,)))
         elif isinstance(part, Trimmer):
             value = format_quantity(part.value, "Ω")
-            said.append(f"{part.name} {value}: {part.low} … {part.wiper} … {part.high}")
+            notes.append(f"{part.name} {value}: {part.low} … {part.wiper} … {part.high}")
             if View.BOM not in part.views:
-                said.append("the DC trim is not fitted")
+                notes.append("the DC trim is not fitted")
     tied = [p.name for p in fittings if isinstance(p, Section)]
-    supply = [f"{_said(n)}: {', '.join(pads[n])}" for n in (POSITIVE, GROUND, NEGATIVE)]
+    supply = [f"{_net_name(n)}: {', '.join(pads[n])}" for n in (POSITIVE, GROUND, NEGATIVE)]
     supply.insert(0, f"{circuit.generator.net}: {', '.join(pads[circuit.generator.net])}")
     for package in circuit.packages:
         pads_of = numbers.get(f"{package}{SUPPLY_UNIT}", {})
         if pads_of:
-            said_of = ", ".join(f"{_said(pin)} {pad}" for pin, pad in pads_of.items())
-            supply.append(f"{package}: {said_of}")
+            listed = ", ".join(f"{_net_name(pin)} {pad}" for pin, pad in pads_of.items())
+            supply.append(f"{package}: {listed}")
     if tied:
         supply.append(f"spare, followers of ground: {', '.join(tied)}")
     cells = [
         CellRows("board: outputs", tuple(shown), pads),
-        CellRows("board: generator", (*drive, *said)),
+        CellRows("board: generator", (*drive, *notes)),
         CellRows("board: connectors", tuple(supply)),
     ]
     for rail in (NEGATIVE, POSITIVE):
@@ -243,5 +243,5 @@ def _pads(fittings: Sequence[Fitting]) -> dict[str, list[str]]:
     return where
 
 
-def _said(net: str) -> str:
+def _net_name(net: str) -> str:
     return "GND" if net == GROUND else net

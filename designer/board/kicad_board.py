@@ -46,7 +46,7 @@ def board(project: str, title: str, entries: Sequence[Entry], placement: Placeme
         spot.component.reference: _pad_nets(by_reference[spot.component.reference])
         for spot in placement.spots
     }
-    names = sorted({net for found in pads.values() for net in found.values() if net})
+    names = sorted({net for of_pads in pads.values() for net in of_pads.values() if net})
     nets = {"": 0} | {name: i for i, name in enumerate(names, start=1)}
     box = placement.outline
     return expression(
@@ -120,5 +120,5 @@ def open_net(reference: str, name: str, number: str) -> str:
 
 def _fields(entry: Entry) -> list[tuple[str, str]]:
     """Fields of the symbol that the board repeats."""
-    held = {"Datasheet": "", "Description": "", **dict(entry.fields)}
-    return [(key, text) for key, text in held.items() if key != "Footprint"]
+    fields = {"Datasheet": "", "Description": "", **dict(entry.fields)}
+    return [(key, text) for key, text in fields.items() if key != "Footprint"]

@@ -31,14 +31,26 @@ class Entry:
     """The fields, by name."""
     component: Component | None = None
     """The component; None for sources, flags and power symbols."""
-    bought: bool = False
-    """Whether it stands on the bill."""
-    placed: bool = False
-    """Whether it stands on the board."""
-    simulated: bool = False
-    """Whether it stands in the simulation."""
-    fitted: bool = True
-    """Whether it is soldered to the board."""
+
+    @property
+    def bought(self) -> bool:
+        """Whether it stands on the bill."""
+        return self.component is not None and View.BOM in self.component.views
+
+    @property
+    def placed(self) -> bool:
+        """Whether it stands on the board."""
+        return self.component is not None and View.BOARD in self.component.views
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it stands in the simulation."""
+        return self.component is None or View.SIMULATION in self.component.views
+
+    @property
+    def fitted(self) -> bool:
+        """Whether it is soldered to the board."""
+        return self.component is None or self.component.fitted
 
 
 def entries(
@@ -46,17 +58,15 @@ def entries(
 ) -> tuple[Entry, ...]:
     """Every component, then what the simulation needs besides. library : file of its models."""
     stages = section_stages(circuit)
-    made = [_entry(c, circuit, stages, library) for c in components]
-    ground = GROUND
-    for source in sources(circuit, run):
-        shape = symbols.source("VSOURCE")
-        pins = {"1": source.net, "2": ground}
-        item = Item(source.name, source.value, shape, pins, {1: SIMULATION})
-        made.append(Entry(item, source.fields, simulated=True))
+    listed = [_entry(c, circuit, stages, library) for c in components]
+    for name, net, value, simulation in sources(circuit, run):
+        pins = {"1": net, "2": GROUND}
+        item = Item(name, value, symbols.source("VSOURCE"), pins, {1: SIMULATION})
+        listed.append(Entry(item, simulation))
     for net in (POSITIVE, GROUND, NEGATIVE):
         item = Item(f"#FLG_{POWER[net]}", "PWR_FLAG", symbols.flag(), {"1": net}, {1: SIMULATION})
-        made.append(Entry(item, ()))
-    return tuple(made)
+        listed.append(Entry(item, ()))
+    return tuple(listed)
 
 
 def shape(component: Component) -> SymbolShape:
@@ -75,12 +85,12 @@ def shape(component: Component) -> SymbolShape:
         ends = numbers["anode"], numbers["cathode"]
         return symbols.diode(name, *ends, prefix=prefix, zener=zener, free=free)
     if kind == "op-amp":
-        found = _units(component)
-        sections = [(u["-"], u["+"], u["OUT"]) for name, u in found.items() if name != SUPPLY_UNIT]
-        supply = found[SUPPLY_UNIT]
+        units = component.units
+        supply = units.pop(SUPPLY_UNIT)
+        sections = [(u["-"], u["+"], u["OUT"]) for u in units.values()]
         return symbols.opamp(_named("", component), sections, (supply["V+"], supply["V-"]))
     if kind == "test point":
-        return symbols.test_point()
+        return symbols.probe_pad()
     pins = [(pin.number, pin.name, pin.electrical) for pin in component.pins]
     if kind == "trimmer":  # between the rails: the higher one above, where its symbol points
         pins.sort(key=lambda pin: ("high", "wiper", "low").index(pin[1]))
@@ -96,21 +106,13 @@ def _entry(
     drawn = shape(component)
     where = {1: component.stage}
     if component.kind == "op-amp":
-        units = [name for name in _units(component) if name != SUPPLY_UNIT]
+        units = [name for name in component.units if name != SUPPLY_UNIT]
         where = {
             i: stages.get(f"{component.reference}{name}", SUPPLY)
             for i, name in enumerate(units, start=1)
         } | {len(units) + 1: SUPPLY}
     item = Item(component.reference, component.value, drawn, component.nets, where)
-    return Entry(
-        item,
-        (*_bought(component), *fields(component, circuit, library)),
-        component,
-        bought=View.BOM in component.views,
-        placed=View.BOARD in component.views,
-        simulated=View.SIMULATION in component.views,
-        fitted=component.fitted,
-    )
+    return Entry(item, (*_bought(component), *fields(component, circuit, library)), component)
 
 
 def _bought(component: Component) -> Iterator[tuple[str, str]]:
@@ -123,14 +125,6 @@ def _bought(component: Component) -> Iterator[tuple[str, str]]:
         yield "MPN", component.bought.part_number
         if component.bought.substitute:
             yield "Substitute", component.bought.substitute
-
-
-def _units(component: Component) -> dict[str, dict[str, str]]:
-    """Pin numbers by name, for each unit of a package."""
-    out: dict[str, dict[str, str]] = {}
-    for pin in component.pins:
-        out.setdefault(pin.unit, {})[pin.name] = pin.number
-    return out
 
 
 def _named(prefix: str, component: Component) -> str:

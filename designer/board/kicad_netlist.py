@@ -17,14 +17,14 @@ Pads = Mapping[str, tuple[tuple[str, str], ...]]
 
 def netlist(project: str, entries: Sequence[Entry]) -> Expression:
     """The file ``.net``: components of the board with their fields, and what each net joins."""
-    held = [e for e in entries if e.component is not None and e.placed]
-    found = [e.component for e in held if e.component is not None]
-    nodes = enumerate(nets(found).items(), 1)
+    placed = [e for e in entries if e.component is not None and e.placed]
+    components = [e.component for e in placed if e.component is not None]
+    nodes = enumerate(nets(components).items(), 1)
     return expression(
         "export",
         version="E",
         design={"source": f"{project}.kicad_sch"},
-        components=tuple(_component(project, entry) for entry in held),
+        components=tuple(_component(project, entry) for entry in placed),
         nets=tuple(_net(code, name, pads) for code, (name, pads) in nodes),
     )
 

@@ -60,9 +60,9 @@ class PlacedComponent:
 
     def pad(self, number: str) -> tuple[float, float]:
         """Where a pad is."""
-        found = next(p for p in self.footprint.pads if p.number == number)
+        pad = next(p for p in self.footprint.pads if p.number == number)
         sign = -1.0 if self.angle == 180 else 1.0
-        return self.x + sign * found.x, self.y + sign * found.y
+        return self.x + sign * pad.x, self.y + sign * pad.y
 
     def moved(self, x: float, y: float) -> PlacedComponent:
         return replace(self, x=self.x + x, y=self.y + y)
@@ -154,10 +154,10 @@ def _owners(circuit: Circuit, components: Sequence[Component]) -> dict[str, list
         if component.kind == "op-amp" or component.stage in (SUPPLY, INTERFACE):
             continue
         nets = set(component.nets.values())
-        here = [s for s in sections if stages[s.name] == component.stage]
-        ranked = [s for s in here if s.inverting in nets and s.inverting != GROUND]
-        ranked += [s for s in here if s.output in nets]
-        ranked += here
+        stage = [s for s in sections if stages[s.name] == component.stage]
+        ranked = [s for s in stage if s.inverting in nets and s.inverting != GROUND]
+        ranked += [s for s in stage if s.output in nets]
+        ranked += stage
         if ranked:
             out[ranked[0].name].append(component.reference)
     return out
@@ -217,10 +217,10 @@ def _rows(
     parts: Iterable[PlacedComponent], *, right: bool, width: float | None = None
 ) -> list[PlacedComponent]:
     """Parts in rows from top to bottom, against the right or the left edge at x = 0."""
-    held = list(parts)
-    if not held:
+    queue = list(parts)
+    if not queue:
         return []
-    widest = max(s.box.width for s in held)
+    widest = max(s.box.width for s in queue)
     limit = max(13.0, 2.1 * widest) if width is None else max(width, widest)
     out: list[PlacedComponent] = []
     y = 0.0
@@ -238,7 +238,7 @@ def _rows(
         y += tall + ROOM / 2.0
         row.clear()
 
-    for s in held:
+    for s in queue:
         if row and sum(r.box.width + ROOM for r in row) + s.box.width > limit:
             close()
         row.append(s)

@@ -52,15 +52,15 @@ def files(project: Project) -> dict[str, str]:
     """
     name, circuit = project.name, project.circuit
     models = f"{name}.lib"
-    made = entries(circuit, project.components, project.run, models)
-    sheet = layout(made, kicad_sim.directives(circuit, project.run))
-    placed = place(circuit, [c for e in made if e.placed and (c := e.component) is not None])
+    listed = entries(circuit, project.components, project.run, models)
+    sheet = layout(listed, kicad_sim.directives(circuit, project.run))
+    placed = place(circuit, [c for e in listed if e.placed and (c := e.component) is not None])
     cases = {spot.footprint.name: spot.footprint for spot in placed.spots}
     out = {
-        f"{name}.kicad_sch": expression_text(schematic(name, project.title, made, sheet)),
-        f"{name}.kicad_pcb": expression_text(board(name, project.title, made, placed)),
+        f"{name}.kicad_sch": expression_text(schematic(name, project.title, listed, sheet)),
+        f"{name}.kicad_pcb": expression_text(board(name, project.title, listed, placed)),
         f"{name}.kicad_pro": settings(name, circuit),
-        f"{name}.net": expression_text(netlist(name, made)),
+        f"{name}.net": expression_text(netlist(name, listed)),
         models: kicad_sim.models(circuit, project.components),
         f"{LIBRARY}.kicad_sym": expression_text(library(shapes(sheet))),
         "sym-lib-table": _table("sym_lib_table", f"{LIBRARY}.kicad_sym"),

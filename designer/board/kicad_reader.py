@@ -17,8 +17,7 @@ from designer.base.sexpr import Expression, read
 from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_names import BOARD_VERSION, circuit_net
-from designer.board.outline import Outline, read_outline
-from designer.board.pad_shape import corners, turned
+from designer.board.outline import Outline, circle, drawn, read_outline
 
 OLDEST, NEWEST = 20221018, BOARD_VERSION
 """Versions of board files that are read: KiCad 7 to 9."""
@@ -28,6 +27,8 @@ SHOWN = 5
 """Differences that a message lists."""
 COURTYARDS = ("F.CrtYd", "B.CrtYd")
 TRACKS = ("segment", "arc")
+WITHIN_SIZE = frozenset({"rect", "roundrect", "oval"})
+"""Shapes of pads that fill ``size``, but for their corners."""
 PART_NUMBER = "MPN"
 """The field that has a part's number, on the sheet and on the board."""
 EXPECTED = "a board of KiCad 7 to 9 (.kicad_pcb)"
@@ -166,18 +167,21 @@ def check_belongs(board: BoardFile, components: Sequence[Component]) -> None:
     missing = sorted(wanted.keys() - there.keys(), key=natural_key)
     foreign = sorted((n for n in there.keys() - wanted.keys() if there[n].wired), key=natural_key)
     if missing or foreign:
-        said = [f"without {_few(missing)}"] if missing else []
-        said += [f"with {_few(foreign)}"] if foreign else []
+        differences = [f"without {_few(missing)}"] if missing else []
+        differences += [f"with {_few(foreign)}"] if foreign else []
         raise InputError(
-            board.path, "footprints", "; ".join(said), "the components of this design, all of them"
+            board.path,
+            "footprints",
+            "; ".join(differences),
+            "the components of this design, all of them",
         )
     differ = []
     for reference, component in wanted.items():
         pads = {pad.number: pad.net for pad in there[reference].pads}
         for number, net in component.nets.items():
             if pads.get(number, "no such pad") != net:
-                found = pads.get(number, "no such pad") or "no net"
-                differ.append(f"{reference}.{number} on {found}, not on {net or 'no net'}")
+                on = pads.get(number, "no such pad") or "no net"
+                differ.append(f"{reference}.{number} on {on}, not on {net or 'no net'}")
     if differ:
         raise InputError(board.path, "nets", _few(differ, "; "), "the nets of this design")
 
@@ -188,56 +192,56 @@ def _few(words: Sequence[str], between: str = ", ") -> str:
 
 
 def _check_version(board: Expression) -> None:
-    found = board.get("version").text()
-    if not (found.isascii() and found.isdecimal() and len(found) <= 8):  # a date, YYYYMMDD
-        raise board.get("version").error(found, "the number of a file version")
-    version, file = int(found), board.source.file
+    text = board.get("version").text()
+    if not (text.isascii() and text.isdecimal() and len(text) <= 8):  # a date, YYYYMMDD
+        raise board.get("version").error(text, "the number of a file version")
+    version, file = int(text), board.source.file
     if version > NEWEST:
         expected = f"at most {NEWEST}, KiCad 9: this board is from a newer one"
-        raise InputError(file, "version", found, expected)
+        raise InputError(file, "version", text, expected)
     if version < OLDEST:
         expected = f"at least {OLDEST}, KiCad 7: save the board with KiCad 9"
-        raise InputError(file, "version", found, expected)
+        raise InputError(file, "version", text, expected)
 
 
-def _footprint(found: Expression) -> PlacedFootprint:
-    at = found.get("at")
+def _footprint(item: Expression) -> PlacedFootprint:
+    at = item.get("at")
     x, y = at.number(0), at.number(1)
     turn = math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)
-    library, _, name = found.text(0).rpartition(":")
+    library, _, name = item.text(0).rpartition(":")
     return PlacedFootprint(
-        reference=_field(found, "Reference") or "",
-        value=_field(found, "Value") or "",
-        pads=tuple(_pad(pad, (x, y), turn) for pad in found.all("pad")),
+        reference=_field(item, "Reference") or "",
+        value=_field(item, "Value") or "",
+        pads=tuple(_pad(pad, (x, y), turn) for pad in item.all("pad")),
         courtyard=any(
-            layer.text() in COURTYARDS for each in found.children for layer in each.all("layer")
+            layer.text() in COURTYARDS for each in item.children for layer in each.all("layer")
         ),
         library=library,
         name=name,
-        part_number=_field(found, PART_NUMBER),
-        fitted=not any("dnp" in each.atoms for each in found.all("attr")),
+        part_number=_field(item, PART_NUMBER),
+        fitted=not any("dnp" in each.atoms for each in item.all("attr")),
     )
 
 
-def _field(found: Expression, name: str) -> str | None:
-    for each in found.all("property"):
+def _field(item: Expression, name: str) -> str | None:
+    for each in item.all("property"):
         if each.text(0) == name:
             return each.text(1)
-    for each in found.all("fp_text"):  # KiCad 7
+    for each in item.all("fp_text"):  # KiCad 7
         if each.text(0) == name.lower():
             return each.text(1)
     return None
 
 
-def _pad(found: Expression, origin: Point, turn: float) -> PlacedPad:
-    at = found.get("at")
+def _pad(item: Expression, origin: Point, turn: float) -> PlacedPad:
+    at = item.get("at")
     place = turned((at.number(0), at.number(1)), origin, turn)
-    net = found.find("net")
+    net = item.find("net")
     return PlacedPad(
-        found.text(0),
+        item.text(0),
         circuit_net(net.text(1)) if net is not None and not _unconnected(net.text(1)) else "",
         place,
-        corners(found, place, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
+        pad_corners(item, place, math.radians(at.number(2) if len(at.atoms) > 2 else 0.0)),
     )
 
 
@@ -246,6 +250,64 @@ def _unconnected(net: str) -> bool:
     return net.startswith("unconnected-(")
 
 
-def _net(found: Expression, names: dict[str, str]) -> str:
-    net = found.find("net")
+def _net(item: Expression, names: dict[str, str]) -> str:
+    net = item.find("net")
     return "" if net is None else circuit_net(names.get(net.text(), ""))
+
+
+def pad_corners(pad: Expression, at: Point, turn: float) -> tuple[Point, ...]:
+    """Corners of the copper, or of the rectangle around it, in order [mm]; a circle's are many.
+
+    at : where the pad stands on the board [mm]; the copper may be off it by the drill's ``offset``.
+    turn : the pad's angle on the board, which the file states with the footprint's in it. Empty
+    where the shape is not read: a trapezoid, one of a kind that is not known, or one that differs
+    from layer to layer.
+    """
+    drill = pad.find("drill")
+    offset = None if drill is None else drill.find("offset")
+    centre = at if offset is None else turned((offset.number(0), offset.number(1)), at, turn)
+    size, kind = pad.get("size"), pad.text(2)
+    x, y = size.number(0) / 2.0, size.number(1) / 2.0
+    box: tuple[float, float, float, float] | None = None
+    if pad.find("padstack") is not None:
+        return ()
+    if kind == "circle":
+        return tuple(circle(centre, x, 16))
+    if kind in WITHIN_SIZE:
+        box = -x, -y, x, y
+    elif kind == "custom":
+        box = _around(pad, (-x, -y, x, y))
+    if box is None:
+        return ()
+    left, top, right, bottom = box
+    rectangle = ((left, top), (right, top), (right, bottom), (left, bottom))
+    return tuple(turned(corner, centre, turn) for corner in rectangle)
+
+
+def turned(at: Point, origin: Point, turn: float) -> Point:
+    """A place in a turned frame, on the board. Angles [rad] are counter-clockwise as seen, with y
+    downwards."""
+    x, y = at
+    return (
+        origin[0] + x * math.cos(turn) + y * math.sin(turn),
+        origin[1] - x * math.sin(turn) + y * math.cos(turn),
+    )
+
+
+def _around(
+    pad: Expression, anchor: tuple[float, float, float, float]
+) -> tuple[float, float, float, float] | None:
+    """The rectangle around the anchor and the primitives of a custom pad, in its own frame; None
+    where one of these is of a kind that is not known."""
+    left, top, right, bottom = anchor
+    primitives = pad.find("primitives")
+    for each in () if primitives is None else primitives.children:
+        points = drawn(each)
+        if not points:
+            return None
+        width = each.find("width")
+        half = 0.0 if width is None else width.number() / 2.0
+        xs, ys = [p[0] for p in points], [p[1] for p in points]
+        left, right = min(left, min(xs) - half), max(right, max(xs) + half)
+        top, bottom = min(top, min(ys) - half), max(bottom, max(ys) + half)
+    return left, top, right, bottom

@@ -11,7 +11,7 @@ they work.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from designer.base.errors import InputError
@@ -87,11 +87,6 @@ def spacing(volts: float) -> tuple[float, float]:
     raise InputError(None, "circuit.supply", f"{volts:g} V between the rails", "at most 500 V")
 
 
-def summing_nets(circuit: Circuit) -> tuple[str, ...]:
-    """Inverting inputs of the op-amps, in order, of the circuit's own nets."""
-    return tuple(dict.fromkeys(s.inverting for s in circuit.sections))
-
-
 def board_rules(
     circuit: Circuit, overrides: Mapping[str, Override] = NONE
 ) -> tuple[CustomRule, ...]:
@@ -100,46 +95,31 @@ def board_rules(
     def limit(id_: str, usual: float | None = None) -> float:
         if id_ in overrides:
             return overrides[id_].limit
-        found = BY_ID[id_].limit if usual is None else usual
-        assert found is not None
-        return found
+        value = BY_ID[id_].limit if usual is None else usual
+        assert value is not None
+        return value
+
+    def rule(
+        id_: str, constraint: str, value: float, nets: tuple[str, ...] = (), condition: str = ""
+    ) -> CustomRule:
+        where = condition or " || ".join(f"A.NetName == '{net}'" for net in nets)
+        return CustomRule(id_, constraint, value, BY_ID[id_].least, where, nets)
 
     conductors, leads = spacing(2.0 * circuit.supply)
     clearance = limit("clearance", max(conductors, MADE))
-    width = limit("supply-width")
-    summing = tuple(kicad_net(net) for net in summing_nets(circuit))
+    beside = limit("summing-clearance", max(clearance, CLASSES[SUMMING]["clearance"]))
+    pads, width = limit("pad-clearance", max(leads, MADE)), limit("supply-width")
+    summing = tuple(dict.fromkeys(kicad_net(s.inverting) for s in circuit.sections))
     supply = tuple(kicad_net(net) for net in (POSITIVE, NEGATIVE, GROUND))
     return (
-        CustomRule("clearance", "clearance", clearance, True),
-        CustomRule(
-            "summing-clearance",
-            "clearance",
-            limit("summing-clearance", max(clearance, CLASSES[SUMMING]["clearance"])),
-            True,
-            _any_of(summing),
-            summing,
-        ),
-        CustomRule(
-            "pad-clearance",
-            "clearance",
-            limit("pad-clearance", max(leads, MADE)),
-            True,
-            "A.Type == 'Pad' && B.Type == 'Pad'",
-        ),
-        CustomRule("component-spacing", "courtyard_clearance", limit("component-spacing"), True),
-        CustomRule(
-            "summing-length", "length", limit("summing-length"), False, _any_of(summing), summing
-        ),
-        CustomRule(
-            "summing-vias", "via_count", limit("summing-vias"), False, _any_of(summing), summing
-        ),
-        CustomRule(
-            "supply-width",
-            "track_width",
-            width,
-            True,
-            _any_of(supply),
-            supply,
+        rule("clearance", "clearance", clearance),
+        rule("summing-clearance", "clearance", beside, summing),
+        rule("pad-clearance", "clearance", pads, (), "A.Type == 'Pad' && B.Type == 'Pad'"),
+        rule("component-spacing", "courtyard_clearance", limit("component-spacing")),
+        rule("summing-length", "length", limit("summing-length"), summing),
+        rule("summing-vias", "via_count", limit("summing-vias"), summing),
+        replace(
+            rule("supply-width", "track_width", width, supply),
             usual=max(width, CLASSES[SUPPLY]["track_width"]),
         ),
     )
@@ -159,7 +139,3 @@ def canary() -> CustomRule:
 
 def _millimetres(value: float) -> str:
     return f"{number_text(value)}mm"
-
-
-def _any_of(nets: Sequence[str]) -> str:
-    return " || ".join(f"A.NetName == '{net}'" for net in nets)

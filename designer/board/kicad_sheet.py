@@ -140,9 +140,9 @@ def _properties(placed: Placed, entry: Entry | None) -> Iterator[Expression]:
         rx, ry = 3.5, 0.0
     yield _property("Reference", item.reference, placed.x + rx, placed.y - ry, item.shape.power)
     yield _property("Value", item.value, placed.x + vx, placed.y - vy, hidden or supply)
-    found = dict(entry.fields) if entry is not None else {}
-    found = {"Footprint": "", "Datasheet": "", "Description": "", **found}
-    for key, text in found.items():
+    fields = dict(entry.fields) if entry is not None else {}
+    fields = {"Footprint": "", "Datasheet": "", "Description": "", **fields}
+    for key, text in fields.items():
         yield _property(key, text, placed.x, placed.y, True)
 
 

@@ -6,51 +6,34 @@ package, whose pins are those of the case.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 
 from designer.base.views import View
 from designer.board.component import Component
 from designer.board.kicad_names import kicad_net
-from designer.catalog import diode_curve
+from designer.board.pins import SUPPLY_UNIT
 from designer.check.deck_runs import FirstRun
 from designer.circuit.netlist import Circuit, nominal_board
 from designer.spice import opamp_model
+from designer.spice.deck import diode_cards, diode_names
+from designer.spice.opamp_model import literal
 
-GENERATOR, RAIL = "generator", "supply"
+GENERATOR = "generator"
 Fields = tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True)
-class Source:
-    """A voltage source that only the simulation has, from ``net`` to ground."""
-
-    name: str
-    """Its designator."""
-    net: str
-    """The net that it drives."""
-    value: str
-    """The value that is shown."""
-    fields: Fields
-    """Its fields for the simulation, by name."""
-
-
-def sources(circuit: Circuit, run: FirstRun) -> tuple[Source, ...]:
-    """The generator and both rails."""
+def sources(circuit: Circuit, run: FirstRun) -> Iterator[tuple[str, str, str, Fields]]:
+    """The sources of the simulation alone: name, net, the value that is shown, fields."""
     drive = run.excitation
     sine = (
-        f"dc={_n(drive.offset)} ampl={_n(drive.amplitude)} f={_n(drive.frequency)} "
+        f"dc={literal(drive.offset)} ampl={literal(drive.amplitude)} f={literal(drive.frequency)} "
         "td=0 theta=0 phase=180"
     )
-    made = [Source(circuit.generator.name, circuit.generator.net, GENERATOR, _source("SIN", sine))]
-    made += [
+    yield circuit.generator.name, circuit.generator.net, GENERATOR, _source("SIN", sine)
+    for rail in circuit.rails:
         # A reference without a number is none to KiCad.
-        Source(
-            f"{rail.name}1", rail.net, f"{rail.volts:g} V", _source("DC", f"dc={_n(rail.volts)}")
-        )
-        for rail in circuit.rails
-    ]
-    return tuple(made)
+        dc = _source("DC", f"dc={literal(rail.volts)}")
+        yield f"{rail.name}1", rail.net, f"{rail.volts:g} V", dc
 
 
 def fields(component: Component, circuit: Circuit, library: str) -> Fields:
@@ -63,14 +46,16 @@ def fields(component: Component, circuit: Circuit, library: str) -> Fields:
         return (
             ("Sim.Device", letter.upper()),
             ("Sim.Pins", "1=+ 2=-"),
-            ("Sim.Params", f"{letter}={_n(circuit.values[component.parts[0]])}"),
+            ("Sim.Params", f"{letter}={literal(circuit.values[component.parts[0]])}"),
         )
     if component.kind == "op-amp":
         pins = " ".join(f"{pin.number}={pin.number}" for pin in component.pins)
         return _model("SUBCKT", library, component.reference.lower(), pins)
     by_names = f"{numbers['cathode']}={{}} {numbers['anode']}={{}}"
     if component.kind == "diode":
-        return _model("D", library, _diodes(circuit)[component.parts[0]], by_names.format("K", "A"))
+        return _model(
+            "D", library, diode_names(circuit)[component.parts[0]], by_names.format("K", "A")
+        )
     name = _references(circuit)[component.parts[0]]
     return _model("SUBCKT", library, name, by_names.format("cathode", "anode"))
 
@@ -83,35 +68,29 @@ def models(circuit: Circuit, components: Sequence[Component]) -> str:
     for package in components:
         if package.kind != "op-amp":
             continue
-        numbers = [pin.number for pin in package.pins]
-        units: dict[str, dict[str, str]] = {}
-        for pin in package.pins:
-            units.setdefault(pin.unit, {})[pin.name] = pin.number
-        supplies = next((u["V+"], u["V-"]) for u in units.values() if "V+" in u)
+        units, numbers = package.units, [pin.number for pin in package.pins]
+        supply = units.pop(SUPPLY_UNIT)
         lines += ["", f".subckt {package.reference.lower()} {' '.join(numbers)}"]
         limits = (-circuit.saturation, circuit.saturation)
-        for unit, found in units.items():
-            if "OUT" not in found:
-                continue
+        for unit, pins in units.items():
             name = f"{package.reference}{unit}"
             lines.append(
                 opamp_model.instance(
                     name,
-                    (found["+"], found["-"], found["OUT"]),
+                    (pins["+"], pins["-"], pins["OUT"]),
                     rung="ideal",
                     vos=0.0,
                     ib=board.bias.get(name, circuit.bias),
                     rails=board.rails.get(name, limits),
-                    supplies=supplies,
+                    supplies=(supply["V+"], supply["V-"]),
                 )
             )
         lines.append(f".ends {package.reference.lower()}")
-    kinds = {name: d.model for d in circuit.diodes for name in [_diodes(circuit)[d.name]]}
-    lines += [diode_curve.card(model, name, charge=False) for name, model in kinds.items()]
+    lines += diode_cards(circuit, charge=False)
     for r in circuit.references:
         name = _references(circuit)[r.name]
         lines += ["", f".subckt {name} cathode anode"]
-        lines += [f"Vkept cathode anode {_n(board.reference[r.name])}", f".ends {name}"]
+        lines += [f"Vkept cathode anode {literal(board.reference[r.name])}", f".ends {name}"]
     return "\n".join(lines) + "\n"
 
 
@@ -124,15 +103,15 @@ def directives(circuit: Circuit, run: FirstRun) -> tuple[str, ...]:
         []
         if run.initial is None
         else [
-            f".ic v({kicad_net(by_name[name].plus)})={_n(volts)}"
+            f".ic v({kicad_net(by_name[name].plus)})={literal(volts)}"
             for name, volts in zip(circuit.states, run.initial, strict=True)
         ]
     )
     return (
-        f".options method={s.method} reltol={_n(s.reltol)}",
-        f".options abstol={_n(s.abstol)} vntol={_n(s.vntol)} noopiter",
+        f".options method={s.method} reltol={literal(s.reltol)}",
+        f".options abstol={literal(s.abstol)} vntol={literal(s.vntol)} noopiter",
         *starts,
-        f".tran {_n(s.max_step)} {_n(run.stop_time)} 0 {_n(s.max_step)} uic",
+        f".tran {literal(s.max_step)} {literal(run.stop_time)} 0 {literal(s.max_step)} uic",
     )
 
 
@@ -154,16 +133,5 @@ def _source(kind: str, parameters: str) -> Fields:
     )
 
 
-def _diodes(circuit: Circuit) -> Mapping[str, str]:
-    """The model of each diode, as in the deck."""
-    kinds = list(dict.fromkeys(d.model for d in circuit.diodes))
-    return {d.name: f"diode{kinds.index(d.model)}" for d in circuit.diodes}
-
-
 def _references(circuit: Circuit) -> Mapping[str, str]:
     return {r.name: f"reference{i}" for i, r in enumerate(circuit.references)}
-
-
-def _n(value: float) -> str:
-    """A number that SPICE reads back as the same float."""
-    return repr(float(value))

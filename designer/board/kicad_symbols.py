@@ -5,6 +5,7 @@ The same shapes make the symbols inside the sheet and the project's library, whi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -126,29 +127,22 @@ def diode(
     if zener:
         bar = [(0.5, -1.3), (1.0, -1.0), (1.0, 1.0), (1.5, 1.3)]
     triangle = ((-1.0, -1.0), (-1.0, 1.0), (1.0, 0.0), (-1.0, -1.0))
-    made = two_pins(name, prefix, (anode, "A"), (cathode, "K"), [triangle, tuple(bar)], 1.0)
+    shape = two_pins(name, prefix, (anode, "A"), (cathode, "K"), [triangle, tuple(bar)], 1.0)
     if not free:
-        return made
+        return shape
     first = -(len(free) - 1)
     pins = [ShapePin(*pin, "no_connect", first + 2 * i, -3, 90, 2) for i, pin in enumerate(free)]
-    unit = replace(made.units[0], pins=(*made.units[0].pins, *pins))
-    return replace(made, units=(unit,), texts=((0.0, 1.9), (0.0, -4.2)))
+    unit = replace(shape.units[0], pins=(*shape.units[0].pins, *pins))
+    return replace(shape, units=(unit,), texts=((0.0, 1.9), (0.0, -4.2)))
 
 
 def source(name: str) -> SymbolShape:
     """A source that only the simulation has; its first pin is positive and on the left."""
-    circle = tuple(
-        (2.0 * x, 2.0 * y)
-        for x, y in (
-            *((1.0, 0.0), (0.924, 0.383), (0.707, 0.707), (0.383, 0.924), (0.0, 1.0)),
-            *((-0.383, 0.924), (-0.707, 0.707), (-0.924, 0.383), (-1.0, 0.0)),
-            *((-0.924, -0.383), (-0.707, -0.707), (-0.383, -0.924), (0.0, -1.0)),
-            *((0.383, -0.924), (0.707, -0.707), (0.924, -0.383), (1.0, 0.0)),
-        )
-    )
+    turns = (math.pi * k / 8.0 for k in range(17))
+    circle = tuple((2.0 * round(math.cos(a), 3), 2.0 * round(math.sin(a), 3)) for a in turns)
     plus = [((-1.5, 0.0), (-0.7, 0.0)), ((-1.1, -0.4), (-1.1, 0.4)), ((0.7, -0.4), (0.7, 0.4))]
-    made = two_pins(name, "V", ("1", "+"), ("2", "-"), [circle, *plus], 2.0)
-    return SymbolShape(name, "V", made.units, ((0.0, 2.8), (0.0, -2.8)))
+    shape = two_pins(name, "V", ("1", "+"), ("2", "-"), [circle, *plus], 2.0)
+    return replace(shape, texts=((0.0, 2.8), (0.0, -2.8)))
 
 
 def row(
@@ -168,15 +162,12 @@ def row(
     )
 
 
-def test_point() -> SymbolShape:
+def probe_pad() -> SymbolShape:
     ring = ((0.0, 0.0), (0.0, 1.0), (-0.6, 1.6), (0.0, 2.2), (0.6, 1.6), (0.0, 1.0))
     pin = ShapePin("1", "1", "passive", 0, 0, 90, 0)
     return SymbolShape(
         "TestPoint", "TP", (SymbolUnit((pin,), (ring,), False),), ((2.6, 1.4), (2.6, 0.0))
     )
-
-
-test_point.__test__ = False  # type: ignore[attr-defined]  # no test, whatever its name says
 
 
 INVERTING, NONINVERTING, OUTPUT = (-6, 2), (-6, -2), (6, 0)

@@ -6,6 +6,7 @@ board itself; curves as chords. What a footprint cuts out is left out.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -89,34 +90,34 @@ def read_outline(board: Expression) -> Outline:
     return Outline(np.array(sides, dtype=float).reshape(-1, 2, 2), tuple(ends))
 
 
-def drawn(found: Expression) -> list[Point]:
+def drawn(item: Expression) -> list[Point]:
     """The middle of what a drawn item's pen follows, as straight pieces; a closed one's first point
     again at the end. Nothing where it is none of the kinds that are read."""
-    return _closed(found) or _open(found)
+    return _closed(item) or _open(item)
 
 
-def _open(found: Expression) -> list[Point]:
+def _open(item: Expression) -> list[Point]:
     """A line, an arc or a curve, from end to end; nothing of what is none."""
-    if found.name == "gr_line":
-        return [_point(found.get("start")), _point(found.get("end"))]
-    if found.name == "gr_arc":
-        return _arc(found)
-    if found.name == "gr_curve":
-        return _bezier([_point(each) for each in found.get("pts").all("xy")])
+    if item.name == "gr_line":
+        return [_point(item.get("start")), _point(item.get("end"))]
+    if item.name == "gr_arc":
+        return _arc(item)
+    if item.name == "gr_curve":
+        return _bezier([_point(each) for each in item.get("pts").all("xy")])
     return []
 
 
-def _closed(found: Expression) -> list[Point]:
+def _closed(item: Expression) -> list[Point]:
     """A rectangle, a circle or a polygon, its first point again at the end; nothing of others."""
     points: list[Point] = []
-    if found.name == "gr_rect":
-        (x0, y0), (x1, y1) = _point(found.get("start")), _point(found.get("end"))
+    if item.name == "gr_rect":
+        (x0, y0), (x1, y1) = _point(item.get("start")), _point(item.get("end"))
         points = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-    elif found.name == "gr_circle":
-        centre = _point(found.get("center"))
-        points = circle(centre, math.dist(centre, _point(found.get("end"))))
-    elif found.name == "gr_poly":
-        points = list(_corners(found.get("pts")))
+    elif item.name == "gr_circle":
+        centre = _point(item.get("center"))
+        points = circle(centre, math.dist(centre, _point(item.get("end"))))
+    elif item.name == "gr_poly":
+        points = list(_corners(item.get("pts")))
     return points + points[:1]
 
 
@@ -134,30 +135,20 @@ def _corners(points: Expression) -> Iterator[Point]:
             yield from _arc(each)
 
 
-def _arc(found: Expression) -> list[Point]:
+def _arc(item: Expression) -> list[Point]:
     """From start to end through mid; straight where the three are in line."""
-    a, b, c = (_point(found.get(name)) for name in ("start", "mid", "end"))
-    cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    a, b, c = (complex(*_point(item.get(name))) for name in ("start", "mid", "end"))
+    cross = ((b - a).conjugate() * (c - a)).imag
     if abs(cross) < 1e-9:
-        return [a, b, c]
-    # The centre is as far from a as from b and from c.
-    u, v = (b[0] - a[0], b[1] - a[1]), (c[0] - a[0], c[1] - a[1])
-    uu, vv = u[0] ** 2 + u[1] ** 2, v[0] ** 2 + v[1] ** 2
-    centre = (
-        a[0] + (v[1] * uu - u[1] * vv) / (2.0 * cross),
-        a[1] + (u[0] * vv - v[0] * uu) / (2.0 * cross),
-    )
-    radius = math.dist(centre, a)
-    first, last = (math.atan2(p[1] - centre[1], p[0] - centre[0]) for p in (a, c))
-    turn = (last - first) % (2.0 * math.pi)
+        return [(p.real, p.imag) for p in (a, b, c)]
+    share = (c - a) / (b - a)
+    centre = a + (b - a) * (share - abs(share) ** 2) / (2j * share.imag)
+    turn = cmath.phase((c - centre) / (a - centre)) % (2.0 * math.pi)
     if cross < 0.0:
         turn -= 2.0 * math.pi
     count = max(2, math.ceil(CHORDS * abs(turn) / (2.0 * math.pi)))
-    inner = [
-        (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
-        for angle in (first + turn * k / count for k in range(1, count))
-    ]
-    return [a, *inner, c]
+    inner = [centre + (a - centre) * cmath.rect(1.0, turn * k / count) for k in range(1, count)]
+    return [(p.real, p.imag) for p in (a, *inner, c)]
 
 
 def _bezier(controls: Sequence[Point]) -> list[Point]:
@@ -173,8 +164,8 @@ def _bezier(controls: Sequence[Point]) -> list[Point]:
     return out
 
 
-def _point(found: Expression) -> Point:
-    return found.number(0), found.number(1)
+def _point(item: Expression) -> Point:
+    return item.number(0), item.number(1)
 
 
 def _to_sides(points: Array, sides: Array) -> Array:
@@ -183,8 +174,8 @@ def _to_sides(points: Array, sides: Array) -> Array:
     away = points[:, None] - start
     long = np.maximum((along**2).sum(axis=1), 1e-300)
     share = np.clip((away * along).sum(axis=2) / long, 0.0, 1.0)
-    found: Array = np.linalg.norm(away - share[..., None] * along, axis=2)
-    return found
+    distance: Array = np.linalg.norm(away - share[..., None] * along, axis=2)
+    return distance
 
 
 def _cross(some: Array, others: Array) -> bool:
@@ -203,7 +194,7 @@ def _any_within(points: Array, around: Array) -> bool:
 
 def _turn(a: Array, b: Array, c: Array) -> Array:
     """Above 0 where c lies on the one side of the line from a to b, below on the other."""
-    found: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
+    side: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
         c[..., 0] - a[..., 0]
     )
-    return found
+    return side

@@ -64,10 +64,10 @@ class Package:
         ------
         InputError : a section that the op-amp does not have.
         """
-        found = [pin for s in self.sections for pin in section_pins(s, self.opamp)]
+        pins = [pin for s in self.sections for pin in section_pins(s, self.opamp)]
         positive, negative = self.opamp.supply_pins
         return (
-            *found,
+            *pins,
             Pin(positive, "V+", POSITIVE, "power_in", SUPPLY_UNIT),
             Pin(negative, "V-", NEGATIVE, "power_in", SUPPLY_UNIT),
         )
@@ -77,9 +77,9 @@ def packages(circuit: Circuit, catalog: Catalog) -> tuple[Package, ...]:
     """The op-amp packages, each with its sections of every view, in the order of their pins."""
     opamp = catalog.opamp(circuit.opamp)
     tied = [p for p in circuit.fittings if isinstance(p, Section)]
-    held = sorted((*circuit.sections, *tied), key=lambda s: s.name)
+    sections = sorted((*circuit.sections, *tied), key=lambda s: s.name)
     return tuple(
-        Package(name, tuple(s for s in held if s.package == name), opamp)
+        Package(name, tuple(s for s in sections if s.package == name), opamp)
         for name in circuit.packages
     )
 
@@ -103,8 +103,8 @@ def pins(part: Fitting, circuit: Circuit, catalog: Catalog) -> tuple[Pin, ...]:
         entry = catalog.diode(part.model.name)
         return _named(entry.pins, {"cathode": part.cathode, "anode": part.anode})
     if isinstance(part, Reference):
-        found = catalog.reference(part.model)
-        return _named(found.pins, {"cathode": part.cathode, "anode": part.anode})
+        entry = catalog.reference(part.model)
+        return _named(entry.pins, {"cathode": part.cathode, "anode": part.anode})
     if isinstance(part, Connector):
         numbered = enumerate(part.ways, start=1)
         return tuple(Pin(str(i), str(i), net) for i, net in numbered)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any, Literal, cast
 
 import schemdraw
@@ -132,7 +133,7 @@ class _Page:
         top = y - ROW * len(cell.feedback) - CLEAR
         after = tip if cell.series is None else tip + PART * len(cell.series.parts)
         for i, chain in enumerate(cell.inputs):
-            self.label(x, top - i * ROW, chain.start)
+            self.net_name(x + LABEL - 0.15, top - i * ROW, _net(chain.start), "left")
             self.chain(x + LABEL, top - i * ROW, node, chain)
         low = top - ROW * max(len(cell.inputs) - 1, 0)
         highest = y - 0.5 * ROW if cell.feedback else top
@@ -163,7 +164,7 @@ class _Page:
         if cell.series is not None:
             self.chain(tip, out, after, cell.series)
             net = cell.series.end
-            self.net(tip, out, section.output, above=False)
+            self.text(tip - 0.1, out - 0.35, section.output, ROLE_SIZE + 1, FAINT, "right")
         bottom = min(low, top - IN2 - 0.9)
         if cell.shunts:
             length = 2.4
@@ -175,12 +176,7 @@ class _Page:
             bottom = min(bottom, out - 0.3 - length - 0.9)
         self.dot(after, out)
         self.line(after, out, after + 0.5, out)
-        self.drawing += (
-            elm.Label()
-            .theta(0)
-            .at((after + 0.6, out))
-            .label(self.escaped(net), loc="right", fontsize=NAME_SIZE, halign="left")
-        )
+        self.net_name(after + 0.6, out, net, "right")
         return after + 0.6 + 0.2 * len(net) + 0.4 - x, y - bottom + 0.5 * ROW
 
     def rows(self, x: float, y: float, cell: CellRows) -> tuple[float, float]:
@@ -194,17 +190,12 @@ class _Page:
                 continue
             height = below - 0.4 * ROW
             below -= ROW
-            self.label(x, height, row.start)
+            self.net_name(x + LABEL - 0.15, height, _net(row.start), "left")
             end = x + LABEL + PART * len(row.parts)
             self.chain(x + LABEL, height, end, row)
-            said = " ".join([_net(row.end), *cell.at.get(row.end, ())])
-            self.drawing += (
-                elm.Label()
-                .theta(0)
-                .at((end + 0.1, height))
-                .label(self.escaped(said), loc="right", fontsize=NAME_SIZE, halign="left")
-            )
-            width = max(width, end - x + 0.3 + 0.2 * len(said))
+            name = " ".join([_net(row.end), *cell.at.get(row.end, ())])
+            self.net_name(end + 0.1, height, name, "right")
+            width = max(width, end - x + 0.3 + 0.2 * len(name))
         return width, y - below
 
     def chain(self, x: float, y: float, end: float, chain: Chain) -> None:
@@ -217,8 +208,8 @@ class _Page:
             self.drawing += _element(part).endpoints(a, b)
             middle = x + (i + 0.5) * step
             self.text(middle, y + 0.5, _named(part), NAME_SIZE, align="center")
-            for n, said in enumerate(_wrapped(part.role)):
-                self.text(middle, y - 0.58 - 0.26 * n, said, ROLE_SIZE, FAINT, "center")
+            for n, line in enumerate(_wrapped(part.role)):
+                self.text(middle, y - 0.58 - 0.26 * n, line, ROLE_SIZE, FAINT, "center")
 
     def hanging(self, x: float, y: float, length: float, chain: Chain) -> None:
         """A chain down to ground."""
@@ -229,39 +220,37 @@ class _Page:
                 a, b = b, a
             self.drawing += _element(part).endpoints(a, b)
             self.text(x + 0.4, y - (i + 0.4) * step, _named(part), NAME_SIZE)
-            for n, said in enumerate(_wrapped(part.role)):
-                self.text(x + 0.4, y - (i + 0.4) * step - 0.4 - 0.26 * n, said, ROLE_SIZE, FAINT)
+            for n, line in enumerate(_wrapped(part.role)):
+                self.text(x + 0.4, y - (i + 0.4) * step - 0.4 - 0.26 * n, line, ROLE_SIZE, FAINT)
         self.drawing += elm.Ground().theta(0).at((x, y - length)).scale(0.7)
 
-    def label(self, x: float, y: float, net: str) -> None:
-        """A net's name at the left end of a row, with its wire."""
+    def net_name(self, x: float, y: float, name: str, side: Literal["left", "right"]) -> None:
+        """A net's name on this side of a point."""
+        towards = "right" if side == "left" else "left"
         self.drawing += (
             elm.Label()
             .theta(0)
-            .at((x + LABEL - 0.15, y))
-            .label(self.escaped(_net(net)), loc="left", fontsize=NAME_SIZE, halign="right")
+            .at((x, y))
+            .label(self.escaped(name), loc=side, fontsize=NAME_SIZE, halign=towards)
         )
-
-    def net(self, x: float, y: float, net: str, *, above: bool) -> None:
-        self.text(x - 0.1, y + (0.2 if above else -0.35), net, ROLE_SIZE + 1, FAINT, "right")
 
     def text(
         self,
         x: float,
         y: float,
-        said: str,
+        words: str,
         size: float,
         color: str = "black",
         align: Align = "left",
     ) -> None:
-        if not said:
+        if not words:
             return
         self.drawing += (
             elm.Label()
             .theta(0)
             .at((x, y))
             .label(
-                self.escaped(said),
+                self.escaped(words),
                 loc="center",
                 fontsize=size,
                 color=color,
@@ -277,15 +266,15 @@ class _Page:
     def dot(self, x: float, y: float) -> None:
         self.drawing += elm.Dot(radius=0.06).at((x, y))
 
-    def escaped(self, said: str) -> str:
+    def escaped(self, text: str) -> str:
         """Text that no backend takes for markup or mathematics.
 
         Both backends measure text as XML; only that of SVG also writes it as such, so a PNG shows
         look-alikes.
         """
         if self.canvas == "matplotlib":
-            return said.translate(_LIKE)
-        return html.escape(said).replace("$", "&#36;")
+            return text.translate(_LIKE)
+        return html.escape(text).replace("$", "&#36;")
 
 
 def _net(net: str) -> str:
@@ -306,12 +295,5 @@ def _element(part: TwoPin) -> Any:
 
 def _wrapped(role: str) -> Sequence[str]:
     """A role in lines, two at most."""
-    lines = [""]
-    for word in role.split():
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > ROLE_WIDTH:
-            lines.append(word)
-        else:
-            lines[-1] = f"{lines[-1]} {word}".strip()
-    if len(lines) > 2:
-        lines = [lines[0], f"{lines[1]} …"]
-    return lines
+    lines = wrap(role, ROLE_WIDTH, break_long_words=False, break_on_hyphens=False)
+    return lines if len(lines) < 3 else [lines[0], f"{lines[1]} …"]

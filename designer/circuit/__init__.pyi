@@ -59,6 +59,7 @@ from .nodal import (
 )
 from .noise_gains import (
     SectionStage as SectionStage,
+    conductance as conductance,
     stages as stages,
 )
 from .nominal import (

@@ -42,6 +42,11 @@ def _conductances(circuit: Circuit) -> list[_Conductance]:
     return found
 
 
+def conductance(circuit: Circuit, a: str, b: str) -> float:
+    """Between two nets [S], through resistors alone; straight or by nets that only these meet."""
+    return sum(wire.siemens for wire in _conductances(circuit) if {wire.a, wire.b} == {a, b})
+
+
 @dataclass(frozen=True)
 class SectionStage:
     """One section with what is connected to it."""

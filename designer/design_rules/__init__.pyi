@@ -1,6 +1,6 @@
 from . import (
-    junit as junit,
     on_board as on_board,
+    rule_reports as rule_reports,
     run_rules as run_rules,
 )
 from .kicad_drc import (

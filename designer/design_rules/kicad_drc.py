@@ -110,16 +110,16 @@ def check(board: BoardFile, rules: Sequence[CustomRule]) -> DesignRuleCheck:
         place = Path(scratch)
         text = rules_text([*rules, canary()])
         broken = report(specimen(rules, breaking=True), text, place / "specimen")
-        heard = {v.rule for v in violations(broken, rules)}
-        heard |= {OPEN} if _unconnected(broken) else set()
-        heard |= {SHORT} if _shorts(broken) else set()
+        reported = {v.rule for v in violations(broken, rules)}
+        reported |= {OPEN} if _unconnected(broken) else set()
+        reported |= {SHORT} if _shorts(broken) else set()
         answer = report(_with_canary(board), text, place / "board")
     if not any(_is_canary(v) for v in answer["violations"]):
         raise CheckFailed("KiCad has dropped the custom rules: a planted violation went unreported")
     return DesignRuleCheck(
         version,
         violations(answer, rules),
-        frozenset([OPEN, SHORT, *(rule.id for rule in rules)]) - heard,
+        frozenset([OPEN, SHORT, *(rule.id for rule in rules)]) - reported,
         _unconnected(answer),
         _shorts(answer),
     )
@@ -148,28 +148,28 @@ def report(board: str, rules: str, place: Path) -> dict[str, Any]:
             timeout=PATIENCE,
             check=False,
         )
-        found = parse_json(out.read_bytes(), out)
+        answer = parse_json(out.read_bytes(), out)
     except subprocess.TimeoutExpired:
         raise CheckFailed(f"kicad-cli gave no answer within {PATIENCE:g} s") from None
     except OSError:
-        said = (done.stderr or done.stdout).strip().splitlines()
+        lines = (done.stderr or done.stdout).strip().splitlines()
         raise CheckFailed(
-            f"kicad-cli wrote no report: {said[-1] if said else 'no reason'}"
+            f"kicad-cli wrote no report: {lines[-1] if lines else 'no reason'}"
         ) from None
     except InputError:
         raise CheckFailed("kicad-cli wrote a report that is no JSON") from None
     lists = ("violations", "unconnected_items")
-    if not isinstance(found, dict) or not all(isinstance(found.get(n), list) for n in lists):
+    if not isinstance(answer, dict) or not all(isinstance(answer.get(n), list) for n in lists):
         raise CheckFailed("kicad-cli wrote a report of another kind")
-    return found
+    return answer
 
 
-def violations(found: Mapping[str, Any], rules: Sequence[CustomRule]) -> tuple[Violation, ...]:
+def violations(answer: Mapping[str, Any], rules: Sequence[CustomRule]) -> tuple[Violation, ...]:
     """What a report says of our rules. A width names the board's setup in the place of the rule; it
     is known by its limit and its net."""
     by_id = {rule.id: rule for rule in rules}
     out = []
-    for each in found["violations"]:
+    for each in answer["violations"]:
         text = str(each.get("description", ""))
         named, actual = _RULE.search(text), _ACTUAL.search(text)
         id_ = named[1] if named else _width_rule(each, rules)
@@ -200,17 +200,17 @@ def _is_canary(each: Mapping[str, Any]) -> bool:
     return each.get("type") == "track_width" and limit is not None and limit[1] == own
 
 
-def _unconnected(found: Mapping[str, Any]) -> Mapping[str, int]:
+def _unconnected(answer: Mapping[str, Any]) -> Mapping[str, int]:
     """Open connections by net; both ends of one are on the same net."""
     return Counter(
         circuit_net(net)
-        for each in found["unconnected_items"]
+        for each in answer["unconnected_items"]
         for net in dict.fromkeys(_nets(each))
     )
 
 
-def _shorts(found: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(_where(each) for each in found["violations"] if each.get("type") in SHORTS)
+def _shorts(answer: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(_where(each) for each in answer["violations"] if each.get("type") in SHORTS)
 
 
 def _nets(each: Mapping[str, Any]) -> list[str]:

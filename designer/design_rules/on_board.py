@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,7 +42,7 @@ from designer.design_rules.kicad_drc import (
 )
 
 NO_BOARD = "no board was given (--board FILE)"
-UNHEARD = "KiCad does not report a board that breaks this rule"
+NOT_UNDERSTOOD = "KiCad does not report a board that breaks this rule"
 MOST = 5
 """Names in a message."""
 NETS = 12
@@ -66,10 +67,10 @@ def checked(
 ) -> tuple[RuleOutcome, ...]:
     """Every rule on a board, with KiCad where that is installed and answers."""
     try:
-        told: DesignRuleCheck | str = check(board, rules)
+        answer: DesignRuleCheck | str = check(board, rules)
     except CheckFailed as why:
-        told = str(why)
-    return on_board(board, components, rules, overrides, told)
+        answer = str(why)
+    return on_board(board, components, rules, overrides, answer)
 
 
 def on_board(
@@ -77,22 +78,22 @@ def on_board(
     components: Sequence[Component],
     rules: Sequence[CustomRule],
     overrides: Mapping[str, Override],
-    told: DesignRuleCheck | str,
+    answer: DesignRuleCheck | str,
 ) -> tuple[RuleOutcome, ...]:
-    """Every rule on a board. told : what KiCad found, or why it was not asked."""
-    said = {custom.id: custom for custom in rules}
+    """Every rule on a board. answer : what KiCad found, or why it was not asked."""
+    by_id = {custom.id: custom for custom in rules}
     out = []
     for rule in _wanted():
         override = overrides.get(rule.id)
         try:
             if rule.id in READ:
                 out.append(judged(rule, READ[rule.id](board, components), override))
-            elif isinstance(told, str):
-                out.append(_idle(rule, rules, overrides, told))
+            elif isinstance(answer, str):
+                out.append(_idle(rule, rules, overrides, answer))
             elif rule.id in REPORTED:
-                out.append(judged(rule, _reported(rule, board, told), override))
+                out.append(judged(rule, _reported(rule, board, answer), override))
             else:
-                out.append(_by_kicad(rule, said[rule.id], board, told, override))
+                out.append(_by_kicad(rule, by_id[rule.id], board, answer, override))
         except NotRun as reason:
             out.append(_idle(rule, rules, overrides, str(reason)))
     return tuple(out)
@@ -136,25 +137,25 @@ def board_outline(board: BoardFile, components: Sequence[Component]) -> Iterator
             yield Finding(room, where, more=_READ)
 
 
-def unconnected(board: BoardFile, told: DesignRuleCheck) -> Iterator[Finding]:
+def unconnected(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Finding]:
     """Open connections, with the nets that they are on.
 
     Raises
     ------
     NotRun : nothing is routed at all.
     """
-    count = sum(told.unconnected.values())
+    count = sum(answer.unconnected.values())
     if count and not board.copper:
-        nets = len(told.unconnected)
+        nets = len(answer.unconnected)
         raise NotRun(f"nothing is routed yet: {count} connections of {nets} nets are open")
-    names = [f"{POWER.get(net, net)} ({n})" for net, n in sorted(told.unconnected.items())]
+    names = [f"{POWER.get(net, net)} ({n})" for net, n in sorted(answer.unconnected.items())]
     more = f" and {len(names) - NETS} more nets" if len(names) > NETS else ""
     yield Finding(count, more=f"not routed: {', '.join(names[:NETS])}{more}" if names else "")
 
 
-def short_circuits(board: BoardFile, told: DesignRuleCheck) -> Iterator[Finding]:
+def short_circuits(board: BoardFile, answer: DesignRuleCheck) -> Iterator[Finding]:
     """Places where copper of two nets touches."""
-    yield Finding(len(told.shorts), more="; ".join(told.shorts[:MOST]))
+    yield Finding(len(answer.shorts), more="; ".join(answer.shorts[:MOST]))
 
 
 REPORTED: Mapping[str, Callable[[BoardFile, DesignRuleCheck], Iterator[Finding]]] = {
@@ -170,27 +171,27 @@ READ: Mapping[str, Callable[[BoardFile, Sequence[Component]], Iterator[Finding]]
 """Rules that KiCad is not asked about: they are read from the file."""
 
 
-def _reported(rule: DesignRule, board: BoardFile, told: DesignRuleCheck) -> Iterator[Finding]:
-    if rule.id in told.misunderstood:
-        raise NotRun(UNHEARD)
-    return REPORTED[rule.id](board, told)
+def _reported(rule: DesignRule, board: BoardFile, answer: DesignRuleCheck) -> Iterator[Finding]:
+    if rule.id in answer.misunderstood:
+        raise NotRun(NOT_UNDERSTOOD)
+    return REPORTED[rule.id](board, answer)
 
 
 def _by_kicad(
     rule: DesignRule,
     custom: CustomRule,
     board: BoardFile,
-    told: DesignRuleCheck,
+    answer: DesignRuleCheck,
     override: Override | None,
 ) -> RuleOutcome:
-    if custom.id in told.misunderstood:
-        raise NotRun(UNHEARD)
-    mine = [v for v in told.violations if v.rule == custom.id]
+    if custom.id in answer.misunderstood:
+        raise NotRun(NOT_UNDERSTOOD)
+    mine = [v for v in answer.violations if v.rule == custom.id]
     if mine:
         return _broken(rule, custom, mine, override)
     concerned = {circuit_net(net) for net in custom.nets}
     if concerned:
-        lost = sorted(concerned & told.unconnected.keys())
+        lost = sorted(concerned & answer.unconnected.keys())
         if lost:
             raise NotRun(f"not routed yet: {', '.join(POWER.get(net, net) for net in lost)}")
         if not concerned & board.routed:
@@ -201,20 +202,17 @@ def _by_kicad(
         bare = [f.reference for f in board.footprints if f.wired and not f.courtyard]
         if bare:
             raise NotRun(f"footprints without a courtyard: {', '.join(bare[:MOST])}")
-    usual = _usual(rule, custom, override)
-    return RuleOutcome(
-        rule, PASS, "no violation in KiCad's check", limit=custom.limit, override=override,
-        usual=usual,
-    )  # fmt: skip
+    usual, words = _usual(rule, custom, override), "no violation in KiCad's check"
+    return RuleOutcome(rule, PASS, words, limit=custom.limit, override=override, usual=usual)
 
 
 def _broken(
-    rule: DesignRule, custom: CustomRule, found: Sequence[Violation], override: Override | None
+    rule: DesignRule, custom: CustomRule, broken: Sequence[Violation], override: Override | None
 ) -> RuleOutcome:
-    worst = (min if rule.least else max)(found, key=lambda v: v.actual)
+    worst = (min if rule.least else max)(broken, key=lambda v: v.actual)
     text = f"{shown(worst.actual, rule.unit)} at {worst.where}"
-    if len(found) > 1:
-        text += f"; {len(found)} places in all"
+    if len(broken) > 1:
+        text += f"; {len(broken)} places in all"
     usual = _usual(rule, custom, override)
     return RuleOutcome(rule, FAIL, text, worst.actual, custom.limit, worst.where, override, usual)
 
@@ -229,12 +227,9 @@ def _usual(rule: DesignRule, custom: CustomRule, override: Override | None) -> f
 def _idle(
     rule: DesignRule, rules: Sequence[CustomRule], overrides: Mapping[str, Override], why: str
 ) -> RuleOutcome:
+    outcome = not_run(rule, why, overrides.get(rule.id))
     limits = {custom.id: custom.limit for custom in rules}
-    made = not_run(rule, why, overrides.get(rule.id))
-    return RuleOutcome(
-        made.rule, made.status, made.found, limit=limits.get(rule.id, made.limit),
-        override=made.override,
-    )  # fmt: skip
+    return replace(outcome, limit=limits.get(rule.id, outcome.limit))
 
 
 def _wanted() -> list[DesignRule]:

@@ -85,8 +85,8 @@ def _other_value(component: Component, there: PlacedFootprint) -> str:
         same = _plain(there.value) == _plain(component.value)
     else:
         try:
-            found = parse_quantity(there.value, unit)
-            same = math.isclose(found, component.quantity, rel_tol=1e-6)
+            quantity = parse_quantity(there.value, unit)
+            same = math.isclose(quantity, component.quantity, rel_tol=1e-6)
         except ValueError:
             same = False
     return "" if same else f"is {_shown(there.value)}, not {component.value}"
@@ -94,11 +94,11 @@ def _other_value(component: Component, there: PlacedFootprint) -> str:
 
 def _other_number(component: Component, there: PlacedFootprint) -> str:
     assert component.bought is not None
-    found, wanted = there.part_number or "", component.bought.part_number
+    actual, wanted = there.part_number or "", component.bought.part_number
     # A substitute is written with its maker in front.
-    if found == wanted or (found and component.bought.substitute.endswith(f" {found}")):
+    if actual == wanted or (actual and component.bought.substitute.endswith(f" {actual}")):
         return ""
-    return f"is ordered as {_shown(found)}, not {wanted}"
+    return f"is ordered as {_shown(actual)}, not {wanted}"
 
 
 def _other_footprint(component: Component, there: PlacedFootprint) -> str:

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Finding
-from designer.catalog.entries import OpAmp
-from designer.circuit.netlist import Circuit, Diode
-from designer.design_rules.force_at_clearance import Forces, leftover, thermal
+from designer.circuit.netlist import Diode
+from designer.design_rules.force_at_clearance import leftover, thermal
+from designer.design_rules.subject import RuleSubject
 
 INSULATION = 1e9
 """Ohm between a node and a rail across the board."""
@@ -27,49 +26,54 @@ STEP = 1e-5
 """Relative change of a resistor for a sensitivity."""
 
 
-def offset(opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float) -> Iterator[Finding]:
-    """All sections' largest offsets, independent of each other. drive : amplitude [V]."""
-    limit = opamp.offset.max if opamp.offset.max is not None else opamp.offset_limit
-    share = {s.name: abs(forces.offset[s.name]) * limit / drive for s in circuit.sections}
-    worst = max(share, key=lambda name: share[name])
+def offset(s: RuleSubject) -> Iterator[Finding]:
+    """All sections' largest offsets, independent of each other."""
+    figure = s.opamp.offset
+    limit = figure.max if figure.max is not None else s.opamp.offset_limit
+    share = {
+        section.name: abs(s.forces.offset[section.name]) * limit / s.drive
+        for section in s.circuit.sections
+    }
     total = float(np.sqrt(sum(each**2 for each in share.values())))
-    more = f"{shown_volts(limit)} at each of {len(share)} sections"
-    yield Finding(total, f"{worst}, which has most of it", more=more)
+    more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections"
+    yield Finding(total, _most(share), more=more)
 
 
-def bias(opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float) -> Iterator[Finding]:
+def bias(s: RuleSubject) -> Iterator[Finding]:
     """All inputs' largest bias currents, added up."""
-    limit = opamp.bias.max if opamp.bias.max is not None else opamp.bias.nominal
-    share = {s.name: abs(forces.current.get(s.inverting, 0.0)) for s in circuit.sections}
-    worst = max(share, key=lambda name: share[name])
-    total = sum(share.values()) * limit / drive
-    yield Finding(total, f"{worst}, which has most of it", more=f"{limit:.3g} A at each input")
+    figure = s.opamp.bias
+    limit = figure.max if figure.max is not None else figure.nominal
+    current = s.forces.current
+    share = {
+        section.name: abs(current.get(section.inverting, 0.0)) for section in s.circuit.sections
+    }
+    total = sum(share.values()) * limit / s.drive
+    yield Finding(total, _most(share), more=f"{limit:.3g} A at each input")
 
 
-def noise(
-    opamp: OpAmp, circuit: Circuit, forces: Forces, drive: float, frequency: float
-) -> Iterator[Finding]:
-    """RMS of op-amps and resistors from ``SLOWEST`` to ``frequency`` [Hz]."""
-    corner = opamp.noise_corner.nominal if opamp.noise_corner is not None else 0.0
-    white = frequency - SLOWEST
-    flicker = corner * float(np.log(frequency / SLOWEST))
-    density = opamp.noise.nominal
-    amplifiers = sum((forces.offset[s.name] * density) ** 2 for s in circuit.sections)
-    resistors = sum((forces.between(r.a, r.b) * thermal(r.value)) ** 2 for r in circuit.resistors)
-    total = float(np.sqrt(amplifiers * (white + flicker) + resistors * white)) / drive
-    yield Finding(total, more=f"{SLOWEST:g} Hz to {frequency:.4g} Hz")
+def noise(s: RuleSubject) -> Iterator[Finding]:
+    """RMS of op-amps and resistors from ``SLOWEST`` to the highest frequency that matters."""
+    corner = s.opamp.noise_corner.nominal if s.opamp.noise_corner is not None else 0.0
+    white = s.fastest - SLOWEST
+    flicker = corner * float(np.log(s.fastest / SLOWEST))
+    density, forces = s.opamp.noise.nominal, s.forces
+    amplifiers = sum((forces.offset[a.name] * density) ** 2 for a in s.circuit.sections)
+    resistors = sum((forces.between(r.a, r.b) * thermal(r.value)) ** 2 for r in s.circuit.resistors)
+    total = float(np.sqrt(amplifiers * (white + flicker) + resistors * white)) / s.drive
+    yield Finding(total, more=f"{SLOWEST:g} Hz to {s.fastest:.4g} Hz")
 
 
-def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) -> Iterator[Finding]:
+def leakage(s: RuleSubject) -> Iterator[Finding]:
     """A rail through the board into one summing node; with it whatever leaks through diodes.
 
     Opposed diodes at one node leak less than that: neither sees a voltage there.
     """
+    circuit, forces = s.circuit, s.forces
     through = 0.0
     for diode in circuit.diodes:
         if diode.rest:
             continue  # it conducts
-        entry = catalog.diode(diode.model.name)
+        entry = s.catalog.diode(diode.model.name)
         through += abs(forces.between(diode.cathode, diode.anode)) * entry.reverse_current.nominal
     opposed = {frozenset(d.nets) for d in circuit.fittings if isinstance(d, Diode)}
     for section in circuit.sections:
@@ -80,31 +84,28 @@ def leakage(circuit: Circuit, catalog: Catalog, forces: Forces, drive: float) ->
             more += ", and through the diodes"
         if any(node in pair for pair in opposed):
             more += "; the protection's diodes see no voltage"
-        yield Finding((over_board + through) / drive, f"{section.name}, node {node}", more=more)
+        yield Finding((over_board + through) / s.drive, f"{section.name}, node {node}", more=more)
 
 
-def absorption(
-    circuit: Circuit, dielectrics: Mapping[str, str], forces: Forces, drive: float
-) -> Iterator[Finding]:
-    """Charge that an integrator's capacitor gives back after its output stood at its limit.
-
-    dielectrics : of the capacitors, in words, by name.
-    """
+def absorption(s: RuleSubject) -> Iterator[Finding]:
+    """Charge that an integrator's capacitor gives back after its output stood at its limit."""
+    circuit = s.circuit
     for capacitor in circuit.capacitors:
-        words = dielectrics.get(capacitor.name, "")
+        words = s.dielectrics.get(capacitor.name, "")
         known = [share for word, share in ABSORPTION.items() if word.lower() in words.lower()]
         share = known[0] if known else UNKNOWN
         current = share * capacitor.value * circuit.saturation / RETURNS
-        force = abs(forces.between(capacitor.plus, capacitor.minus)) * current / drive
+        force = abs(s.forces.between(capacitor.plus, capacitor.minus)) * current / s.drive
         more = f"{100 * share:g} % of {circuit.saturation:g} V, {words or 'dielectric not known'}"
         yield Finding(force, capacitor.name, more=more)
 
 
-def stiffness(circuit: Circuit, mu: float, grades: Mapping[str, float]) -> Iterator[Finding]:
+def stiffness(s: RuleSubject) -> Iterator[Finding]:
     """What the dead zone leaves, in units of K1: |nominal| and a standard deviation.
 
-    mu : the stop's stiffness over K1. grades : of each resistor as it is bought, spread evenly.
+    The resistors are spread evenly within the grades at which they are bought.
     """
+    circuit, mu, grades = s.circuit, s.design.model.mu, s.resistor_grades
     if not circuit.stops:
         return
     nominal = mu * leftover(circuit)
@@ -115,12 +116,12 @@ def stiffness(circuit: Circuit, mu: float, grades: Mapping[str, float]) -> Itera
     most = max(grades[name] for name in change)
     shares = {name: c * (grades[name] / most) for name, c in change.items()}
     deviation = float(np.sqrt(sum(c**2 for c in shares.values()))) * most / np.sqrt(3.0)
-    worst = max(shares, key=lambda name: abs(shares[name]))
     bought = " and ".join(f"{100 * g:g}" for g in sorted({grades[name] for name in change}))
     more = f"nominal {abs(nominal):.2g}, deviation {deviation:.2g} at {bought} % resistors"
-    yield Finding(float(abs(nominal) + deviation), f"{worst}, which has most of it", more=more)
+    yield Finding(float(abs(nominal) + deviation), _most(shares), more=more)
 
 
-def shown_volts(volts: float) -> str:
-    """Volts as people write them."""
-    return f"{1e3 * volts:.3g} mV"
+def _most(shares: Mapping[str, float]) -> str:
+    """Where most of a sum comes from."""
+    worst = max(shares, key=lambda name: abs(shares[name]))
+    return f"{worst}, which has most of it"

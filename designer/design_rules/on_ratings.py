@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from designer.catalog.design_rule import Finding
 from designer.catalog.entries import OpAmp
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode
-from designer.circuit.noise_gains import SectionStage, stages
+from designer.circuit.noise_gains import conductance, stages
 from designer.design_rules.operating_point import Operating, Peak
+from designer.design_rules.subject import RuleSubject
 from designer.synthesis.limits import bandwidth_limit, guaranteed
 from designer.synthesis.side_conditions import saturating
 
@@ -20,17 +21,14 @@ HEAVY, LIGHT = 2e3, 10e3
 """Loads that data sheets state the swing for [Ω]."""
 
 
-def swing(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
+def swing(s: RuleSubject) -> Iterator[Finding]:
     """Peaks of every output but those that reach their limits in contact."""
-    meant = saturating(circuit)
-    for section in circuit.sections:
-        if section.name in meant:
-            continue
-        peak = max(met.high[section.output], met.low[section.output], key=lambda p: p.value)
-        current = met.source[section.name].value
-        yield Finding(
-            peak.value, _at(section.name, peak), guaranteed_swing(opamp, circuit, current)
-        )
+    met, meant = s.operating, saturating(s.circuit)
+    for section in s.circuit.sections:
+        if section.name not in meant:
+            peak = max(met.high[section.output], met.low[section.output], key=lambda p: p.value)
+            limit = guaranteed_swing(s.opamp, s.circuit, met.source[section.name].value)
+            yield Finding(peak.value, _at(section.name, peak), limit)
 
 
 def guaranteed_swing(opamp: OpAmp, circuit: Circuit, current: float) -> float:
@@ -48,33 +46,32 @@ def guaranteed_swing(opamp: OpAmp, circuit: Circuit, current: float) -> float:
     return light + share * (heavy - light) + shift
 
 
-def load(circuit: Circuit) -> Iterator[Finding]:
+def load(s: RuleSubject) -> Iterator[Finding]:
     """Resistance on each output."""
-    for stage in stages(circuit):
+    for stage in stages(s.circuit):
         if stage.load < float("inf"):
             yield Finding(stage.load, stage.section.name)
 
 
-def output_current(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
+def output_current(s: RuleSubject) -> Iterator[Finding]:
     """Peak current of each output."""
-    limit = guaranteed(opamp.output_current)
-    for section in circuit.sections:
-        peak = met.source[section.name]
+    limit = guaranteed(s.opamp.output_current)
+    for section in s.circuit.sections:
+        peak = s.operating.source[section.name]
         yield Finding(peak.value, _at(section.name, peak), limit)
 
 
-def fault_current(circuit: Circuit, opamp: OpAmp) -> Iterator[Finding]:
+def fault_current(s: RuleSubject) -> Iterator[Finding]:
     """From the generator into each input with the supply off, every output and rail at 0 V.
 
     A pair of opposed diodes to ground at the node takes the current in the input's place; the two
     share it at worst, for both drop a diode's voltage.
     """
-    limit = INPUT if opamp.input_current is None else opamp.input_current.nominal
-    held = {GROUND, POSITIVE, NEGATIVE, *(s.output for s in circuit.sections)}
+    circuit, most = s.circuit, s.opamp.input_current
+    limit = INPUT if most is None else most.nominal
     for section in circuit.sections:
         node = section.inverting
-        siemens = _towards(circuit, circuit.generator.net, node, held)
-        current = GENERATOR * siemens
+        current = GENERATOR * conductance(circuit, circuit.generator.net, node)
         ways = {
             d.anode == node
             for d in circuit.fittings
@@ -86,43 +83,33 @@ def fault_current(circuit: Circuit, opamp: OpAmp) -> Iterator[Finding]:
         yield Finding(current, f"{section.name}, node {node}", limit, more)
 
 
-def _towards(circuit: Circuit, source: str, node: str, held: set[str]) -> float:
-    """Conductance [S] from the generator into a node at 0 V: straight, or through one more net."""
-    total = 0.0
-    for first in circuit.resistors:
-        if source not in first.nets:
-            continue
-        middle = first.b if first.a == source else first.a
-        if middle == node:
-            total += 1.0 / first.value
-        elif middle not in held:
-            second = [r for r in circuit.resistors if set(r.nets) == {middle, node}]
-            total += sum(1.0 / (first.value + r.value) for r in second)
-    return total
+def power(s: RuleSubject) -> Iterator[Finding]:
+    """Mean power of each resistor over its rating."""
+    return _power(s, s.operating)
 
 
-def power(ratings: Mapping[str, float], met: Operating) -> Iterator[Finding]:
-    """Mean power of each resistor over its rating [W], by name."""
-    for name, rating in ratings.items():
+def power_stuck(s: RuleSubject) -> Iterator[Finding]:
+    """The same with an op-amp stuck at a rail."""
+    return _power(s, s.stuck)
+
+
+def _power(s: RuleSubject, met: Operating) -> Iterator[Finding]:
+    for name, rating in s.watts.items():
         peak = met.power.get(name)
         if peak is not None:
             more = f"{1e3 * peak.value:.3g} mW of {1e3 * rating:.3g} mW"
             yield Finding(peak.value / rating, _at(name, peak), more=more)
 
 
-def capacitor_voltage(
-    circuit: Circuit,
-    ratings: Mapping[str, float],
-    met: Operating,
-    stuck: Operating,
-) -> Iterator[Finding]:
-    """Voltage of each capacitor over its rating [V], by name; those of the supply too."""
-    supply = {POSITIVE: circuit.supply, NEGATIVE: -circuit.supply, GROUND: 0.0}
-    across = {name: met.across[name] for name in met.across if name in ratings}
-    for name, peak in stuck.across.items():
+def capacitor_voltage(s: RuleSubject) -> Iterator[Finding]:
+    """Voltage of each capacitor over its rating; those of the supply too."""
+    ratings, met = s.volts, s.operating.across
+    supply = {POSITIVE: s.circuit.supply, NEGATIVE: -s.circuit.supply, GROUND: 0.0}
+    across = {name: met[name] for name in met if name in ratings}
+    for name, peak in s.stuck.across.items():
         if name in across and peak.value > across[name].value:
             across[name] = peak
-    for part in circuit.fittings:
+    for part in s.circuit.fittings:
         if part.name in ratings and set(part.nets) <= set(supply):
             volts = [supply[net] for net in part.nets]
             across[part.name] = Peak(abs(volts[0] - volts[1]), "")
@@ -131,36 +118,32 @@ def capacitor_voltage(
         yield Finding(peak.value / ratings[name], _at(name, peak), more=more)
 
 
-def common_mode(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
+def common_mode(s: RuleSubject) -> Iterator[Finding]:
     """Room of each input inside the range; its ends move with the rails."""
-    shift = circuit.supply - opamp.rated_supply
-    low = (opamp.common_mode.min or 0.0) - shift
-    high = (opamp.common_mode.max or 0.0) + shift
-    for section in circuit.sections:
+    shift = s.circuit.supply - s.opamp.rated_supply
+    low = (s.opamp.common_mode.min or 0.0) - shift
+    high = (s.opamp.common_mode.max or 0.0) + shift
+    for section in s.circuit.sections:
         for net in dict.fromkeys((section.inverting, section.noninverting)):
-            top, bottom = met.high[net], met.low[net]
+            top, bottom = s.operating.high[net], s.operating.low[net]
             yield Finding(high - top.value, _at(section.name, top))
             yield Finding(-bottom.value - low, _at(section.name, bottom))
 
 
-def slew(circuit: Circuit, opamp: OpAmp, met: Operating) -> Iterator[Finding]:
+def slew(s: RuleSubject) -> Iterator[Finding]:
     """Fastest change of each output over what is guaranteed."""
-    limit = guaranteed(opamp.slew)
-    for section in circuit.sections:
-        peak = met.slew[section.name]
+    limit = guaranteed(s.opamp.slew)
+    for section in s.circuit.sections:
+        peak = s.operating.slew[section.name]
         more = f"{peak.value / 1e6:.3g} V/µs of {limit / 1e6:.3g} V/µs"
         yield Finding(peak.value / limit, _at(section.name, peak), more=more)
 
 
-def gain_bandwidth(circuit: Circuit, opamp: OpAmp, frequency: float) -> Iterator[Finding]:
-    """Noise gain times the highest frequency that matters [Hz]."""
-
-    def found(stage: SectionStage) -> Finding:
-        more = f"up to {frequency:.4g} Hz"
-        name = stage.section.name
-        return Finding(stage.bandwidth(frequency), name, bandwidth_limit(opamp), more)
-
-    return (found(stage) for stage in stages(circuit))
+def gain_bandwidth(s: RuleSubject) -> Iterator[Finding]:
+    """Noise gain times the highest frequency that matters."""
+    more, limit = f"up to {s.fastest:.4g} Hz", bandwidth_limit(s.opamp)
+    for stage in stages(s.circuit):
+        yield Finding(stage.bandwidth(s.fastest), stage.section.name, limit, more)
 
 
 def _at(name: str, peak: Peak) -> str:

@@ -80,11 +80,11 @@ def stuck(circuit: Circuit, run: Run) -> Operating:
             board = _stuck(circuit, section.name, sign)
             name = f"{section.name} at the {rail} rail"
             there = replace(run, name=name, start=np.zeros(len(circuit.states)), periods=REST)
-            found = operating(Reduction(circuit, board), [there], {})
+            met = operating(Reduction(circuit, board), [there], {})
             for kind in ("high", "low", "slew", "across", "power", "source"):
-                _keep(getattr(out, kind), getattr(found, kind).items())
-            out.runs += found.runs
-            out.left_out |= found.left_out
+                _raise_peaks(getattr(out, kind), getattr(met, kind).items())
+            out.runs += met.runs
+            out.left_out |= met.left_out
     return out
 
 
@@ -101,22 +101,22 @@ def _add(out: Operating, circuit: Circuit, sampled: Sampled, run: str) -> None:
     nets = [*circuit.nets, GROUND]
     voltage = _values(sampled, lambda s: np.array([s.voltage[n] for n in nets]))
     at = {net: voltage[:, i] for i, net in enumerate(nets)}
-    _keep(out.high, ((n, Peak(float(v.max()), run)) for n, v in at.items()))
-    _keep(out.low, ((n, Peak(float(-v.min()), run)) for n, v in at.items()))
+    _raise_peaks(out.high, ((n, Peak(float(v.max()), run)) for n, v in at.items()))
+    _raise_peaks(out.low, ((n, Peak(float(-v.min()), run)) for n, v in at.items()))
     for r in circuit.resistors:
         volts = at[r.a] - at[r.b]
-        _keep(out.across, [(r.name, Peak(float(np.abs(volts).max()), run))])
+        _raise_peaks(out.across, [(r.name, Peak(float(np.abs(volts).max()), run))])
         mean = float(np.mean(volts[:-1] ** 2)) / r.value
-        _keep(out.power, [(r.name, Peak(mean, run))])
+        _raise_peaks(out.power, [(r.name, Peak(mean, run))])
     for c in circuit.capacitors:
         volts = at[c.plus] - at[c.minus]
-        _keep(out.across, [(c.name, Peak(float(np.abs(volts).max()), run))])
+        _raise_peaks(out.across, [(c.name, Peak(float(np.abs(volts).max()), run))])
     sections = circuit.sections
     current = _values(sampled, lambda s: np.array([s.output[a.name] for a in sections]))
     speed = _rates(sampled, lambda s: np.array([s.voltage[a.output] for a in sections]))
     for i, section in enumerate(sections):
-        _keep(out.source, [(section.name, Peak(float(np.abs(current[:, i]).max()), run))])
-        _keep(out.slew, [(section.name, Peak(float(np.abs(speed[:, i]).max()), run))])
+        _raise_peaks(out.source, [(section.name, Peak(float(np.abs(current[:, i]).max()), run))])
+        _raise_peaks(out.slew, [(section.name, Peak(float(np.abs(speed[:, i]).max()), run))])
 
 
 def _values(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
@@ -136,18 +136,18 @@ def _rates(sampled: Sampled, rows: Callable[[Solution], Array]) -> Array:
 def _by_mode(sampled: Sampled, rows: Callable[[Solution], Array], known: Array) -> Array:
     out: Array | None = None
     for i, key in enumerate(sampled.keys):
-        here = sampled.at == i
-        if not here.any():
+        inside = sampled.at == i
+        if not inside.any():
             continue
-        value = known[here] @ rows(sampled.reduction.solution(key)).T
+        value = known[inside] @ rows(sampled.reduction.solution(key)).T
         if out is None:
             out = np.empty((len(known), value.shape[1]))
-        out[here] = value
+        out[inside] = value
     assert out is not None
     return out
 
 
-def _keep(known: dict[str, Peak], found: Iterable[tuple[str, Peak]]) -> None:
-    for name, peak in found:
-        if name not in known or peak.value > known[name].value:
-            known[name] = peak
+def _raise_peaks(peaks: dict[str, Peak], values: Iterable[tuple[str, Peak]]) -> None:
+    for name, peak in values:
+        if name not in peaks or peak.value > peaks[name].value:
+            peaks[name] = peak

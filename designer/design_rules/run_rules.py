@@ -23,35 +23,29 @@ from designer.design_rules.subject import RuleSubject
 Look = Callable[[RuleSubject], Iterable[Finding]]
 
 LOOKS: dict[str, Look] = {
-    "feedback": lambda s: on_nets.feedback(s.circuit),
-    "drivers": lambda s: on_nets.drivers(s.components, s.circuit.generator.net),
-    "floating-input": lambda s: on_nets.floating_inputs(s.components, s.circuit.generator.net),
-    "single-pin": lambda s: on_nets.single_pins(s.components),
-    "references": lambda s: on_nets.duplicates(s.components),
-    "supply-pins": lambda s: on_nets.supply_pins(s.components, s.opamp.supply_pins),
-    "decoupling": lambda s: on_nets.decoupling(s.components),
-    "swing": lambda s: on_ratings.swing(s.circuit, s.opamp, s.operating),
-    "load": lambda s: on_ratings.load(s.circuit),
-    "output-current": lambda s: on_ratings.output_current(s.circuit, s.opamp, s.operating),
-    "fault-current": lambda s: on_ratings.fault_current(s.circuit, s.opamp),
-    "power": lambda s: on_ratings.power(s.watts, s.operating),
-    "power-stuck": lambda s: on_ratings.power(s.watts, s.stuck),
-    "capacitor-voltage": lambda s: on_ratings.capacitor_voltage(
-        s.circuit, s.volts, s.operating, s.stuck
-    ),
-    "common-mode": lambda s: on_ratings.common_mode(s.circuit, s.opamp, s.operating),
-    "slew": lambda s: on_ratings.slew(s.circuit, s.opamp, s.operating),
-    "gain-bandwidth": lambda s: on_ratings.gain_bandwidth(s.circuit, s.opamp, s.fastest),
-    "offset-force": lambda s: on_precision.offset(s.opamp, s.circuit, s.forces, s.drive),
-    "bias-force": lambda s: on_precision.bias(s.opamp, s.circuit, s.forces, s.drive),
-    "noise-force": lambda s: on_precision.noise(s.opamp, s.circuit, s.forces, s.drive, s.fastest),
-    "leakage-force": lambda s: on_precision.leakage(s.circuit, s.catalog, s.forces, s.drive),
-    "absorption-force": lambda s: on_precision.absorption(
-        s.circuit, s.dielectrics, s.forces, s.drive
-    ),
-    "dead-zone-stiffness": lambda s: on_precision.stiffness(
-        s.circuit, s.design.model.mu, s.resistor_grades
-    ),
+    "feedback": on_nets.feedback,
+    "drivers": on_nets.drivers,
+    "floating-input": on_nets.floating_inputs,
+    "single-pin": on_nets.single_pins,
+    "references": on_nets.duplicates,
+    "supply-pins": on_nets.supply_pins,
+    "decoupling": on_nets.decoupling,
+    "swing": on_ratings.swing,
+    "load": on_ratings.load,
+    "output-current": on_ratings.output_current,
+    "fault-current": on_ratings.fault_current,
+    "power": on_ratings.power,
+    "power-stuck": on_ratings.power_stuck,
+    "capacitor-voltage": on_ratings.capacitor_voltage,
+    "common-mode": on_ratings.common_mode,
+    "slew": on_ratings.slew,
+    "gain-bandwidth": on_ratings.gain_bandwidth,
+    "offset-force": on_precision.offset,
+    "bias-force": on_precision.bias,
+    "noise-force": on_precision.noise,
+    "leakage-force": on_precision.leakage,
+    "absorption-force": on_precision.absorption,
+    "dead-zone-stiffness": on_precision.stiffness,
 }
 """By id: yields what was found, one value for each place that the rule looks at."""
 

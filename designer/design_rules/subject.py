@@ -79,11 +79,7 @@ class RuleSubject:
         NotRun : there is no orbit to go by.
         """
         runs, left_out = self._runs
-        met = operating(self.reduction, runs, left_out)
-        if met.left_out:
-            name, why = next(iter(met.left_out.items()))
-            raise NotRun(f"no answer of the exact circuit at {name}: {why}")
-        return met
+        return _complete(operating(self.reduction, runs, left_out), "at")
 
     @cached_property
     def stuck(self) -> Operating:
@@ -91,11 +87,8 @@ class RuleSubject:
         runs, left_out = self._runs
         if not runs:
             raise NotRun(f"no orbit of the exact circuit: {left_out}")
-        met = stuck(self.circuit, max(runs, key=lambda run: abs(run.drive.amplitude)))
-        if met.left_out:
-            name, why = next(iter(met.left_out.items()))
-            raise NotRun(f"no answer of the exact circuit with {name}: {why}")
-        return met
+        largest = max(runs, key=lambda run: abs(run.drive.amplitude))
+        return _complete(stuck(self.circuit, largest), "with")
 
     @cached_property
     def forces(self) -> Forces:
@@ -139,8 +132,8 @@ class RuleSubject:
     @cached_property
     def dielectrics(self) -> dict[str, str]:
         """What each capacitor is made of, in words."""
-        found = (c for c in self.components if c.kind == "capacitor" and c.bought is not None)
-        return {c.parts[0]: c.bought.dielectric for c in found if c.bought is not None}
+        capacitors = (c for c in self.components if c.kind == "capacitor" and c.bought is not None)
+        return {c.parts[0]: c.bought.dielectric for c in capacitors if c.bought is not None}
 
     def _rated(self, kind: str, unit: str) -> dict[str, float]:
         out = {}
@@ -151,3 +144,10 @@ class RuleSubject:
                 if words.endswith(unit):
                     out[component.parts[0]] = parse_quantity(words, unit)
         return out
+
+
+def _complete(met: Operating, where: str) -> Operating:
+    """What was met, if every run has an answer; NotRun else."""
+    for name, why in met.left_out.items():
+        raise NotRun(f"no answer of the exact circuit {where} {name}: {why}")
+    return met

@@ -24,7 +24,7 @@ from designer.board.kicad_rules import board_rules
 from designer.catalog.catalog import load_catalog
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, RuleOutcome
 from designer.check.synthesis_result import Synthesis
-from designer.design_rules import junit as junit_xml, on_board as rule_board, run_rules
+from designer.design_rules import on_board as rule_board, rule_reports, run_rules
 from designer.design_rules.kicad_drc import kicad_version
 from designer.design_rules.subject import RuleSubject
 from designer.jobs.design_source import read_design
@@ -118,7 +118,7 @@ def rules(
     with place.working(stages):
         place.write(NAME, dumps(answer))
     if report is not None:
-        text = junit_xml.report(made.modelfile.title, checks.outcomes)
+        text = rule_reports.junit(made.modelfile.title, checks.outcomes)
         with atomic_write.appearing(report, "--junit") as partial:
             partial.write_text(text, encoding="utf-8")
     return RulesResult(answer, checks.passed)

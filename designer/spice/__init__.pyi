@@ -16,6 +16,8 @@ from .convergence_aids import (
 )
 from .deck import (
     SolverSettings as SolverSettings,
+    diode_cards as diode_cards,
+    diode_names as diode_names,
 )
 from .equation_check import (
     EquationCheck as EquationCheck,
@@ -33,6 +35,7 @@ from .opamp_check import (
 from .opamp_model import (
     RUNGS as RUNGS,
     Rung as Rung,
+    literal as literal,
 )
 from .pool import (
     SpicePool as SpicePool,

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.circuit.design import Design
-from designer.circuit.netlist import Circuit, Excitation, nominal_board
+from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.noise_gains import conductance
 from designer.circuit.reduction import Reduction
 from designer.model.find_responses import ModelResponse, peaks
 from designer.model.mechanics import SecondOrderSystem
@@ -428,25 +429,9 @@ def _wanted_slope(design: Design, model: SecondOrderSystem) -> float:
     circuit, scales, stop = design.circuit, design.errors.scales, model.clearances[0]
     velocity = 2 * stop.mass + 1
     capacitor = next(c for c in circuit.capacitors if c.name == circuit.states[velocity])
-    conductance = _into(circuit, capacitor.minus)
     rate = stop.stiffness / model.mass[stop.mass] / scales.seconds
     per_volt = scales.volts[velocity] / scales.volts[velocity - 1]
-    return float(rate * per_volt * capacitor.value / conductance)
-
-
-def _into(circuit: Circuit, node: str) -> float:
-    """Conductance [S] from the nonlinear stage into a summing node: R50, of one part or two."""
-    total = 0.0
-    for first in circuit.resistors:
-        if STAGE not in (first.a, first.b):
-            continue
-        inner = first.b if first.a == STAGE else first.a
-        if inner == node:
-            total += 1.0 / first.value
-        for second in circuit.resistors:
-            if second is not first and {second.a, second.b} == {inner, node}:
-                total += 1.0 / (first.value + second.value)
-    return total
+    return float(rate * per_volt * capacitor.value / conductance(circuit, STAGE, capacitor.minus))
 
 
 def _place(contact: int) -> str:

@@ -12,7 +12,7 @@ from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override,
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fields import Figure
 from designer.circuit.dead_zone_parts import Kind, Sides
-from designer.circuit.netlist import GROUND, Capacitor, Diode, nominal_board
+from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
 from designer.design_rules.force_at_clearance import Statics, leftover, thermal
@@ -273,10 +273,17 @@ def test_johnson_noise_of_a_kilohm() -> None:
     assert 1e3 * thermal(1e3) == pytest.approx(4.0577e-9, rel=1e-3)
 
 
+def at(circuit: Circuit, **figures: object) -> RuleSubject:
+    """A circuit with the drive, the frequency or the dielectrics that a test asks for."""
+    subject = with_circuit(circuit)
+    vars(subject).update(figures)  # in the place of what is computed when first asked for
+    return subject
+
+
 def test_noise_is_that_of_each_source_by_itself() -> None:
-    circuit, opamp = base().circuit, base().opamp
+    circuit = base().circuit
     forces = Statics(circuit).forces
-    (found,) = on_precision.noise(opamp, circuit, forces, 1.0, 1000.1)
+    (found,) = on_precision.noise(at(circuit, drive=1.0, fastest=1000.1))
     power = sum((forces.offset[s.name] * 18e-9) ** 2 for s in circuit.sections)
     for r in circuit.resistors:
         force = forces.current.get(r.a, 0.0) - forces.current.get(r.b, 0.0)
@@ -287,21 +294,22 @@ def test_noise_is_that_of_each_source_by_itself() -> None:
 def test_flicker_noise_counts_from_a_tenth_of_a_hertz() -> None:
     circuit, opamp = base().circuit, base().opamp
     forces = Statics(circuit).forces
-    (plain,) = on_precision.noise(opamp, circuit, forces, 1.0, 1000.0)
+    (plain,) = on_precision.noise(at(circuit, drive=1.0, fastest=1000.0))
     corner = replace(opamp, noise_corner=Figure(None, 500.0, None, "a test"))
-    (found,) = on_precision.noise(corner, circuit, forces, 1.0, 1000.0)
+    noisy = at(replace(circuit, figures=corner), drive=1.0, fastest=1000.0)
+    (found,) = on_precision.noise(noisy)
     amplifiers = sum((forces.offset[s.name] * 18e-9) ** 2 for s in circuit.sections)
     added = amplifiers * 500.0 * np.log(1e4)
     assert found.value**2 - plain.value**2 == pytest.approx(added, rel=1e-9)
 
 
 def test_offsets_add_as_squares_and_bias_currents_as_they_are() -> None:
-    circuit, opamp = base().circuit, base().opamp
+    circuit = base().circuit
     forces = Statics(circuit).forces
-    (offset,) = on_precision.offset(opamp, circuit, forces, 2.0)
+    (offset,) = on_precision.offset(at(circuit, drive=2.0))
     expected = np.sqrt(sum((10e-3 * forces.offset[s.name]) ** 2 for s in circuit.sections)) / 2.0
     assert offset.value == pytest.approx(expected)
-    (bias,) = on_precision.bias(opamp, circuit, forces, 2.0)
+    (bias,) = on_precision.bias(at(circuit, drive=2.0))
     total = sum(abs(forces.current[s.inverting]) for s in circuit.sections)
     assert bias.value == pytest.approx(200e-12 * total / 2.0)
 
@@ -312,9 +320,9 @@ def test_offsets_add_as_squares_and_bias_currents_as_they_are() -> None:
 )
 def test_absorption_by_dielectric(words: str, share: float) -> None:
     circuit = base().circuit
-    forces = Statics(circuit).forces
     made = {c.name: words for c in circuit.capacitors}
-    found = {f.where: f.value for f in on_precision.absorption(circuit, made, forces, 1.0)}
+    subject = at(circuit, dielectrics=made, drive=1.0)
+    found = {f.where: f.value for f in on_precision.absorption(subject)}
     c2 = circuit.values["C2"]
     expected = share * c2 * 13.0 * circuit.values["R6"]
     assert found["C2"] == pytest.approx(expected, rel=1e-3)
@@ -375,5 +383,5 @@ def test_a_value_that_is_no_number_never_passes() -> None:
 
 def test_a_net_s_drivers_are_counted_with_the_rails() -> None:
     short = rule_cases.rewired({("U1", "1"): "vcc"})
-    found = list(on_nets.drivers(short.components, "vg"))
+    found = list(on_nets.drivers(short))
     assert max(found, key=lambda f: f.value).where == "vcc"

@@ -27,7 +27,7 @@ from designer.catalog.design_rule import (
 )
 from designer.catalog.design_rules import BY_ID, RULES
 from designer.cli import entry
-from designer.design_rules import junit, markdown, run_rules
+from designer.design_rules import rule_reports, run_rules
 from designer.jobs import rules_job
 from designer.jobs.design_source import design_inputs
 from designer.jobs.json_answers import synthesis_json
@@ -109,8 +109,8 @@ def test_every_rule_says_what_it_is(rule: Any) -> None:
 
 def test_the_documentation_holds_the_table_of_the_code() -> None:
     text = DOCS.read_text(encoding="utf-8")
-    assert markdown.table("circuit") in text
-    assert markdown.table("board") in text
+    assert rule_reports.table("circuit") in text
+    assert rule_reports.table("board") in text
 
 
 # ---------------------------------------------------------------------------------------------
@@ -304,7 +304,7 @@ def outcomes(reason: str) -> tuple[RuleOutcome, ...]:
 
 @given(text=st.text())
 def test_a_junit_report_holds_any_text(text: str) -> None:
-    root = ElementTree.fromstring(junit.report(text, outcomes(text)).encode("utf-8"))
+    root = ElementTree.fromstring(rule_reports.junit(text, outcomes(text)).encode("utf-8"))
     (suite,) = root
     assert (suite.get("tests"), suite.get("failures"), suite.get("skipped")) == ("3", "1", "1")
     first, second, third = suite
@@ -316,7 +316,7 @@ def test_a_junit_report_holds_any_text(text: str) -> None:
 
 
 def test_a_junit_report_says_what_was_found() -> None:
-    root = ElementTree.fromstring(junit.report("<&>", outcomes("U1A")))
+    root = ElementTree.fromstring(rule_reports.junit("<&>", outcomes("U1A")))
     assert root[0].get("name") == "design rules: <&>"
     failure = root[0][0][0]
     assert failure.get("message") == "found 13V at U1A; at most 12V"
