@@ -1,7 +1,7 @@
 """Every design rule: what it limits, by how much, after whom, and what helps.
 
-The functions that look at a design stand in ``rule_nets``, ``rule_ratings``, ``rule_precision`` and
-``rule_board``, by the ids of this list. docs/rules.md holds the same list as a table.
+The functions that look at a design stand in the package ``design_rules``, by the ids of this list.
+docs/rules.md holds the same list as a table.
 """
 
 from __future__ import annotations

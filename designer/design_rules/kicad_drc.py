@@ -2,7 +2,7 @@
 
 Everything happens on copies in a scratch folder, without the board's project: its severities and
 exclusions hide nothing, and its net classes are not needed. Two checks are made. One of a board
-that breaks every rule (``board_specimen``): what KiCad does not report there, it does not
+that breaks every rule (``drc_specimen``): what KiCad does not report there, it does not
 understand, be it a rule of ours or one of its own. One of the board itself with a track besides
 that breaks a rule of its own: unless that is reported, KiCad has dropped the rules, and nothing it
 says of them counts.
