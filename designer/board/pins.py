@@ -103,8 +103,8 @@ def pins(part: Fitting, circuit: Circuit, catalog: Catalog) -> tuple[Pin, ...]:
         entry = catalog.diode(part.model.name)
         return _named(entry.pins, {"cathode": part.cathode, "anode": part.anode})
     if isinstance(part, Reference):
-        entry = catalog.reference(part.model)
-        return _named(entry.pins, {"cathode": part.cathode, "anode": part.anode})
+        reference = catalog.reference(part.model)
+        return _named(reference.pins, {"cathode": part.cathode, "anode": part.anode})
     if isinstance(part, Connector):
         numbered = enumerate(part.ways, start=1)
         return tuple(Pin(str(i), str(i), net) for i, net in numbered)

@@ -226,7 +226,7 @@ class _Page:
 
     def net_name(self, x: float, y: float, name: str, side: Literal["left", "right"]) -> None:
         """A net's name on this side of a point."""
-        towards = "right" if side == "left" else "left"
+        towards: Align = "right" if side == "left" else "left"
         self.drawing += (
             elm.Label()
             .theta(0)
