@@ -92,7 +92,9 @@ from .guarded_reading import (
     reading as reading,
 )
 from .jit import (
+    callee as callee,
     compiled as compiled,
+    inlined as inlined,
 )
 from .jit_notice import (
     announced as announced,

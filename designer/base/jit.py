@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 import platformdirs
+from numba.core.types.misc import unliteral
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -62,15 +63,44 @@ if CACHE is not None:
     numba.config.CACHE_DIR = str(CACHE)
 
 
-def compiled(function: Function) -> Function:
-    """Compile with numba: no GIL; stored in ``CACHE``, or for this process only where there is
-    none.
+OPTIONS: dict[str, Any] = {
+    "nogil": True,
+    "fastmath": {"contract", "nsz", "arcp"},
+    "error_model": "numpy",
+}
+"""Of fast-math only what keeps infinities and NaN."""
 
-    Of fast-math only what keeps infinities and NaN.
+
+def compiled(function: Function) -> Function:
+    """Compile with numba a function that Python calls.
+
+    Stored in ``CACHE`` with all that it calls, or for this process only where there is none.
     """
-    options: dict[str, Any] = {
-        "nogil": True,
-        "fastmath": {"contract", "nsz", "arcp"},
-        "error_model": "numpy",
-    }
-    return numba.njit(cache=CACHE is not None, **options)(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=CACHE is not None, **OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def inlined(function: Function) -> Function:
+    """Compile with numba a function that is written into its compiled callers.
+
+    For what calls the flow and is called once: with ``callee`` the flow would be optimised again in
+    each layer above it.
+    """
+    return numba.njit(inline="always", **OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def callee(function: Function) -> Function:
+    """Compile with numba a function that only compiled functions call.
+
+    It costs less time than ``compiled``: nothing is built for a call from Python, nothing is stored
+    for it alone, and it is compiled for the types of its arguments, not for each literal number.
+    """
+    options = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    dispatcher = numba.njit(**options)(function)
+    template = dispatcher.get_call_template
+
+    def of_types(arguments: Iterable[Any], by_name: dict[str, Any]) -> Any:
+        plain = tuple(unliteral(argument) for argument in arguments)
+        return template(plain, {name: unliteral(t) for name, t in by_name.items()})
+
+    dispatcher.get_call_template = of_types
+    return dispatcher  # type: ignore[no-any-return]

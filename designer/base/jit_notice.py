@@ -20,10 +20,12 @@ CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
     "kernel_linear": "search for parts",
     "kernel_nodal": "equations of boards",
+    "kernel_boards": "circuits",
     "kernel_four_state": "circuits",
+    "kernel_mode_tables": "circuits",
     "kernel_sweep": "sweeps",
 }
-"""What a kernel's module is for; all others are the ``MOTION``."""
+"""What a kernel's module is for; all others are for ``MOTION``."""
 MOTION = "motion between the stops"
 TEXT = (
     "compiling the exact engine's part for {part} "
@@ -37,27 +39,29 @@ def announced(say: Callable[[str], None]) -> Iterator[None]:
     from numba.core import event
 
     lock = threading.Lock()
-    said: set[str] = set()
+    announced: set[str] = set()
+    depth = threading.local()
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
+            depth.now = getattr(depth, "now", 0) + 1
             name = str(event.data["dispatcher"].py_func.__module__)
             part = PARTS.get(name.rpartition(".")[2], MOTION)
-            with lock:
-                if part in said or not name.startswith("designer."):
+            with lock:  # a callee belongs to the part that calls it
+                if depth.now > 1 or part in announced or not name.startswith("designer."):
                     return
-                said.add(part)
+                announced.add(part)
             say(TEXT.format(part=part))
 
         def on_end(self, event: Any) -> None:
-            return None
+            depth.now -= 1
 
-    with _heard(), event.install_listener("numba:compile", Listener()):
+    with _interruptible(), event.install_listener("numba:compile", Listener()):
         yield
 
 
 @contextmanager
-def _heard() -> Iterator[None]:
+def _interruptible() -> Iterator[None]:
     """Ctrl-C is put off for a moment while the compiler calls back through C, where it is lost."""
     usual = signal.getsignal(signal.SIGINT)
     main = threading.current_thread() is threading.main_thread()

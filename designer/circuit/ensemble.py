@@ -1,9 +1,8 @@
 """The attractors of many boards of one circuit: what every study of yields is made of.
 
 Boards are reduced together, and the usual way to an answer (settle, shoot, check) is compiled
-(``dynamics.kernel_four_state``). What is unusual on that way goes to
-``dynamics.attractors.settle``, which it must equal: a period above ``kernel_four_state.LONGEST``,
-none after 140 drive periods, a mode that is no working one.
+(``dynamics.kernel_boards``). What is unusual on that way goes to ``dynamics.attractors.settle``,
+which it must equal.
 """
 
 from __future__ import annotations
@@ -13,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.base.arrays import Array, Mask
+from designer.base.arrays import Array, Index, Mask
 from designer.base.threads import heed, parallel
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.reduction import FloatingCircuit, Reduction
-from designer.dynamics import attractors, kernel_four_state as kernel, working_modes
+from designer.dynamics import attractors, kernel_boards as kernel, kernel_mode_tables, working_modes
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult
+from designer.dynamics.kernel_orbit import CHAOS, FOUND
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus, failed
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 
@@ -27,17 +27,8 @@ CHUNK = 32
 """Questions that one thread takes at a time; no answer depends on it."""
 TOGETHER = 125
 """Boards that one thread reduces at a time: their matrices stay in the cache. Nor on this."""
-FAINT = 5.0 * attractors.CHAOS
+FAINT = 5.0 * CHAOS
 """Growth of a tangent vector per drive period below which chaos is not plain."""
-RULES = np.array(
-    [
-        MAX_EVENTS,
-        attractors.WORTH,
-        attractors.NEAR,
-        attractors.CLOSING,
-        attractors.STROBE_TOLERANCE,
-    ]
-)
 
 
 @dataclass(frozen=True)
@@ -61,7 +52,7 @@ class Ensemble:
         self.boards = boards
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
-        self._modes: kernel.Modes | None = None
+        self._modes: kernel_mode_tables.Modes | None = None
         self._good = np.zeros(len(boards), dtype=np.bool_)
         self._keys = working.working_keys(boards.circuit)
         if fast:
@@ -193,7 +184,7 @@ class Ensemble:
         return SettledBoard(orbit, trace)
 
     def _compiled(
-        self, which: kernel.Int, drives: Sequence[Drive], starts: Array
+        self, which: Index, drives: Sequence[Drive], starts: Array
     ) -> list[SettledBoard | None]:
         """None for each question that the compiled way leaves open."""
         out: list[SettledBoard | None] = [None] * len(which)
@@ -218,12 +209,12 @@ class Ensemble:
             which[asked],
             given[asked],
             starts[asked],
-            RULES,
-            working_modes.WAYS,
+            MAX_EVENTS,
+            working_modes.ANCHORS,
             j,
             answers,
         )
-        found = np.flatnonzero(answers.whole[:, 0] == kernel.FOUND)
+        found = np.flatnonzero(answers.whole[:, 0] == FOUND)
         multipliers = np.linalg.eigvals(answers.real[found, 4:20].reshape(-1, 4, 4)).astype(complex)
         for e, multiplier in zip(found, multipliers, strict=True):
             period = drives[int(asked[e])].period
@@ -272,7 +263,7 @@ def _faint(orbit: Orbit, drive: Drive) -> bool:
     return orbit.status is OrbitStatus.NOT_SETTLED
 
 
-def _reduced(boards: Boards, jobs: int) -> tuple[kernel.Modes | None, Mask]:
+def _reduced(boards: Boards, jobs: int) -> tuple[kernel_mode_tables.Modes | None, Mask]:
     """``working_modes.of_boards`` by ``jobs`` threads."""
     count = len(boards)
     if count <= TOGETHER:

@@ -12,7 +12,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import Exit, NodalEquations
-from designer.dynamics import kernel_four_state as kernel
+from designer.dynamics import kernel_mode_tables as kernel
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.working_modes import STATES, empty_modes
 

@@ -1,8 +1,10 @@
 from . import (
     attractors as attractors,
     harmonics as harmonics,
+    kernel_boards as kernel_boards,
     kernel_four_state as kernel_four_state,
     kernel_modal as kernel_modal,
+    kernel_mode_tables as kernel_mode_tables,
     modal_tables as modal_tables,
     step_budget as step_budget,
     working_modes as working_modes,
@@ -31,18 +33,29 @@ from .flow import (
     FlowResult as FlowResult,
     FlowStatus as FlowStatus,
 )
-from .kernel_four_state import (
+from .kernel_algebra import (
+    factor as factor,
+    substitute as substitute,
+)
+from .kernel_boards import (
+    LONGEST as LONGEST,
     POINTS as POINTS,
 )
-from .kernel_modal import (
+from .kernel_crossing import (
+    BLOCK_STEP as BLOCK_STEP,
     LAST as LAST,
     NODES as NODES,
     PARTS as PARTS,
     TERMS as TERMS,
+)
+from .kernel_modal import (
     ModalTables as ModalTables,
 )
+from .kernel_orbit import (
+    CHAOS as CHAOS,
+    FOUND as FOUND,
+)
 from .modal_tables import (
-    STEP as STEP,
     WORST_RESONANCE as WORST_RESONANCE,
     Oscillators as Oscillators,
 )

@@ -19,23 +19,20 @@ from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics import step_budget
 from designer.dynamics.flow import Flow, FlowResult, FlowStatus
+from designer.dynamics.kernel_orbit import (
+    CHAOS,
+    CLOSING,
+    NEAR,
+    STROBE_TOLERANCE as STROBE_TOLERANCE,
+    WORTH,
+)
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.step_budget import Budget
 
 STAGES = (20, 20, 100, 660, 3200)
-STROBE_TOLERANCE = 1e-8
-"""Of the peak of each state (docs/definitions.md)."""
 ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
-WORTH = 1e-2
-"""Of the peak: how nearly a strobe must repeat to be worth polishing."""
-NEAR = 0.05
-"""Of the peak: how far a polished orbit may lie from where settling had arrived."""
-CLOSING = 400
-"""Most periods that are spent on seeing the settling trajectory close in on a polished orbit."""
-CHAOS = 0.02
-"""Growth of a tangent vector per drive period that is taken for chaos after 800 periods."""
 
 
 def settle(

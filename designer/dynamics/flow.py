@@ -9,7 +9,7 @@ a circuit that keeps to its working modes takes that of ``dynamics.kernel_four_s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -19,16 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.threads import heed
 from designer.dynamics import (
     kernel_four_state,
     kernel_general as kernel,
     kernel_modal,
+    kernel_orbit,
     modal_tables,
     working_modes,
 )
+from designer.dynamics.kernel_four_state import RunTrail
+from designer.dynamics.kernel_general import Log
+from designer.dynamics.kernel_modal import ModalTables
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
 
@@ -61,9 +65,9 @@ class Impacts:
 
     time: Array
     """(k,) times of the entries."""
-    clearance: kernel.Int
+    clearance: Index
     """(k,) ints, index of the clearance."""
-    side: kernel.Int
+    side: Index
     """(k,) ints, 1 at the upper and -1 at the lower stop."""
     state: Array
     """(k, n) states at the entries."""
@@ -77,7 +81,7 @@ class FlowResult:
     """How the run ended."""
     strobes: Array
     """(periods · points + 1, n) states at the start and after each stretch."""
-    counts: kernel.Int
+    counts: Index
     """(periods · points, clearances, 2) impacts on the lower and the upper stop."""
     mode: ModeKey
     """Key of the mode that was reached."""
@@ -148,13 +152,11 @@ class Flow:
         points: int = 1,
         stretches: int | None = None,
         max_events: int = MAX_EVENTS,
-        room: int | None = None,
     ) -> FlowResult:
         """Start at a strobe (drive phase 0) in state x (n,) and run for ``periods`` periods.
 
         points : strobes per period; more than one gives a dense trace, as exact as the strobe.
         stretches : stop after so many of the ``periods · points`` stretches.
-        room : impacts that the log holds; by itself it grows to what is met.
         tangent : (n, k) vectors to be carried by the linearised flow.
         measure : also log impacts and refine extremes, at about three times the cost.
 
@@ -165,40 +167,48 @@ class Flow:
         """
         x = np.array(x, dtype=float)
         _check(x, self.system.size, periods, points)
-        n, c = self.system.size, len(self.system.clearances)
         key = self.system.mode_at(x, self.drive.offset, mode)
         stretches = periods * points if stretches is None else stretches
+        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float, order="C")
         if self._modal is not None and points == 1 and not measure and stretches == periods:
-            return self._run_modal(self._modal, x, periods, key, tangent, max_events)
+            return self._run_modal(self._modal, x, periods, key, phi, max_events)
+        room = 8 + 16 * periods if measure else 0
         if self._working is not None and key in self.system.working:
-            found = self._run_working(
-                self._working, x, stretches, points, key, tangent, max_events, room, measure=measure
+            result = self._run_working(
+                self._working,
+                x,
+                stretches,
+                points,
+                key,
+                phi.copy(),
+                max_events,
+                room,
+                measure=measure,
             )
-            if found is not None:
-                return found
-        z = np.concatenate([x, [0.0, 1.0, 1.0]])
+            if result is not None:
+                return result
+        return self._run_general(x, stretches, points, key, phi, max_events, room, measure=measure)
+
+    def _run_general(
+        self,
+        x: Array,
+        stretches: int,
+        points: int,
+        key: ModeKey,
+        phi: Array,
+        max_events: int,
+        room: int,
+        *,
+        measure: bool,
+    ) -> FlowResult:
+        """The same by the general kernel, which builds modes as it meets them."""
+        z, before = np.concatenate([x, [0.0, 1.0, 1.0]]), phi.copy()
         clock, budget = np.zeros(3), self._budget or Budget()
         cursor = np.array([0, self._number(key), 0, 0], dtype=np.int64)
-        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
-        phases = 2.0 * np.pi * np.arange(points) / points
-        anchor = np.stack([np.sin(phases), np.cos(phases)], axis=1)
-        capacity = (8 + 16 * periods if room is None else room) if measure else 0
-        log = kernel.Log(
-            strobes=np.empty((stretches + 1, n)),
-            impacts=np.zeros((stretches, c, 2), dtype=np.int64),
-            when=np.empty(capacity),
-            at=np.empty((capacity, n)),
-            stop=np.zeros((capacity, 2), dtype=np.int64),
-            extremes=np.tile([np.inf, -np.inf], (n, 1)),
-            graze=np.array([np.inf, np.inf, 0.0]),
-            clipped=np.zeros(1),
-        )
-        log.strobes[0] = x
-        depth = np.full(c, 0.0)
-        for j, side in enumerate(self.system.mode(key).sides):
-            # A contact that was already running has an unknown deepest point so far.
-            depth[j] = np.inf if side else 0.0
-        code = kernel.DONE
+        log = self._log(x, stretches, room)
+        # A contact that was already running has an unknown deepest point so far.
+        depth = np.array([np.inf if side else 0.0 for side in self.system.mode(key).sides])
+        code = kernel_orbit.DONE
         while cursor[0] < stretches:
             heed()
             given = clock[2] = max(min(float(SLICE), budget.left), 0.0)
@@ -208,7 +218,7 @@ class Flow:
                 clock,
                 cursor,
                 self.drive.period / points,
-                anchor,
+                working_modes.anchors(points),
                 phi,
                 depth,
                 max_events,
@@ -217,160 +227,120 @@ class Flow:
                 log,
             )
             budget.take(given - float(clock[2]))
-            if code == kernel.UNKNOWN_MODE:
+            if code == kernel_orbit.UNKNOWN_MODE:
                 self._link(int(cursor[1]), int(cursor[3]))
-            elif code == kernel.PAUSED and budget.left > 0.0:
+            elif code == kernel_orbit.PAUSED and budget.left > 0.0:
                 continue
-            elif code != kernel.DONE:
+            elif code != kernel_orbit.DONE:
                 break
-        if measure and clock[1] > capacity:  # more impacts than room: again, with room for all
-            return self.run(
-                x,
-                periods,
-                mode=mode,
-                tangent=tangent,
-                measure=True,
-                points=points,
-                stretches=stretches,
-                max_events=max_events,
-                room=int(clock[1]),
+        met = int(clock[1])
+        if measure and met > room:  # more impacts than room: again, with room for all
+            return self._run_general(
+                x, stretches, points, key, before, max_events, met, measure=True
             )
-        status = _STATUS[code]
-        done, k = int(cursor[0]), int(clock[1])
-        return FlowResult(
-            status=status,
-            strobes=log.strobes[: done + 1],
-            counts=log.impacts[:done],
-            mode=self._keys[int(cursor[1])],
-            tangent=None if tangent is None else phi,
-            impacts=Impacts(log.when[:k], log.stop[:k, 0], log.stop[:k, 1], log.at[:k]),
-            extremes=log.extremes,
-            penetration=float(log.graze[0]),
-            miss=float(log.graze[1]),
-            tangencies=int(log.graze[2]),
-            clipped_time=float(log.clipped[0]),
-        )
+        return _result(code, log, int(cursor[0]), met, self._keys[int(cursor[1])], phi)
 
     def _run_modal(
         self,
-        tables: kernel_modal.ModalTables,
+        tables: ModalTables,
         x: Array,
         periods: int,
         key: ModeKey,
-        tangent: Array | None,
+        phi: Array,
         max_events: int,
     ) -> FlowResult:
         """The same by the fast path: no impact log, no extremes."""
         keys = modal_tables.keys(self.system)
         cursor = np.array([keys.index(key), 0], dtype=np.int64)
-        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
-        strobes = np.empty((periods + 1, 4))
-        strobes[0] = x
-        counts = np.zeros((periods, 2), dtype=np.int64)
-        done, code = 0, kernel_modal.DONE
-        chunk, budget = self._chunk(), self._budget or Budget()
-        while done < periods and code == kernel_modal.DONE:
-            heed()
-            if budget.left <= 0.0:
-                code = kernel.PAUSED
-                break
-            last = min(done + chunk, periods)
-            code = kernel_modal.advance(
-                tables,
-                strobes[done].copy(),
-                cursor,
-                self.drive.period,
-                phi,
-                max_events,
-                strobes[done : last + 1],
-                counts[done:last],
+        log = self._log(x, periods, 0)
+
+        def advance(part: slice, start: Array) -> int:
+            strobes, counts = log.strobes[part.start : part.stop + 1], log.impacts[part, 0]
+            return kernel_modal.advance(
+                tables, start, cursor, self.drive.period, phi, max_events, strobes, counts
             )
-            self._charge(budget, counts[done : done + int(cursor[1])])
-            done += int(cursor[1])
-        nothing = np.zeros(0)
-        return FlowResult(
-            status=_STATUS[code],
-            strobes=strobes[: done + 1],
-            counts=counts[:done, None, :],
-            mode=keys[int(cursor[0])],
-            tangent=None if tangent is None else phi,
-            impacts=Impacts(nothing, counts[:0, 0], counts[:0, 0], np.zeros((0, 4))),
-            extremes=np.tile([np.inf, -np.inf], (4, 1)),
-            penetration=np.inf,
-            miss=np.inf,
-            tangencies=0,
-            clipped_time=0.0,
-        )
+
+        code, done = self._in_chunks(advance, log, cursor, self._chunk(), 1)
+        return _result(code, log, done, 0, keys[int(cursor[0])], phi)
 
     def _run_working(
         self,
-        tables: working_modes.DrivenTables,
+        tables: tuple[Array, Index],
         x: Array,
         stretches: int,
         points: int,
         key: ModeKey,
-        tangent: Array | None,
+        phi: Array,
         max_events: int,
-        room: int | None,
+        room: int,
         *,
         measure: bool,
     ) -> FlowResult | None:
         """The same by the fast path of circuits; None where the run leaves the working modes."""
         keys = self.system.working
         cursor = np.array([keys.index(key), 0, measure], dtype=np.int64)
-        phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float)
-        strobes = np.empty((stretches + 1, 4))
-        strobes[0] = x
-        counts = np.zeros((stretches, 2), dtype=np.int64)
-        capacity = (8 + 16 * stretches // points if room is None else room) if measure else 0
-        trail = working_modes.trail(capacity)
+        log, met = self._log(x, stretches, room), np.zeros(1, dtype=np.int64)
+        trail = RunTrail(log.extremes, log.graze, log.when, log.at, log.stop[:, 1].copy(), met)
         anchor = working_modes.anchors(points)
         drive = np.array([self.drive.omega, self.drive.period, max_events])
-        done, code = 0, kernel_four_state.DONE
+
+        def advance(part: slice, start: Array) -> int:
+            strobes, counts = log.strobes[part.start : part.stop + 1], log.impacts[part, 0]
+            return kernel_four_state.advance(
+                *tables, start, cursor, drive, anchor, phi, strobes, counts, trail
+            )
+
         chunk = stretches if measure else self._chunk() * points
-        budget = self._budget or Budget()
-        while done < stretches and code == kernel_four_state.DONE:
+        before = phi.copy()
+        code, done = self._in_chunks(advance, log, cursor, chunk, points)
+        if code == kernel_orbit.LEFT:
+            return None
+        if met[0] > room and measure:  # more impacts than room: again, with room for all
+            return self._run_working(
+                tables, x, stretches, points, key, before, max_events, int(met[0]), measure=True
+            )
+        log.stop[:, 1] = trail.stop
+        if not measure:
+            log.graze[[0, 2]] = np.inf, 0.0
+        return _result(code, log, done, int(met[0]), keys[int(cursor[0])], phi)
+
+    def _log(self, x: Array, stretches: int, room: int) -> Log:
+        """Room for what a run writes; the fast paths write a part of it."""
+        n, c = self.system.size, len(self.system.clearances)
+        log = Log(
+            strobes=np.empty((stretches + 1, n)),
+            impacts=np.zeros((stretches, c, 2), dtype=np.int64),
+            when=np.empty(room),
+            at=np.empty((room, n)),
+            stop=np.zeros((room, 2), dtype=np.int64),
+            extremes=np.tile([np.inf, -np.inf], (n, 1)),
+            graze=np.array([np.inf, np.inf, 0.0]),
+            clipped=np.zeros(1),
+        )
+        log.strobes[0] = x
+        return log
+
+    def _in_chunks(
+        self,
+        advance: Callable[[slice, Array], int],
+        log: Log,
+        cursor: Index,
+        chunk: int,
+        points: int,
+    ) -> tuple[int, int]:
+        """Run a fast path to the end of the log; its code, and the stretches done."""
+        budget, done, code = self._budget or Budget(), 0, kernel_orbit.DONE
+        while done < len(log.impacts) and code == kernel_orbit.DONE:
             heed()
             if budget.left <= 0.0:
-                code = kernel.PAUSED
+                return kernel_orbit.PAUSED, done
+            part = slice(done, min(done + chunk, len(log.impacts)))
+            code = advance(part, log.strobes[done].copy())
+            if code == kernel_orbit.LEFT:
                 break
-            last = min(done + chunk, stretches)
-            code = kernel_four_state.advance(
-                tables.data,
-                tables.ints,
-                strobes[done].copy(),
-                cursor,
-                drive,
-                anchor,
-                phi,
-                strobes[done : last + 1],
-                counts[done:last],
-                trail,
-            )
-            if code == kernel_four_state.LEFT:
-                return None
-            self._charge(budget, counts[done : done + int(cursor[1])], points)
+            self._charge(budget, log.impacts[done : done + int(cursor[1]), 0], points)
             done += int(cursor[1])
-        met = int(trail.met[0])
-        if met > capacity and measure:  # more impacts than room: again, with room for all
-            return self._run_working(
-                tables, x, stretches, points, key, tangent, max_events, met, measure=True
-            )
-        return FlowResult(
-            status=_STATUS[code],
-            strobes=strobes[: done + 1],
-            counts=counts[:done, None, :],
-            mode=keys[int(cursor[0])],
-            tangent=None if tangent is None else phi,
-            impacts=Impacts(
-                trail.when[:met], np.zeros(met, dtype=np.int64), trail.stop[:met], trail.at[:met]
-            ),
-            extremes=trail.extremes,
-            penetration=float(trail.graze[0]) if measure else np.inf,
-            miss=float(trail.graze[1]),
-            tangencies=int(trail.graze[2]) if measure else 0,
-            clipped_time=0.0,
-        )
+        return code, done
 
     def _chunk(self) -> int:
         """Periods of a fast path between two looks at ``interrupt`` and the budget."""
@@ -423,11 +393,29 @@ def _check(x: Array, size: int, periods: int, points: int) -> None:
 
 
 _STATUS = {
-    kernel.DONE: FlowStatus.DONE,
-    kernel.TOO_MANY_EVENTS: FlowStatus.CHATTER,
-    kernel.DIVERGED: FlowStatus.DIVERGED,
-    kernel.PAUSED: FlowStatus.TOO_LONG,
+    kernel_orbit.DONE: FlowStatus.DONE,
+    kernel_orbit.TOO_MANY_EVENTS: FlowStatus.CHATTER,
+    kernel_orbit.DIVERGED: FlowStatus.DIVERGED,
+    kernel_orbit.PAUSED: FlowStatus.TOO_LONG,
 }
+
+
+def _result(code: int, log: Log, done: int, met: int, mode: ModeKey, phi: Array) -> FlowResult:
+    """done : stretches; met : impacts in the log; phi : tangent vectors, (0, 0) for none."""
+    impacts = Impacts(log.when[:met], log.stop[:met, 0], log.stop[:met, 1], log.at[:met])
+    return FlowResult(
+        status=_STATUS[code],
+        strobes=log.strobes[: done + 1],
+        counts=log.impacts[:done],
+        mode=mode,
+        tangent=phi if phi.size else None,
+        impacts=impacts,
+        extremes=log.extremes,
+        penetration=float(log.graze[0]),
+        miss=float(log.graze[1]),
+        tangencies=int(log.graze[2]),
+        clipped_time=float(log.clipped[0]),
+    )
 
 
 def augmented(mode: Mode, drive: Drive) -> Array:

@@ -1,8 +1,7 @@
 """Compiled core of the exact flow: steps, guards, impacts, extremes.
 
-Everything that these functions call stands in this file: a callee edited in another file would
-leave a stale compiled cache. They release the GIL and know nothing of Python objects; set-up
-(matrix functions, tables) is done by ``dynamics.flow`` in NumPy.
+The functions release the GIL and know nothing of Python objects; set-up (matrix functions, tables)
+is done by ``dynamics.flow`` in NumPy.
 
 The state is augmented with the drive's sine, cosine and the constant 1, z = (x, sin, cos, 1), so a
 mode is autonomous: z' = M z. A step of length h has the propagator E = exp(M h); inside a step z
@@ -21,15 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import compiled
+from designer.base.jit import callee, compiled
+from designer.dynamics.kernel_orbit import DIVERGED, DONE, PAUSED, TOO_MANY_EVENTS, UNKNOWN_MODE
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 ORDER = 18
 """Taylor order: 0.5**19/19! is 1.6e-23."""
-DONE, UNKNOWN_MODE, TOO_MANY_EVENTS, DIVERGED, PAUSED = 0, 1, 2, 3, 4
-"""Return codes of ``advance``."""
 CHANGE, TANGENT = 20.0, 4.0
 """What a change of mode, and a step that carries tangent vectors, cost, in plain steps."""
 FINEST = 1e-10
@@ -85,7 +83,7 @@ class Log(NamedTuple):
     """(1,) time spent clipped."""
 
 
-@compiled
+@callee
 def _value(c: Float, s: float) -> float:
     total = 0.0
     for k in range(c.shape[0] - 1, -1, -1):
@@ -93,7 +91,7 @@ def _value(c: Float, s: float) -> float:
     return total
 
 
-@compiled
+@callee
 def _slope(c: Float, s: float) -> float:
     total = 0.0
     for k in range(c.shape[0] - 1, 0, -1):
@@ -101,7 +99,7 @@ def _slope(c: Float, s: float) -> float:
     return total
 
 
-@compiled
+@callee
 def _curvature_bound(c: Float, end: float) -> float:
     """Bound of |p''| on [0, end]."""
     total = 0.0
@@ -110,7 +108,7 @@ def _curvature_bound(c: Float, end: float) -> float:
     return total
 
 
-@compiled
+@callee
 def _root(c: Float, a: float, b: float) -> float:
     """The root of p in [a, b], where p is monotone and changes sign: Newton kept by bisection."""
     rising = _value(c, b) > _value(c, a)
@@ -133,7 +131,7 @@ def _root(c: Float, a: float, b: float) -> float:
     return s
 
 
-@compiled
+@callee
 def _first_rise(c: Float, end: float, graze: Float) -> float:
     """First s in [0, end] where p goes from negative to positive; -1.0 if there is none."""
     bound = _curvature_bound(c, end)
@@ -165,7 +163,7 @@ def _first_rise(c: Float, end: float, graze: Float) -> float:
     return -1.0
 
 
-@compiled
+@callee
 def _stationary(c: Float, end: float, found: Float) -> int:
     """Writes the points of [0, end] where p' = 0 into ``found``; returns how many."""
     n = c.shape[0]
@@ -200,7 +198,7 @@ def _stationary(c: Float, end: float, found: Float) -> int:
     return count
 
 
-@compiled
+@callee
 def _partial(taylor: Float, z: Float, s: float, out: Float) -> None:
     """out = Σ s^k (M h)^k/k! z, by columns of the table."""
     n = z.shape[0]
@@ -216,7 +214,7 @@ def _partial(taylor: Float, z: Float, s: float, out: Float) -> None:
         weight *= s
 
 
-@compiled
+@callee
 def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, work: Float) -> None:
     """phi ← (state block of exp(M s h)) phi; s = 1 uses the propagator."""
     for i in range(n):
@@ -237,7 +235,17 @@ def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, wor
             phi[i, j] = total
 
 
-@compiled
+@callee
+def _series(rows: Float, z: Float, c: Float) -> None:
+    """c ← Taylor coefficients of a guard or a depth from its rows (ORDER + 1, N)."""
+    for k in range(c.shape[0]):
+        total = 0.0
+        for j in range(z.shape[0]):
+            total += rows[k, j] * z[j]
+        c[k] = total
+
+
+@callee
 def _measure(
     tables: ModeTables, mode: int, z: Float, n: int, end: float, depth: Float, log: Log
 ) -> None:
@@ -258,11 +266,7 @@ def _measure(
     for j in range(tables.side.shape[1]):
         if tables.side[mode, j] == 0:
             continue
-        for k in range(c.shape[0]):
-            total = 0.0
-            for i in range(z.shape[0]):
-                total += tables.depth[mode, j, k, i] * z[i]
-            c[k] = total
+        _series(tables.depth[mode, j], z, c)
         count = _stationary(c, end, found)
         for q in range(count):
             depth[j] = max(depth[j], _value(c, found[q]))
@@ -271,11 +275,7 @@ def _measure(
         j = tables.clearance[mode, g]
         if j < 0 or tables.side[mode, j] != 0:
             continue
-        for k in range(c.shape[0]):
-            total = 0.0
-            for i in range(z.shape[0]):
-                total += tables.guard[mode, g, k, i] * z[i]
-            c[k] = total
+        _series(tables.guard[mode, g], z, c)
         count = _stationary(c, end, found)
         for q in range(count):
             v = _value(c, found[q])
@@ -339,11 +339,7 @@ def advance(
                 swing += tables.chord[mode, g, j] * abs(z[j])
             if max(g0, g1) + swing < 0.0:
                 continue
-            for k in range(c.shape[0]):
-                total = 0.0
-                for j in range(size):
-                    total += tables.guard[mode, g, k, j] * z[j]
-                c[k] = total
+            _series(tables.guard[mode, g], z, c)
             s = _first_rise(c, first, log.graze)
             if s >= 0.0 and (s < first or through < 0):
                 first, through = s, g

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from designer.base.arrays import Array
 from designer.dynamics import kernel_modal as kernel
-from designer.dynamics.kernel_modal import LAST, NODES, PARTS, TERMS, ModalTables
+from designer.dynamics.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
+from designer.dynamics.kernel_modal import ModalTables
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 
 Complex = NDArray[np.complex128]
-STEP = 0.4
-"""h · max(|lambda|, omega): longer steps fail the proof more often."""
 WORST_CONDITION = 1e4
 WORST_RESONANCE = 1e5
 """Of the equations of the forced motion: near an undamped resonance that motion is huge, and the
@@ -146,7 +145,7 @@ def _fill(data: Array, parts: Oscillators, w: float, row: Array, centre: float) 
     M[4, 5], M[5, 4] = w, -w
     for k, (p, q) in enumerate(factors):
         M[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[0.0, 1.0], [-q, -p]]
-    h = STEP / max(parts.rate, w)
+    h = BLOCK_STEP / max(parts.rate, w)
     part = h / PARTS
     powers = [np.eye(6)]  # M^k
     for _ in range(TERMS - 1):

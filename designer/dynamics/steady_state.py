@@ -2,9 +2,9 @@
 
 A transient is run and left out; over the periods kept after it the least displacement of each and
 every impact on the upper stop are noted, and the motion is named n-p-q by the rules of
-``dynamics.attractors``. Two engines: the compiled one for models (``dynamics.kernel_sweep`` and
-``dynamics.kernel_classify``), and the general flow, which is slow and obvious, and serves boards
-and whatever the fast path does not fit.
+``dynamics.attractors``. Two engines: the compiled one for models (``dynamics.kernel_sweep``), and
+the general flow, which is slow and obvious, and serves boards and whatever the fast path does not
+fit.
 """
 
 from __future__ import annotations
@@ -16,28 +16,25 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.threads import interrupt
-from designer.dynamics import attractors, kernel_classify, kernel_modal, kernel_sweep
-from designer.dynamics.attractors import CHAOS, lyapunov, peaks_near, settle
+from designer.dynamics import attractors, kernel_orbit, kernel_sweep as kernel
+from designer.dynamics.attractors import lyapunov, peaks_near, settle
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
-from designer.dynamics.kernel_modal import ModalTables
+from designer.dynamics.kernel_modal import ModalTables, Watch
+from designer.dynamics.kernel_orbit import CHAOS, WORTH
 from designer.dynamics.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, OrbitStatus
 
 SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
-REPEAT = 1e-2
-"""Of the peak: strobes further apart than this are not taken for a repetition."""
 ROOM = 48
 """Impacts on the upper stop per period that are kept at first; more where there are more."""
 _STATUS = {
-    kernel_classify.PERIODIC: OrbitStatus.PERIODIC,
-    kernel_classify.APERIODIC: OrbitStatus.APERIODIC,
-    kernel_classify.NOT_SETTLED: OrbitStatus.NOT_SETTLED,
-    kernel_classify.CHATTER: OrbitStatus.NOT_SETTLED,
-    kernel_classify.DIVERGED: OrbitStatus.DIVERGED,
+    kernel.PERIODIC: OrbitStatus.PERIODIC,
+    kernel.APERIODIC: OrbitStatus.APERIODIC,
+    kernel.NOT_SETTLED: OrbitStatus.NOT_SETTLED,
 }
 _STOPPED = {
-    kernel_modal.TOO_MANY_EVENTS: OrbitStatus.NOT_SETTLED,
-    kernel_modal.DIVERGED: OrbitStatus.DIVERGED,
+    kernel_orbit.TOO_MANY_EVENTS: OrbitStatus.NOT_SETTLED,
+    kernel_orbit.DIVERGED: OrbitStatus.DIVERGED,
 }
 
 
@@ -147,7 +144,7 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
     n = p = q = 0
     symmetric, radius, start = None, float("nan"), end
     growth = exponent * flow.drive.period
-    if course.tangents >= kernel_classify.SPAN and growth > CHAOS and not _repeats(flow, strobes):
+    if course.tangents >= kernel.SPAN and growth > CHAOS and not _repeats(flow, strobes):
         status = OrbitStatus.APERIODIC
     else:
         orbit = settle(flow, end)
@@ -179,7 +176,7 @@ def _repeats(flow: Flow, strobes: list[Array]) -> bool:
     """Whether the last strobe is near an earlier one, up to the largest period."""
     peak = peaks_near(flow, strobes[-1])
     earlier = strobes[-1 - min(MAX_PERIOD, len(strobes) - 1) : -1]
-    return any(bool((np.abs(s - strobes[-1]) <= REPEAT * peak).all()) for s in earlier)
+    return any(bool((np.abs(s - strobes[-1]) <= WORTH * peak).all()) for s in earlier)
 
 
 def _stopped(status: FlowStatus, x: Array, spent: int) -> Steady:
@@ -195,37 +192,25 @@ def _nothing(status: OrbitStatus, x: Array, spent: int) -> Steady:
 def _by_kernel(
     flow: Callable[[], Flow], tables: ModalTables, period: float, x: Array, course: Course
 ) -> Steady:
-    room = ROOM * course.keep
-    while True:
-        at = np.array(x, dtype=float)
-        strobes, minima = np.empty((course.keep + 1, 4)), np.empty(course.keep)
-        velocities, peak, cursor = np.empty(room), np.zeros(4), np.zeros(3, dtype=np.int64)
-        growth = kernel_sweep.travel(
-            tables,
-            at,
-            period,
-            MAX_EVENTS,
-            course.settle,
-            course.tangents,
-            strobes,
-            minima,
-            velocities,
-            peak,
-            cursor,
+    model = kernel.DrivenModel(tables, period, MAX_EVENTS)
+    strobes, cursor = np.empty((course.keep + 1, 4)), np.zeros(2, dtype=np.int64)
+    room, entries = 0, ROOM * course.keep
+    while entries > room:  # more impacts than room: again, with room for all
+        room = entries
+        watch = Watch(
+            np.empty(course.keep), np.empty(room), np.zeros(4), np.zeros(1, dtype=np.int64)
         )
-        if cursor[1] <= room:
-            break
-        room = int(cursor[1])
+        at = np.array(x, dtype=float)
+        growth = kernel.travel(model, at, course.settle, course.tangents, strobes, watch, cursor)
+        entries = int(watch.entries[0])
     spent = course.settle + course.keep
-    if cursor[2] != kernel_modal.DONE:
-        return _nothing(_STOPPED[int(cursor[2])], np.array(x, dtype=float), spent)
-    peak = np.maximum(peak, max(1e-9 * float(peak.max()), 1e-300))
+    if cursor[1] != kernel_orbit.DONE:
+        return _nothing(_STOPPED[int(cursor[1])], np.array(x, dtype=float), spent)
+    peak = np.maximum(watch.peak, max(1e-9 * float(watch.peak.max()), 1e-300))
     orbit, facts, counted = np.empty(4), np.full(3, np.nan), np.zeros(4, dtype=np.int64)
-    code = kernel_classify.classify(
-        tables,
+    code = kernel.classify(
+        model,
         strobes,
-        period,
-        MAX_EVENTS,
         course.patience,
         growth,
         course.tangents,
@@ -233,21 +218,23 @@ def _by_kernel(
         orbit,
         facts,
         counted,
+        cursor,
     )
-    periodic = code == kernel_classify.PERIODIC
+    stopped = code == kernel.STOPPED
+    n, p, q = (int(v) if code == kernel.PERIODIC else 0 for v in counted[:3])
     return Steady(
-        status=_STATUS[code],
-        n=int(counted[0]) if periodic else 0,
-        p=int(counted[1]) if periodic else 0,
-        q=int(counted[2]) if periodic else 0,
-        symmetric=_symmetric(flow, facts[1], orbit, int(counted[0]), peak) if periodic else None,
+        status=_STOPPED[int(cursor[1])] if stopped else _STATUS[code],
+        n=n,
+        p=p,
+        q=q,
+        symmetric=_symmetric(flow, facts[1], orbit, n, peak) if n else None,
         lyapunov=float(facts[2]) / period,
-        radius=float(facts[0]) if periodic else float("nan"),
+        radius=float(facts[0]) if n else float("nan"),
         start=orbit,
         end=strobes[-1],
-        minima=minima,
-        velocities=velocities[: int(cursor[1])].copy(),
-        periods=spent + int(counted[3]),
+        minima=watch.minima,
+        velocities=watch.velocities[:entries].copy(),
+        periods=spent + int(counted[kernel_orbit.SPENT]),
     )
 
 

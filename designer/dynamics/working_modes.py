@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from designer.base.arrays import Array
-from designer.dynamics import kernel_four_state as kernel
+from designer.base.arrays import Array, Index
+from designer.dynamics import kernel_mode_tables as kernel
+from designer.dynamics.kernel_boards import POINTS, Anchors
+from designer.dynamics.kernel_orbit import DONE
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 
 STATES = 4
@@ -34,22 +36,15 @@ def of_system(system: PiecewiseLinearSystem) -> kernel.Modes | None:
     return out
 
 
-class DrivenTables:
-    """The tables of one system under one drive: data (K, WIDTH) and ints (K, INTS)."""
-
-    def __init__(self, count: int) -> None:
-        self.data = np.zeros((count, kernel.WIDTH))
-        self.ints = np.zeros((count, kernel.INTS), dtype=np.int64)
-
-
-def tables(system: PiecewiseLinearSystem, drive: Drive) -> DrivenTables | None:
-    """None where the fast path does not fit."""
+def tables(system: PiecewiseLinearSystem, drive: Drive) -> tuple[Array, Index] | None:
+    """Tables (K, WIDTH) and (K, INTS) of one system under one drive; None where they do not fit."""
     modes = of_system(system)
     if modes is None:
         return None
-    out = DrivenTables(len(system.working))
-    code = kernel.fill(out.data, out.ints, modes, 0, drive.omega, drive.amplitude, drive.offset)
-    return out if code == kernel.DONE else None
+    data = np.zeros((len(system.working), kernel.WIDTH))
+    ints = np.zeros((len(system.working), kernel.INTS), dtype=np.int64)
+    code = kernel.fill(data, ints, modes, 0, drive.omega, drive.amplitude, drive.offset)
+    return (data, ints) if code == DONE else None
 
 
 def anchors(points: int) -> Array:
@@ -58,19 +53,7 @@ def anchors(points: int) -> Array:
     return np.stack([np.sin(phases), np.cos(phases)], axis=1)
 
 
-WAYS = kernel.Ways(anchors(1), anchors(32), anchors(kernel.POINTS))
-
-
-def trail(room: int) -> kernel.RunTrail:
-    """Room for what a measured run writes."""
-    return kernel.RunTrail(
-        extremes=np.tile([np.inf, -np.inf], (STATES, 1)),
-        graze=np.array([np.inf, np.inf, 0.0]),
-        when=np.empty(room),
-        at=np.empty((room, STATES)),
-        stop=np.zeros(room, dtype=np.int64),
-        met=np.zeros(1, dtype=np.int64),
-    )
+ANCHORS = Anchors(anchors(1), anchors(32), anchors(POINTS))
 
 
 def empty_modes(boards: int, modes: int, guards: int) -> kernel.Modes:

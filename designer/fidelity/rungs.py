@@ -24,7 +24,7 @@ from designer.circuit.ensemble import displacement
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.fidelity import gate as trade_gate, runge_kutta

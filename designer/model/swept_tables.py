@@ -12,8 +12,9 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics import kernel_modal as kernel, modal_tables
-from designer.dynamics.kernel_modal import LAST, NODES, PARTS, TERMS, ModalTables
-from designer.dynamics.modal_tables import STEP, WORST_RESONANCE, Oscillators
+from designer.dynamics.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
+from designer.dynamics.kernel_modal import ModalTables
+from designer.dynamics.modal_tables import WORST_RESONANCE, Oscillators
 from designer.model.mechanics import POSITIONS
 from designer.model.model import Dimensionless
 
@@ -128,7 +129,7 @@ class _Forced:
             p, q = self.factors[:, k].T
             M[:, 2 * k, 2 * k + 1] = 1.0
             M[:, 2 * k + 1, 2 * k], M[:, 2 * k + 1, 2 * k + 1] = -q, -p
-        h = STEP / np.maximum(self.rate, w)
+        h = BLOCK_STEP / np.maximum(self.rate, w)
         part = h / PARTS
         powers = [np.broadcast_to(np.eye(6), M.shape)]
         for _ in range(TERMS - 1):

@@ -20,7 +20,7 @@ from designer.base.arrays import Array
 from designer.circuit.ensemble import displacement
 from designer.circuit.paper_values import MODEL
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.kernel_boards import POINTS
 from designer.fidelity import runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.fidelity.runge_kutta import PAPERS_STEP

@@ -2,8 +2,7 @@
 
 Everything is in logarithms and all loops are exhaustive: what they leave out cannot reach the
 level or breaks a condition. The mathematics stands in ``synthesis.linear_block``, the conditions in
-``synthesis.linear_rules``. Parts are numbered as in ``synthesis.linear_block.PARTS``. All loops
-stand in this one file: a callee in another would leave compiled code stale (``base.jit``).
+``synthesis.linear_rules``. Parts are numbered as in ``synthesis.linear_block.PARTS``.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
-from designer.base.jit import compiled
+from designer.base.jit import callee, compiled
 
 TINY = 1e-12
 """Allowance for rounding in every comparison of logarithms."""
@@ -88,7 +87,7 @@ class Rules(NamedTuple):
     """Elementary vectors that hold values of both masses, as (k, 3) places and (k, 3) entries."""
 
 
-@compiled
+@callee
 def _below(table: Array, x: float) -> int:
     """How many entries of the sorted table are smaller than x."""
     low, high = 0, len(table)
@@ -101,7 +100,7 @@ def _below(table: Array, x: float) -> int:
     return low
 
 
-@compiled
+@callee
 def _largest(vectors: tuple[Index, Array], v: Array) -> float:
     """Largest |y · v| over elementary vectors y."""
     places, entries = vectors
@@ -116,7 +115,7 @@ def _largest(vectors: tuple[Index, Array], v: Array) -> float:
     return out
 
 
-@compiled
+@callee
 def _agree(rules: Rules, parts: Index, part: int, value: int) -> bool:
     """Whether part number ``part`` may have this value beside those chosen (-1: not yet)."""
     for other in range(14):
@@ -125,7 +124,7 @@ def _agree(rules: Rules, parts: Index, part: int, value: int) -> bool:
     return True
 
 
-@compiled
+@callee
 def _kinds(rules: Rules, parts: Index) -> int:
     """Distinct values among the parts chosen, without the preferred ones."""
     count = 0
@@ -139,7 +138,7 @@ def _kinds(rules: Rules, parts: Index) -> int:
     return count
 
 
-@compiled
+@callee
 def _ranges(
     values: Values,
     rules: Rules,
@@ -184,7 +183,7 @@ def _ranges(
     return bool(out[1, 0] <= out[1, 1])
 
 
-@compiled
+@callee
 def _tied(rules: Rules, delta: float, p: float, slack: float) -> bool:
     """Whether ties between the masses allow these ratios of capacitors and of velocities.
 
@@ -201,7 +200,7 @@ def _tied(rules: Rules, delta: float, p: float, slack: float) -> bool:
     return True
 
 
-@compiled
+@callee
 def _ratios(
     values: Values,
     rules: Rules,
@@ -280,7 +279,7 @@ def join(
         c2 = (values.c[own[0]], values.c[own[-1]])
         # C2 and C4 have a value of their own, and where they differ two, unless it is preferred.
         most = rules.most - (0 if rules.free_c.any() else 1 + (abs(delta) > TINY))
-        parts[:] = -1
+        _clear(parts)
         parts[R2] = i2
         v[0] = r[i2] + w2
         i9 = _below(r, v[0] - delta - w9 - 2 * level - TINY)
@@ -366,7 +365,7 @@ def join(
     return stop, count, steps
 
 
-@compiled
+@callee
 def _own(
     values: Values, rules: Rules, row: Index, pick: int, parts: Index, v: Array
 ) -> tuple[bool, float, float]:
@@ -376,7 +375,7 @@ def _own(
     """
     r, w = values.r, rules.w
     delta = values.deltas[row[0]]
-    parts[:] = -1
+    _clear(parts)
     v[0], v[1] = r[row[1]] + w[0], r[row[2]] + delta + w[5]
     v[2], v[3] = r[row[3]] + w[1], r[row[4]] + delta + w[4]
     v[4] = 0.5 * (values.ratios[row[5]] - delta + w[2] - w[6])
@@ -391,7 +390,7 @@ def _own(
     return good, alpha, p
 
 
-@compiled
+@callee
 def _side(
     values: Values,
     rules: Rules,
@@ -467,13 +466,19 @@ def _side(
     return count, True, steps
 
 
-@compiled
+@callee
+def _clear(parts: Index) -> None:
+    for i in range(14):
+        parts[i] = -1
+
+
+@callee
 def _copy(into: Index, parts: Index) -> None:
     for i in range(len(parts)):
         into[i] = parts[i]
 
 
-@compiled
+@callee
 def _put(parts: Index, found: Index, second: bool) -> None:
     """Put one completion (its four indices) among the parts."""
     if second:
@@ -482,7 +487,7 @@ def _put(parts: Index, found: Index, second: bool) -> None:
         parts[R4], parts[R10], parts[R1], parts[C1] = found[0], found[1], found[2], found[3]
 
 
-@compiled
+@callee
 def _pair(
     rules: Rules, parts: Index, v: Array, p: float, found: Index, one: Array, two: Array
 ) -> float:
@@ -501,7 +506,7 @@ def _pair(
     return float(max(one[3], two[3], _largest(rules.both, v)))
 
 
-@compiled
+@callee
 def _sorted(keys: Array) -> Index:
     """Places of the keys in ascending order, equal ones as they come (Shell's method)."""
     n = len(keys)
@@ -592,7 +597,7 @@ def complete(
                     if _kinds(rules, parts) <= rules.most:
                         least, reached, any_found = error, 3, True
                         _copy(best, parts)
-            parts[:] = -1
+            _clear(parts)
     return (least if any_found else np.inf), reached, whole, steps
 
 

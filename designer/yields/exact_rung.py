@@ -12,7 +12,7 @@ from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.numerics_gate import GateSubject
 from designer.spread.spread import draw_many

@@ -10,20 +10,20 @@ from designer.base.jit_notice import MOTION, PARTS, announced
 from designer.dynamics import kernel_four_state, kernel_general, kernel_modal
 
 
-def _compile(function: object) -> None:
-    data = {"dispatcher": SimpleNamespace(py_func=function)}
-    with event.trigger_event("numba:compile", data):
+def _dispatcher(module: object) -> object:
+    function = SimpleNamespace(__module__=getattr(module, "__name__", module))
+    return SimpleNamespace(py_func=function)
+
+
+def _compile(module: object) -> None:
+    with event.trigger_event("numba:compile", data={"dispatcher": _dispatcher(module)}):
         pass
-
-
-def _of(module: object) -> object:
-    return SimpleNamespace(__module__=getattr(module, "__name__", module))
 
 
 def test_each_part_is_announced_once_and_by_name() -> None:
     said: list[str] = []
     with announced(said.append):
-        _compile(_of("somebody.elses"))
+        _compile("somebody.elses")
         assert said == []
         for module in (
             kernel_general,
@@ -32,8 +32,10 @@ def test_each_part_is_announced_once_and_by_name() -> None:
             kernel_four_state,
             kernel_general,
         ):
-            _compile(_of(module))
-    _compile(_of("designer.dynamics.kernel_sweep"))
+            _compile(module)
+        with event.trigger_event("numba:compile", {"dispatcher": _dispatcher(kernel_general)}):
+            _compile("designer.synthesis.kernel_linear")  # a callee: no part of its own
+    _compile("designer.dynamics.kernel_sweep")
     assert len(said) == 2
     assert MOTION in said[0]
     assert PARTS["kernel_four_state"] in said[1]

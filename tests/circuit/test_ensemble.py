@@ -17,7 +17,7 @@ from designer.circuit.netlist import Circuit, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_four_state import LONGEST
+from designer.dynamics.kernel_boards import LONGEST
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.spread import Spread, draw_many

@@ -15,6 +15,7 @@ from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics import kernel_four_state as kernel, working_modes
 from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.kernel_orbit import DONE
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.spread import Spread, draw, draw_many
 from tests.circuit.test_coefficients import exact_for_paper
@@ -26,6 +27,14 @@ RECTIFIER = stage("rectifier", "both", rectifier())
 UPPER = stage("rectifier", "upper", rectifier(sides="upper"))
 CIRCUITS = {"saturation": SATURATION, "rectifier": RECTIFIER, "upper": UPPER}
 SPREAD = Spread(0.05, 0.05, 3e-3, 10e-3)
+NO_TRAIL = kernel.RunTrail(
+    np.zeros((4, 2)),
+    np.zeros(3),
+    np.zeros(0),
+    np.zeros((0, 4)),
+    np.zeros(0, dtype=np.int64),
+    np.zeros(1, dtype=np.int64),
+)
 VOLTS = {"saturation": 0.1, "rectifier": 6.0, "upper": 1.6}
 """Size of a start and of the drive that leads into contact without clipping."""
 
@@ -94,8 +103,7 @@ def test_the_fast_path_serves_good_boards(kind: str) -> None:
         assert tables is not None
         cursor, strobes = np.zeros(3, dtype=np.int64), np.zeros((6, 4))
         code = kernel.advance(
-            tables.data,
-            tables.ints,
+            *tables,
             np.zeros(4),
             cursor,
             np.array([drive.omega, drive.period, 1000.0]),
@@ -103,9 +111,9 @@ def test_the_fast_path_serves_good_boards(kind: str) -> None:
             np.zeros((0, 0)),
             strobes,
             np.zeros((5, 2), dtype=np.int64),
-            working_modes.trail(0),
+            NO_TRAIL,
         )
-        served += code == kernel.DONE
+        served += code == DONE
     assert served == 20
 
 

@@ -11,7 +11,14 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from designer.base.arrays import Array
-from designer.dynamics import attractors, kernel_classify, kernel_sweep, modal_tables, steady_state
+from designer.dynamics import (
+    attractors,
+    kernel_algebra,
+    kernel_orbit,
+    kernel_sweep,
+    modal_tables,
+    steady_state,
+)
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.kernel_modal import CHANGE, WIDTH
 from designer.dynamics.orbit import MAX_PERIOD, OrbitStatus
@@ -89,12 +96,8 @@ def test_tables_in_batches_equal_those_of_one(
             assert (np.abs(a[keep] - c[keep]) <= 1e-9 * size + 1e-13).all()
 
 
-def test_rules_are_those_of_the_attractor() -> None:
-    assert kernel_classify.CHAOS == attractors.CHAOS
-    assert kernel_classify.NEAR == attractors.NEAR
-    assert kernel_classify.CLOSING == attractors.CLOSING
-    assert kernel_classify.STROBE == attractors.STROBE_TOLERANCE
-    assert kernel_classify.LONGEST == MAX_PERIOD
+def test_the_longest_period_is_that_of_the_definitions() -> None:
+    assert kernel_orbit.MAX_PERIOD == MAX_PERIOD
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -102,12 +105,19 @@ def test_linear_algebra_of_size_four(seed: int) -> None:
     rng = np.random.default_rng(seed)
     M, r = rng.standard_normal((4, 4)), rng.standard_normal(4)
     want = float(np.abs(np.linalg.eigvals(M)).max())
-    assert kernel_classify._radius(M) == pytest.approx(want, rel=1e-7)
-    assert kernel_classify._radius(np.diag([0.5, -0.9, 0.0, 0.1])) == pytest.approx(0.9)
-    x = r.copy()
-    assert kernel_classify._solve(M.copy(), x)
-    np.testing.assert_allclose(M @ x, r, atol=1e-9)
-    assert not kernel_classify._solve(np.ones((4, 4)), r)
+    radius, factor, substitute = (
+        getattr(kernel_algebra, name).py_func
+        for name in ("spectral_radius", "factor", "substitute")
+    )
+    assert radius(M, 48) == pytest.approx(want, rel=1e-12)
+    assert radius(M, 5) == pytest.approx(want, rel=0.2)
+    assert radius(np.diag([0.5, -0.9, 0.0, 0.1]), 48) == pytest.approx(0.9, rel=1e-12)
+    assert radius(np.zeros((4, 4)), 48) == 0.0
+    factors, order, x = M.copy(), np.zeros(4, dtype=np.int64), np.zeros((4, 1))
+    assert factor(factors, order) > 0.0
+    substitute(factors, order, r[:, None], x)
+    np.testing.assert_allclose(M @ x[:, 0], r, atol=1e-9)
+    assert factor(np.ones((4, 4)), order) == 0.0
 
 
 @pytest.mark.parametrize("omega", [1.55, 0.85, 0.54, 0.215, 1.0, 0.6])
@@ -120,14 +130,15 @@ def test_least_displacement_and_exponent_against_integration(omega: float) -> No
     assert once.minima[0] == pytest.approx(low, abs=1e-6)
     tables = setting(omega).tables
     assert tables is not None
-    cursor = np.array([kernel_sweep.mode_of(tables.data, x), 0], dtype=np.int64)
+    cursor = np.array([-1, 0], dtype=np.int64)
+    driven = kernel_sweep.DrivenModel(tables, 2 * np.pi / omega, MAX_EVENTS)
     v = np.array([[0.5], [-0.3], [0.7], [0.4]])
     carried = flow(omega).run(x, 1, tangent=v).tangent
     assert carried is not None
     assert np.linalg.norm(carried) / np.linalg.norm(v) == pytest.approx(growth, rel=1e-4)
     # and the kernel's own exponent over many periods is the flow's
     at = x.copy()
-    mine = kernel_sweep.exponent(tables, at, cursor, 2 * np.pi / omega, MAX_EVENTS, 15)
+    mine = kernel_sweep.exponent(driven, at, cursor, 15)
     start = flow(omega).run(x, 10, tangent=v)
     assert start.tangent is not None
     last = flow(omega).run(start.strobes[-1], 5, tangent=start.tangent)
@@ -231,16 +242,3 @@ def test_all_impacts_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = (run.impacts.time > 40 * 2 * np.pi / 0.215) & (run.impacts.side > 0)
     assert len(got.velocities) == shown.sum() > 3
     np.testing.assert_allclose(got.velocities, run.impacts.state[shown, 1], atol=1e-8)
-
-
-def test_compiled_code_is_keyed_by_the_files_it_calls() -> None:
-    """A function that calls another file's kernel closes over a hash of that file's source."""
-    keyed = ("_dip", "_observe", "exponent", "travel")
-    for module, names in (
-        (kernel_sweep, keyed),
-        (kernel_classify, ("_lap", "_shoot", "_polish", "classify")),
-    ):
-        for name in names:
-            (cell,) = getattr(module, name).py_func.__closure__
-            assert cell.cell_contents == module.STAMP
-    assert kernel_sweep.stamp_of(modal_tables) != kernel_sweep.stamp_of(kernel_sweep)

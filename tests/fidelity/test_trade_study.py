@@ -21,7 +21,7 @@ from designer.base.manifest import ManifestStage
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.cli import entry
-from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity import gate as trade_gate, pieces, rungs, yields
 from designer.fidelity.cpu_clock import SpiceClock

@@ -252,5 +252,5 @@ def test_the_page_has_a_paragraph_for_each_package() -> None:
 def test_a_changed_kernel_empties_the_cache() -> None:
     """Every file with a compiled function is in the hash that names the cache's folder."""
     hashed = {p for pattern in jit.KERNELS for p in jit.PACKAGE.glob(pattern)}
-    users = {p for p in HOUSE.rglob("*.py") if "base.jit import compiled" in p.read_text("utf-8")}
+    users = {p for p in HOUSE.rglob("*.py") if "designer.base.jit import" in p.read_text("utf-8")}
     assert users == hashed

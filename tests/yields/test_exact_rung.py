@@ -13,7 +13,7 @@ from designer.circuit.ensemble import Ensemble, displacement
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
-from designer.dynamics.kernel_four_state import POINTS
+from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.spread import draw, draw_many
 from designer.yields import exact_rung

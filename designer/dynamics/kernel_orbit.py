@@ -1,0 +1,192 @@
+"""Compiled rules of a periodic orbit: near repetition, Newton's method, acceptance, counting.
+
+These are the rules of ``dynamics.attractors``, in the same order, for four states. They do not know
+what carries the state: that is ``lap``, a compiled function
+
+    lap(system, x, cursor, phi, strobes, impacts) -> code
+
+which carries x (4,), at drive phase 0, over the drive periods of ``strobes`` (periods + 1, 4) in
+the mode cursor[0] (-1: the one that holds at x), writes ``strobes`` with the start, ``impacts``
+(periods, 2) and the mode that it ends in, and carries the tangent vectors phi (4, k).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.jit import callee, inlined
+from designer.dynamics.kernel_algebra import factor, spectral_radius, substitute
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Lap = Callable[..., int]
+
+DONE, LEFT, TOO_MANY_EVENTS, DIVERGED, PAUSED, UNKNOWN_MODE = range(6)
+"""Return codes of every flow; LEFT: the fast path does not fit here; the last two are the general
+kernel's: no steps left, a mode that has no tables yet."""
+FOUND, NONE, UNDECIDED = 0, 1, 2
+"""Answers of ``shoot`` and ``polish``; UNDECIDED: the flow was LEFT, or the period is too long."""
+MAX_PERIOD = 16
+"""Longest period that is looked for, in drive periods."""
+STROBE_TOLERANCE = 1e-8
+"""Of the peak of each state (docs/definitions.md)."""
+WORTH = 1e-2
+"""Of the peak: how nearly a strobe must repeat to be worth polishing."""
+NEAR = 0.05
+"""Of the peak: how far a polished orbit may lie from where settling had arrived."""
+CLOSING = 400
+"""Most periods that are spent on seeing the settling trajectory close in on a polished orbit."""
+CHAOS = 0.02
+"""Growth of a tangent vector per drive period that is taken for chaos."""
+SPENT = 3
+"""Place in ``counted``, after n, p and q."""
+
+
+@callee
+def distance(a: Float, b: Float, peak: Float) -> float:
+    """Largest difference of two states (4,), each relative to the state's peak."""
+    most = 0.0
+    for i in range(4):
+        most = max(most, abs(a[i] - b[i]) / peak[i])
+    return float(most)
+
+
+@callee
+def count_impacts(strobes: Float, impacts: Int, n: int, peak: Float, counted: Int) -> bool:
+    """counted ← n, p, q of an orbit by some laps of n periods; False if the strobe drifts."""
+    periods, lower, upper = impacts.shape[0], 0, 0
+    for k in range(periods):
+        lower, upper = lower + impacts[k, 0], upper + impacts[k, 1]
+    for k in range(periods + 1):
+        if not distance(strobes[k], strobes[k % n], peak) <= STROBE_TOLERANCE:
+            return False
+    laps = float(periods // n)
+    counted[0], counted[1], counted[2] = n, int(upper / laps + 0.5), int(lower / laps + 0.5)
+    return True
+
+
+def polisher(lap: Lap) -> Callable[..., int]:
+    """The compiled ``polish`` of a flow that is carried by ``lap``."""
+
+    @callee
+    def shoot(
+        system: Any, x: Float, n: int, peak: Float, monodromy: Float
+    ) -> int:  # fmt: skip
+        """``attractors.shoot``: x, monodromy ← a fixed point of the n-period map, its matrix."""
+        last = np.inf
+        strobes, impacts = np.zeros((n + 1, 4)), np.zeros((n, 2), dtype=np.int64)
+        cursor, order = np.zeros(3, dtype=np.int64), np.zeros(4, dtype=np.int64)
+        matrix, step, change = np.zeros((4, 4)), np.zeros((4, 1)), np.zeros((4, 1))
+        for _ in range(8):
+            for i in range(4):
+                for j in range(4):
+                    monodromy[i, j] = 1.0 if i == j else 0.0
+            cursor[0] = -1
+            code = lap(system, x, cursor, monodromy, strobes, impacts)
+            if code != DONE:
+                return UNDECIDED if code == LEFT else NONE
+            error = 0.0
+            for i in range(4):
+                step[i, 0] = strobes[n, i] - x[i]
+                error = max(error, abs(step[i, 0]) / peak[i])
+                for j in range(4):
+                    matrix[i, j] = monodromy[i, j] - (1.0 if i == j else 0.0)
+            if error < 1e-11 or (error < 1e-9 and error >= 0.5 * last):
+                return FOUND
+            if not factor(matrix, order) > 0.0:
+                return NONE
+            substitute(matrix, order, step, change)
+            largest = max(max(peak[0], peak[1]), max(peak[2], peak[3]))
+            for i in range(4):
+                x[i] -= change[i, 0]
+                if not abs(x[i]) <= 1e6 * largest:
+                    return NONE
+            last = error
+        return NONE
+
+    @inlined
+    def least_period(
+        system: Any, x: Float, n: int, peak: Float
+    ) -> int:  # fmt: skip
+        """The smallest divisor of n after which the strobe repeats; 0 where the run ends early, -1
+        where the flow was LEFT."""
+        strobes, impacts = np.zeros((n + 1, 4)), np.zeros((n, 2), dtype=np.int64)
+        cursor = np.zeros(3, dtype=np.int64)
+        cursor[0] = -1
+        code = lap(system, x, cursor, np.zeros((0, 0)), strobes, impacts)
+        if code != DONE:
+            return -1 if code == LEFT else 0
+        for d in range(1, n):
+            if n % d == 0 and distance(strobes[d], x, peak) <= STROBE_TOLERANCE:
+                return d
+        return n
+
+    @inlined
+    def after_periods(
+        system: Any, end: Float, mode: int, periods: int, x: Float, peak: Float
+    ) -> float:  # fmt: skip
+        """Distance from x after these periods from ``end``; infinite where the run ends early, -1
+        where the flow was LEFT."""
+        strobes, impacts = np.zeros((periods + 1, 4)), np.zeros((periods, 2), dtype=np.int64)
+        cursor = np.zeros(3, dtype=np.int64)
+        cursor[0] = mode
+        code = lap(system, end, cursor, np.zeros((0, 0)), strobes, impacts)
+        if code != DONE:
+            return -1.0 if code == LEFT else np.inf
+        return float(distance(strobes[periods], x, peak))
+
+    @inlined
+    def polish(
+        system: Any, strobes: Float, mode: int, longest: int, peak: Float, x: Float,
+        monodromy: Float, counted: Int,
+    ) -> int:  # fmt: skip
+        """Try to turn the end of a run, ``strobes`` in the mode ``mode``, into a stable orbit.
+
+        x, monodromy ← a strobe of it and its matrix; counted[0] ← its period, counted[SPENT] plus
+        the drive periods that this is charged. longest : a longer period is UNDECIDED.
+        """
+        k = strobes.shape[0] - 1
+        end = strobes[k]
+        for n in range(1, min(MAX_PERIOD, k) + 1):
+            if not distance(end, strobes[k - n], peak) <= WORTH:
+                continue
+            if n > longest:
+                return UNDECIDED
+            for i in range(4):
+                x[i] = end[i]
+            code = shoot(system, x, n, peak, monodromy)
+            least = n
+            counted[SPENT] += 8 * n
+            if code == FOUND and n > 1:
+                least = least_period(system, x, n, peak)
+                if least < 1:
+                    code = NONE if least == 0 else UNDECIDED
+                elif least < n:
+                    code = shoot(system, x, least, peak, monodromy)
+            if code == UNDECIDED:
+                return UNDECIDED
+            before = distance(end, x, peak)
+            if code == NONE or before >= NEAR:
+                continue
+            radius = spectral_radius(monodromy, 48)
+            if not radius < 1.0:
+                continue
+            turns = int(np.log(1e-4) / np.log(max(radius, 1e-3)))
+            turns = min(max(turns, 2), CLOSING // n)
+            counted[SPENT] += turns * n
+            if before > STROBE_TOLERANCE:  # does the motion itself go there? A passing one leaves
+                after = after_periods(system, end, mode, turns * n, x, peak)
+                if after < 0.0:
+                    return UNDECIDED
+                if not after <= max(10.0 * radius**turns * before, STROBE_TOLERANCE):
+                    continue
+            counted[0] = least
+            counted[SPENT] += 5 * n
+            return FOUND
+        return NONE
+
+    return polish
