@@ -328,16 +328,16 @@ def _left(
 
 
 def _fewest_of_each(
-    table: ValueTable, logs: Array, free: frozenset[float], quiet: Array | None = None
+    table: ValueTable, logs: Array, free: frozenset[float], largest: Array | None = None
 ) -> ValueTable:
     """One row for each different logarithm, ascending: that with the fewest values that are not
-    free, and with ``quiet`` also the one where that is largest."""
+    free, and with ``largest`` also the one where that is largest."""
     if len(table) == 0:
         return table
-    kept = []
-    for rank in (new_values(table.values, free), None if quiet is None else -quiet):
-        if rank is not None:
-            order = np.argsort(rank, kind="stable")
-            kept.append(order[np.unique(np.round(logs[order], DIGITS), return_index=True)[1]])
-    both = np.unique(np.concatenate(kept))
+    ranks = [new_values(table.values, free), *([] if largest is None else [-largest])]
+    first = []
+    for rank in ranks:
+        order = np.argsort(rank, kind="stable")
+        first.append(order[np.unique(np.round(logs[order], DIGITS), return_index=True)[1]])
+    both = np.unique(np.concatenate(first))
     return table.take(both[np.argsort(np.round(logs[both], DIGITS), kind="stable")])

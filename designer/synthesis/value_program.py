@@ -127,14 +127,14 @@ def _promising(
     """
     inside = [np.flatnonzero(t.error <= limit) for t in tables]
     best = sum(t.table.values.shape[1] for t in tables)
-    kept: list[list[Index]] = []
+    choices: list[list[Index]] = []
     for grid, count in _counted(tables, rules, ranking, inside):
         least = int(count.min(initial=best + 1))
         if least < best:
-            best, kept = least, []
+            best, choices = least, []
         if least == best:
-            kept.append([np.unique(g[count == best]) for g in grid])
-    return _joined(kept, inside)
+            choices.append([np.unique(g[count == best]) for g in grid])
+    return _joined(choices, inside)
 
 
 def _few_enough(
@@ -143,17 +143,17 @@ def _few_enough(
     """Places of the rows that stand in a choice of least error among those with at most
     ``ranking.most`` new values; none where there is no such choice."""
     every = [np.arange(len(t)) for t in tables]
-    best, kept = np.inf, list[list[Index]]()
+    best, choices = np.inf, list[list[Index]]()
     for grid, count in _counted(tables, rules, ranking, every):
         few = count <= (len(count) if ranking.most is None else ranking.most)
         grid = [g[few] for g in grid]
         error = np.max([t.error[g] for t, g in zip(tables, grid, strict=True)], axis=0)
         least = float(error.min(initial=np.inf))
         if least < best:
-            best, kept = least, []
+            best, choices = least, []
         if len(error) and least == best:
-            kept.append([np.unique(g[error == best]) for g in grid])
-    return _joined(kept, [np.zeros(0, dtype=np.intp)] * len(tables))
+            choices.append([np.unique(g[error == best]) for g in grid])
+    return _joined(choices, [np.zeros(0, dtype=np.intp)] * len(tables))
 
 
 def _counted(
@@ -175,11 +175,11 @@ def _counted(
         yield grid, new_values(values, ranking.free)
 
 
-def _joined(kept: Sequence[Sequence[Index]], without: list[Index]) -> list[Index]:
+def _joined(choices: Sequence[Sequence[Index]], without: list[Index]) -> list[Index]:
     """The places of all keys together."""
-    if not kept:
+    if not choices:
         return without
-    return [np.unique(np.concatenate(places)) for places in zip(*kept, strict=True)]
+    return [np.unique(np.concatenate(places)) for places in zip(*choices, strict=True)]
 
 
 def _solve(
@@ -188,32 +188,32 @@ def _solve(
     """Rows of least error; with a ``limit`` of the error, of fewest values and least price."""
     picks = [cp.Variable(len(t), boolean=True) for t in tables]
     error = cp.Variable(nonneg=True)
-    held: list[object] = [cp.sum(z) == 1 for z in picks]
+    constraints: list[object] = [cp.sum(z) == 1 for z in picks]
     keys = np.unique(tables[0].key)
     members = [(t.key[None, :] == keys[:, None]).astype(float) for t in tables]
     if len(keys) > 1:
         for member, z in zip(members[1:], picks[1:], strict=True):
-            held.append(members[0] @ picks[0] == member @ z)
+            constraints.append(members[0] @ picks[0] == member @ z)
     for rule in rules:
         total = sum(w @ z for w, z in zip(rule.weights, picks, strict=True))
-        held += [total >= rule.low] if np.isfinite(rule.low) else []
-        held += [total <= rule.high] if np.isfinite(rule.high) else []
-    held += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
+        constraints += [total >= rule.low] if np.isfinite(rule.low) else []
+        constraints += [total <= rule.high] if np.isfinite(rule.high) else []
+    constraints += [t.error @ z <= error for t, z in zip(tables, picks, strict=True)]
     objective: Any = error
     if limit is not None or ranking.most is not None:
         uses = [(z, c) for t, z in zip(tables, picks, strict=True) for c in t.table.values.T]
         kinds, at_least = distinct_values(uses, np.array(sorted(ranking.free), dtype=float))
-        held += at_least
+        constraints += at_least
     if ranking.most is not None:
-        held.append(cp.sum(kinds) <= ranking.most)
+        constraints.append(cp.sum(kinds) <= ranking.most)
     if limit is not None:
         price: Any = 0.0
         for z, column in uses:
             cost = np.array([ranking.price.get(float(v), 0.0) for v in column])
             price = price + cost @ z if cost.any() else price
         objective = cp.sum(kinds) + PRICE_WEIGHT * price + ERROR_WEIGHT / limit * error
-        held.append(error <= limit)
-    problem = cp.Problem(cp.Minimize(objective), held)
+        constraints.append(error <= limit)
+    problem = cp.Problem(cp.Minimize(objective), constraints)
     problem.solve(solver=cp.HIGHS, **SOLVER)
     chosen = [chosen_row(z) for z in picks]
     rows = tuple(row for row in chosen if row is not None)
