@@ -151,6 +151,7 @@ from .plain_json import (
     plain as plain,
 )
 from .progress import (
+    Laps as Laps,
     Progress as Progress,
     doing as doing,
     part as part,

@@ -36,6 +36,20 @@ BEAT = 1.0
 """s between two looks at whether it was silent too long."""
 
 
+class Laps:
+    """Wall times of the parts of a work that follow each other."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        """Wall time of each part that has ended [s], by name."""
+        self._began = time.perf_counter()
+
+    def end(self, name: str) -> None:
+        """A part ends here, and the next one begins."""
+        now = time.perf_counter()
+        self.seconds[name], self._began = now - self._began, now
+
+
 class ProgressStage:
     """One stage of the work: its steps, and when something was last said about it.
 

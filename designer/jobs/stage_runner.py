@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from designer.base.defaults import cores
 from designer.base.design_folder import Folder
 from designer.base.manifest import StageName, Stages
 from designer.base.progress import Progress
@@ -17,6 +18,7 @@ from designer.catalog.catalog import load_catalog
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
 from designer.jobs import design_files, kicad_files
+from designer.jobs.compile_ahead import compiling_ahead
 from designer.jobs.design_source import design_inputs, design_stage, standing_design
 from designer.jobs.options import Options
 from designer.model.model_file import ModelFile, naming
@@ -78,8 +80,9 @@ class StageRunner:
         stages = {stage: self.stages[stage] for stage in self.todo}
         if "design" in stages:
             self.progress.stage("responses of the model, parts")
-            made = synthesis_result.synthesise(self.modelfile, self.catalog)
-            write_design(self.folder, made, stages, self.options, self.progress)
+            with compiling_ahead(self.options.jobs or cores()):
+                made = synthesis_result.synthesise(self.modelfile, self.catalog)
+                write_design(self.folder, made, stages, self.options, self.progress)
         else:
             made = design_files.load(self.folder, self.modelfile, self.catalog)
             if stages:

@@ -185,10 +185,13 @@ class StudyStage:
                 "maps_seconds": sum(each.seconds for each in study.maps),
                 "jobs": float(help_.jobs),
                 "design_seconds": design_seconds,
+                **{f"{name}_seconds": seconds for name, seconds in study.seconds.items()},
             }
             return run_result(self.made, study, options, cost, equations)
 
         def sampled(study: Study) -> None:
+            if help_.pool is None:
+                return
             self.progress.note("yields of the exact circuit; ngspice is now asked about boards")
             self.shown(run_json(folder.json(DESIGN), plain(result_json(result_of(study)))))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -106,6 +106,8 @@ class Study:
     """Yield maps of questions; empty where none were asked for."""
     blame_wanted: bool = True
     """Whether a blame was asked for."""
+    seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
+    """Wall time of each part of the work [s], as far as it has gone."""
 
     def answers_to(self, index: int) -> tuple[Answer, ...]:
         """The answers for response number ``index``, by sample."""

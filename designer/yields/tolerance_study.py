@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Literal
 
 from designer.base.defaults import SAMPLES as SAMPLES, SEED as SEED, at_least, cores
-from designer.base.progress import Progress
+from designer.base.progress import Laps, Progress
 from designer.check import checked_design
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
@@ -115,8 +115,8 @@ def tolerance(
     settings over which the yield is wanted (``yield_maps.OVERS``). checked : of the same design, to
     save the time of the gate. pool : where ngspice runs; without one ngspice is not asked. stores :
     where rows are read from and written to. runner : who computes blocks; this process if None.
-    sampled : is given the study once the exact circuit has every board and ngspice is still to be
-    asked. standing : is given the study once its yields stand and the blame or maps are still to be
+    sampled : is given the study once the exact circuit has every board, before ngspice is asked.
+    standing : is given the study once its yields stand and the blame or maps are still to be
     worked out.
     """
     need_responses(synthesis.modelfile)
@@ -139,7 +139,10 @@ def tolerance(
     )
     if plan.spread.gain_bandwidth is not None:
         progress.note(f"the spread of the gain-bandwidth {NO_BANDWIDTH}")
-    study = Study(checked, plan, asked, left_out, (), until=until, blame_wanted=blamed)
+    laps = Laps()
+    study = Study(
+        checked, plan, asked, left_out, (), until=until, blame_wanted=blamed, seconds=laps.seconds
+    )
     if not asked:
         return study
     work = Work(
@@ -153,11 +156,14 @@ def tolerance(
     )
     if until is None:
         study = work.sampled(study)
-        if pool is not None:
-            sampled(study)
+        laps.end("exact")
+        sampled(study)
+        laps.end("early_table")
         study = work.cross_checked(study)
+        laps.end("ngspice")
     else:
         study = work.grown(study)
+        laps.end("growing")
     if tuned:
         study = work.tuned(study, synthesis.modelfile.tuning)
     trim = dc_trim(synthesis)
@@ -165,10 +171,12 @@ def tolerance(
         study = work.trimmed(study, trim)
     if reached:
         study = work.powered_up(study)
+    laps.end("further_layers")
     if blamed:
         study = replace(study, blame=work.stores.blame(study.plan, blame_budget))
     if standing is not None and (maps or (blamed and study.blame is None)):
         standing(study)
+        laps.end("first_report")
     if blamed and study.blame is None:
         study = work.blamed(study)
     return work.mapped(study, maps) if maps else study

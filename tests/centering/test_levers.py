@@ -123,7 +123,7 @@ def test_places_that_stay_where_they_were_are_worth_nothing(
     ) -> tuple[list[Scored], int]:
         return score(bench, spec, [seen[0].at((0.5,))[0]], 16), 1
 
-    monkeypatch.setattr("designer.centering.design_search.places", middle)
+    monkeypatch.setattr("designer.centering.design_search.best_points", middle)
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     found = search(file('omega = "best"\nexpect = "1-2-2"'), catalog())
     assert found.start is not None

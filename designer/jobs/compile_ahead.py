@@ -1,0 +1,64 @@
+"""The exact engine's part for circuits, compiled by a process of its own on a first run.
+
+After an installation or an update the compiler takes longer than the choice of the parts, on one
+core. The part for circuits is needed last: another process compiles it while this one compiles what
+comes first, and stores it where `base.jit` finds it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from designer.base import jit
+from designer.catalog.catalog import load_catalog
+from designer.circuit.board_arrays import Boards
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import nominal_board
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.circuit_table import CircuitSpec
+from designer.model.model import Dimensionless
+from designer.synthesis.attempt import zone_of_spec
+from designer.synthesis.part_names import parts_of
+
+CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circuits()"
+
+
+@contextmanager
+def compiling_ahead(jobs: int) -> Iterator[None]:
+    """The other process works, where nothing is compiled yet and there is a core for it; it ends
+    with the block at the latest."""
+    if jobs < 2 or jit.CACHE is None or any(jit.CACHE.iterdir()):
+        yield
+        return
+    process = subprocess.Popen(
+        [sys.executable, "-c", CALL],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,  # what goes wrong here goes wrong again where it is needed
+        start_new_session=True,  # Ctrl-C is for the run, which ends this one
+    )
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+def compile_circuits() -> None:
+    """Compile it by using it once: one board with every value 1."""
+    model, spec, catalog = (
+        Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25),
+        CircuitSpec(),
+        load_catalog(),
+    )
+    circuit = parts_of(model, spec, catalog, zone_of_spec(model, spec, catalog))
+    boards = Ensemble(Boards.of(circuit, [nominal_board(circuit)]))
+    drive, rest = Drive(1.0), np.zeros(len(circuit.states))
+    Flow(boards.reduction(0).system(), drive).run(rest, 1)
+    boards.settle([0], [drive], rest[None])

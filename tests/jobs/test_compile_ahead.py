@@ -1,0 +1,64 @@
+"""The kernels for circuits are compiled by another process where none is compiled yet."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from designer.base import jit
+from designer.circuit import kernel_nodal
+from designer.dynamics import kernel_four_state
+from designer.jobs.compile_ahead import compile_circuits, compiling_ahead
+
+
+class Process:
+    """A process that is only said to run."""
+
+    def __init__(self, said: list[str]) -> None:
+        self.said = said
+
+    def kill(self) -> None:
+        self.said.append("kill")
+
+    def wait(self) -> None:
+        self.said.append("wait")
+
+
+@pytest.mark.parametrize(
+    ("jobs", "files", "expected"),
+    [(2, [], ["start", "work", "kill", "wait"]), (2, ["old"], ["work"]), (1, [], ["work"])],
+)
+def test_a_process_works_beside_a_first_run(
+    jobs: int,
+    files: list[str],
+    expected: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said: list[str] = []
+
+    def start(*_: Any, **__: Any) -> Process:
+        said.append("start")
+        return Process(said)
+
+    for name in files:
+        (tmp_path / name).touch()
+    monkeypatch.setattr(jit, "CACHE", tmp_path)
+    monkeypatch.setattr(subprocess, "Popen", start)
+    with compiling_ahead(jobs):
+        said.append("work")
+    assert said == expected
+
+
+def test_it_compiles_what_a_circuit_needs() -> None:
+    compile_circuits()
+    kernels: list[Any] = [
+        kernel_nodal.solve_all,
+        kernel_four_state.fill,
+        kernel_four_state.advance,
+        kernel_four_state.respond_all,
+    ]
+    assert all(kernel.signatures for kernel in kernels)
