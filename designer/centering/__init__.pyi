@@ -1,6 +1,9 @@
 from . import (
     cure_table as cure_table,
 )
+from .answer_cache import (
+    AnswerCache as AnswerCache,
+)
 from .cure_branch import (
     KINDS as KINDS,
     cured as cured,
@@ -28,9 +31,6 @@ from .design_search import (
 )
 from .limiting_parts import (
     limitings as limitings,
-)
-from .memory import (
-    Memory as Memory,
 )
 from .ngspice_check import (
     LEVELS as LEVELS,

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import Agreement
-from designer.centering.places import Scored
+from designer.centering.operating_points import Scored
 from designer.centering.windows import Stretch
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design

@@ -2,8 +2,8 @@
 asked for (docs/cure.md).
 
 Rounds of choosing and measuring. Each branch (``cure_branch``) has a linear picture
-(``cure_picture``); the cheapest choice of upgrades that it promises to be enough is found by
-mixed-integer optimisation (``cure_program``) and put to fresh boards on the exact rung. A response
+(``cure_linear_model``); the cheapest choice of upgrades that it promises to be enough is found by
+mixed-integer optimisation (``cure_milp``) and put to fresh boards on the exact rung. A response
 that falls short has its demand tightened by what was measured, and the next round chooses again.
 Branches are made only as far as they may be cheaper than what is known.
 """
@@ -31,11 +31,12 @@ from designer.centering.cure_measure import (
     plan_of,
 )
 from designer.centering.cure_milp import CureProgram, cheapest
-from designer.centering.cure_tighten import cut, shown
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
+from designer.centering.cure_ways import ResponseWay
 from designer.centering.limiting_parts import limiting, together
 from designer.check.synthesis_result import Synthesis
+from designer.circuit.board_arrays import Boards
 from designer.model.model_file import need_responses
 from designer.spread.part_rules import spread_of
 from designer.yields.trimmed_yield import DcTrim
@@ -53,6 +54,11 @@ FRONT_TARGETS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 FRONT_POINTS = 5
 """Points of the front that are measured beside those of the rounds."""
 FRONT_BOARDS = 500
+TIGHTER = 0.95
+"""Of a demand's room: the least by which it is tightened where a promise was not kept."""
+LARGEST_STEP = 2.0
+"""The factor by which a measurement brings a loss nearer than the picture has it, at most: one that
+is so wrong says little about by how much."""
 
 
 def find_cure(
@@ -248,7 +254,7 @@ class _Search:
             if short:
                 for r in short:
                     key = r, pick[len(seen.parts) + r]
-                    shrink[key] = shrink.get(key, 1.0) * cut(program, pick, key, len(seen.parts))
+                    shrink[key] = shrink.get(key, 1.0) * _cut(program, pick, key, len(seen.parts))
             else:
                 enough[pick] = promised
             z = seen.quantiles(target, boards)
@@ -326,7 +332,7 @@ class _Search:
                 continue
             # The upper end of what the measurement allows: the cheapest is come upon from below.
             key, rate = (which, r, w), m.counts.interval[1]
-            self.shrink[key] = min(self.shrink.get(key, 1.0), shown(way, boards, rate))
+            self.shrink[key] = min(self.shrink.get(key, 1.0), _shown(way, boards, rate))
 
     def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
         limits = tuple(self._limit(r) for r in range(len(self.base.found)))
@@ -406,3 +412,24 @@ class _Search:
             if not front or t.worst.rate > front[-1].worst.rate:
                 front.append(t)
         return tuple(front) if before in front else (before, *front)
+
+
+def _cut(program: CureProgram, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
+    """A factor on a way's room under which this choice no longer keeps its demands."""
+    r, w = key
+    own = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]
+    shares = [d.variance(pick) / d.room for d in own]
+    return min(TIGHTER, 0.999 * max(shares, default=1.0))
+
+
+def _shown(way: ResponseWay, boards: Boards, rate: float) -> float:
+    """By which factor the room of a way's demands is to shrink for the picture to promise what was
+    measured: the square of the ratio of the distances at which that share of boards is lost; 1
+    where more are ok than was promised."""
+    assert way.margin is not None
+    form = way.margin.of(boards)
+    middle = float(np.median(form))
+    reach = middle - float(np.quantile(form, min(1.0 - rate, 0.5)))
+    if middle <= 0.0 or reach >= middle:
+        return 1.0
+    return max((reach / middle) ** 2, 1.0 / LARGEST_STEP**2)

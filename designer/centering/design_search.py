@@ -23,6 +23,7 @@ from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
+from designer.centering.answer_cache import AnswerCache
 from designer.centering.candidate import Candidate, Contribution, Listened, Searched, Step, better
 from designer.centering.distance import Stretched
 from designer.centering.levers import (
@@ -34,10 +35,9 @@ from designer.centering.levers import (
     topologies,
     variants,
 )
-from designer.centering.memory import Memory
 from designer.centering.ngspice_check import LISTENED, RUNG, Agreement, Listen
-from designer.centering.places import MANY, places, room_of, score
-from designer.centering.windows import ResponsePlace, Stretch, open_in, stretches
+from designer.centering.operating_points import MANY, best_points, room_of, score
+from designer.centering.windows import OperatingPoint, Stretch, open_in, stretches
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.design import Design
 from designer.model import find_responses
@@ -58,7 +58,7 @@ def search(
     *,
     seed: int = 1,
     jobs: int = 1,
-    memory: Memory | None = None,
+    memory: AnswerCache | None = None,
     windows: Sequence[tuple[Stretch, ...]] | None = None,
     listen: Listen | None = None,
     progress: Progress | None = None,
@@ -85,7 +85,7 @@ def search(
             seen,
             seed,
             jobs,
-            Memory() if memory is None else memory,
+            AnswerCache() if memory is None else memory,
             listen,
             said,
         )
@@ -134,7 +134,7 @@ class _Hunt:
         seen: tuple[tuple[Stretch, ...], ...],
         seed: int,
         jobs: int,
-        memory: Memory,
+        memory: AnswerCache,
         listen: Listen | None,
         said: Progress,
     ) -> None:
@@ -212,7 +212,7 @@ class _Hunt:
                 continue
             step = self.said.stage(f"place of response {number + 1}, {spec.expect}")
             room = room_of(spec, self.modelfile.model.b, self.modelfile.search.omega)
-            ranked, tried = places(bench, spec, self.seen[number], room, progress=step)
+            ranked, tried = best_points(bench, spec, self.seen[number], room, progress=step)
             self.places += tried
             if not ranked:
                 raise self._nowhere(number, spec)
@@ -293,7 +293,7 @@ class _Hunt:
         bench = self._bench(choice, found, design, BOARDS)
         scored = tuple(
             score(
-                bench, r.spec, [ResponsePlace(r.omega, r.b, r.orbit.start)], BOARDS, progress=step
+                bench, r.spec, [OperatingPoint(r.omega, r.b, r.orbit.start)], BOARDS, progress=step
             )[0]
             for r in found
         )
@@ -337,7 +337,7 @@ class _Hunt:
         made = self._candidate(choice, found, "what a lever is worth")
         return None if made is None else made.rank
 
-    def _there(self, spec: Response, ranked: Sequence[ResponsePlace]) -> ModelResponse:
+    def _there(self, spec: Response, ranked: Sequence[OperatingPoint]) -> ModelResponse:
         """The first of these places at which ``find_responses.find`` meets the response too."""
         model = self.modelfile.model
         for place in ranked:

@@ -21,8 +21,8 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
 from designer.base.plain_json import plain
-from designer.centering.memory import Memory
-from designer.centering.windows import ResponsePlace
+from designer.centering.answer_cache import AnswerCache
+from designer.centering.windows import OperatingPoint
 from designer.circuit.design import Design
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation
@@ -81,7 +81,7 @@ class Stand:
 
     spec: Response
     """The wanted response."""
-    place: ResponsePlace
+    place: OperatingPoint
     """Where it is asked for."""
     drive: Drive
     """The generator's drive there."""
@@ -104,10 +104,10 @@ class Stretched:
         count: int,
         *,
         jobs: int = 1,
-        memory: Memory | None = None,
+        memory: AnswerCache | None = None,
     ) -> None:
         self.design, self.count, self.jobs = design, count, jobs
-        self._memory = Memory() if memory is None else memory
+        self._memory = AnswerCache() if memory is None else memory
         drawn = draw_many(design.circuit, spread, seed, range(count), STREAM)
         rows = [0] + [i for _ in LADDER for i in range(count)]
         shares = np.concatenate([[0.0], np.repeat(LADDER, count)])
@@ -115,7 +115,7 @@ class Stretched:
         circuit = design.circuit
         self._whose = [circuit.opamp, sorted(circuit.values.items()), plain(spread.as_dict()), seed]
 
-    def stands(self, wanted: Sequence[tuple[Response, ResponsePlace]]) -> list[Stand | None]:
+    def stands(self, wanted: Sequence[tuple[Response, OperatingPoint]]) -> list[Stand | None]:
         """Each place on the nominal board; None where that does not show the response there."""
         if not wanted:
             return []
@@ -171,7 +171,7 @@ class Stretched:
         asked = [boards.start, boards.stop, list(stretches)]
         return [self._whose, nine_digits(setting), wanted, asked]
 
-    def excitation(self, place: ResponsePlace) -> Excitation:
+    def excitation(self, place: OperatingPoint) -> Excitation:
         """The generator's setting for a place."""
         frequency = self.design.errors.scales.frequency(place.omega)
         return Excitation(frequency, self.design.amplitude(place.b))

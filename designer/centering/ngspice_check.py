@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from designer.centering.answer_cache import AnswerCache
 from designer.centering.distance import Stand, Stretched
-from designer.centering.memory import Memory
 from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
@@ -67,7 +67,7 @@ Listen = Callable[[Stretched, Sequence[Stand | None], Callable[[], None]], tuple
 class Listener:
     """Asks ngspice, and remembers. pool : where it runs. memory : of the search."""
 
-    def __init__(self, pool: SpicePool, memory: Memory) -> None:
+    def __init__(self, pool: SpicePool, memory: AnswerCache) -> None:
         self._pool, self._memory = pool, memory
 
     def __call__(

@@ -33,7 +33,7 @@ COURSE = Course(settle=300, keep=10, patience=300)
 
 
 @dataclass(frozen=True)
-class ResponsePlace:
+class OperatingPoint:
     """Where a response is asked for."""
 
     omega: float
@@ -48,7 +48,7 @@ class ResponsePlace:
 class Stretch:
     """Neighbouring places at one clearance that show one response, by ascending ω."""
 
-    places: tuple[ResponsePlace, ...]
+    places: tuple[OperatingPoint, ...]
     """The places."""
 
     @property
@@ -63,7 +63,7 @@ class Stretch:
     def high(self) -> float:
         return self.places[-1].omega
 
-    def at(self, shares: Sequence[float]) -> list[ResponsePlace]:
+    def at(self, shares: Sequence[float]) -> list[OperatingPoint]:
         """The places nearest to these shares of the way from the lower end to the upper, in the
         order of the shares."""
         last = len(self.places) - 1
@@ -171,12 +171,12 @@ def _grid(ends: tuple[float, float]) -> Array:
 def _runs(
     response: Response, omegas: Array, b: float, tracks: Sequence[Sequence[Steady]]
 ) -> list[Stretch]:
-    places: list[ResponsePlace | None] = []
+    places: list[OperatingPoint | None] = []
     for i, omega in enumerate(omegas):
         step = next((t[i] for t in tracks if shows(response, t[i])), None)
-        places.append(None if step is None else ResponsePlace(float(omega), b, step.start))
+        places.append(None if step is None else OperatingPoint(float(omega), b, step.start))
     out: list[Stretch] = []
-    run: list[ResponsePlace] = []
+    run: list[OperatingPoint] = []
     for place in [*places, None]:
         if place is not None:
             run.append(place)
@@ -188,7 +188,7 @@ def _runs(
 
 def _single(model: Dimensionless, response: Response, omega: float, b: float) -> list[Stretch]:
     found = find_responses.find(model, [replace(response, omega=omega, b=b)])[0]
-    return [Stretch((ResponsePlace(omega, b, found.orbit.start),))] if found.found else []
+    return [Stretch((OperatingPoint(omega, b, found.orbit.start),))] if found.found else []
 
 
 def _refuse(number: int, response: Response, spec: SearchSpec) -> None:

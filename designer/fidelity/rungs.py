@@ -6,11 +6,12 @@ and slew (``dynamic``), with a macromodel (``full``). The largest step of ngspic
 the period that follows the shortest contact (``numerics_gate.first_steps``): "step ×1, reltol
 1e-05" is what the numerics gate tries first, "step ×4" four times that step, so coarser. The
 tolerance goes with the step, for beside a tight one ngspice takes the small steps anyway. Of each
-setting it is said whether it passes the gate (``fidelity.gate``).
+setting it is said whether it passes the gate (`passes`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -27,9 +28,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
-from designer.fidelity import gate as trade_gate, runge_kutta
+from designer.fidelity import runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
-from designer.fidelity.gate import Run
 from designer.model.find_responses import ModelResponse
 from designer.model.model import Dimensionless
 from designer.spice import numerics_gate as gate
@@ -39,6 +39,8 @@ from designer.spice.opamp_model import RUNGS as SPICE_RUNGS, Rung
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read, Reading, read
 from designer.spice.simulator import SimulationFailed, Waveforms
+
+Run = Read | SimulationFailed
 
 RK4, MODEL, CIRCUIT = "rk4", "model", "circuit"
 RUNGS = (RK4, MODEL, CIRCUIT, *SPICE_RUNGS)
@@ -215,7 +217,7 @@ def _spice(
         for k, own in enumerate(ladder):
             settings = _own(one, own)
             asks.append((one, k, settings))
-            asks += [(one, k, other) for other in trade_gate.companions(settings)]
+            asks += [(one, k, other) for other in companions(settings)]
     jobs = [gate.job(one, said, keep=said == _own(one, ladder[k])) for one, k, said in asks]
     heard = dict(pool.map(jobs))
     runs: dict[tuple[Rung, int], list[Run]] = {}
@@ -225,7 +227,7 @@ def _spice(
         for k, own in enumerate(ladder):
             settings = _own(one, own)
             found, half, gear = runs[one.rung, k]
-            passed = trade_gate.passed(one, found, (half, gear))
+            passed = passes(one, found, (half, gear))
             entrant = _timed(one, settings, clock)
             said = {**settings.as_dict(), "steps_a_period": ladder[k][0]}
             said["discarded_periods"] = one.discard
@@ -273,3 +275,41 @@ def _traced(found: Read, volts: float) -> Array:
     count = found.orbit.n * POINTS
     grid = time[-1] * np.arange(count) / count
     return np.asarray(np.interp(grid, time, states[:, 0])) / volts
+
+
+def companions(settings: SolverSettings) -> tuple[SolverSettings, SolverSettings]:
+    """What a setting is held against: half its step, and the other method at that."""
+    half = replace(settings, max_step=settings.max_step / 2.0)
+    return half, replace(half, method="gear")
+
+
+def passes(subject: GateSubject, own: Run, beside: tuple[Run, Run]) -> bool:
+    """Whether the run of a setting, which has its trace, and those of its ``companions`` agree, as
+    in ``spice.numerics_gate``.
+
+    Above ideal op-amps the n-p-q is the rung's own: whether it is the exact circuit's is what a
+    trade measures. subject : on its rung.
+    """
+    read = [run for run in (own, *beside) if isinstance(run, Read)]
+    if len(read) < 3 or isinstance(own, SimulationFailed):
+        return False
+    exact, found = subject.orbit, own.orbit
+    if found.status not in (OrbitStatus.PERIODIC, OrbitStatus.APERIODIC):
+        return False
+    if len({run.orbit.response for run in read}) > 1:
+        return False
+    ideal = subject.rung == "ideal"
+    if ideal and found.response != exact.response:
+        return False
+    if found.status is not OrbitStatus.PERIODIC:
+        return True  # there is no strobe and no wave to compare
+    extremes = exact.extremes if exact.status is OrbitStatus.PERIODIC else found.extremes
+    peak = np.abs(extremes).max(axis=1)
+    last = [run.strobes[-found.n :] for run in read]
+    apart = max(
+        float((np.abs(a - b) / peak).max()) for i, a in enumerate(last) for b in last[i + 1 :]
+    )
+    if apart > gate.BOUND:
+        return False
+    wave = gate.wave_error(subject, own) if ideal else 0.0
+    return not math.isnan(wave) and wave <= gate.wave_bound(exact)

@@ -18,8 +18,8 @@ from designer.base.plain_json import dumps
 from designer.base.progress import Progress
 from designer.base.version import __version__
 from designer.catalog.catalog import load_catalog
+from designer.centering.answer_cache import AnswerCache
 from designer.centering.design_search import look, search as design_search
-from designer.centering.memory import Memory
 from designer.centering.ngspice_check import Listener
 from designer.centering.resolved_file import resolved
 from designer.centering.result_json import search_json
@@ -92,7 +92,7 @@ def searched_into(
     # trade.json goes with its design, and so before this is done.
     folder.begin({"search": (inputs, FILES)}, origin, {"trade": trade} if trade else None)
     folder.write(ASKED, modelfile.text)
-    memory = Memory(folder / CANDIDATES, inputs["model"], progress.note)
+    memory = AnswerCache(folder / CANDIDATES, inputs["model"], progress.note)
     with SpicePool(options.workers, timeout=SPICE_TIMEOUT) as pool:
         searched = design_search(
             modelfile,

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.stats import norm
 
+from designer.centering.answer_cache import AnswerCache
 from designer.centering.distance import LADDER, STREAM, Counts, Stretched
-from designer.centering.memory import Memory
-from designer.centering.windows import ResponsePlace
+from designer.centering.windows import OperatingPoint
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import STAGES
 from designer.spread.board_quantities import between
@@ -53,7 +53,7 @@ def test_the_boards_are_the_spread_s_stretched() -> None:
     """The compiled shortcut counts what the study's rung, asked one by one, says."""
     synthesis, response = made(), made().found[0]
     bench = Stretched(synthesis.design, spread(), 5, COUNT)
-    place = ResponsePlace(response.omega, response.b, response.orbit.start)
+    place = OperatingPoint(response.omega, response.b, response.orbit.start)
     (stand,) = bench.stands([(response.spec, place)])
     assert stand is not None
     (found,) = bench.ask([stand], range(COUNT))
@@ -80,16 +80,16 @@ def test_the_boards_are_the_spread_s_stretched() -> None:
 def test_a_place_without_the_response_has_no_stand() -> None:
     bench = Stretched(made().design, spread(), 5, 1)
     response = made().found[0]
-    there = ResponsePlace(0.85, 0.25, response.orbit.start)
-    elsewhere = ResponsePlace(0.6, 0.25, response.orbit.start)
+    there = OperatingPoint(0.85, 0.25, response.orbit.start)
+    elsewhere = OperatingPoint(0.6, 0.25, response.orbit.start)
     stands = bench.stands([(response.spec, there), (response.spec, elsewhere)])
     assert stands[0] is not None
     assert stands[1] is None
 
 
 def test_what_is_known_is_not_asked_again() -> None:
-    memory, response = Memory(), made().found[0]
-    place = ResponsePlace(response.omega, response.b, response.orbit.start)
+    memory, response = AnswerCache(), made().found[0]
+    place = OperatingPoint(response.omega, response.b, response.orbit.start)
     steps: list[int] = []
     answers = []
     for _ in range(2):

@@ -16,8 +16,8 @@ from designer.centering.design_search import BOARDS, look, search
 from designer.centering.distance import Stand, Stretched
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
 from designer.centering.ngspice_check import Agreement
-from designer.centering.places import Scored, score
-from designer.centering.windows import ResponsePlace, Stretch
+from designer.centering.operating_points import Scored, score
+from designer.centering.windows import OperatingPoint, Stretch
 from designer.model import find_responses
 from designer.model.model_file import ModelFile
 from designer.model.response_table import Response
@@ -157,7 +157,7 @@ def _enumerated(modelfile: ModelFile, choice: DesignChoice) -> Candidate:
     design = parts_choice.synthesise(model, spec, catalog(), held, found, aims=choice.aims)
     spread = spread_of(modelfile, design.circuit, catalog())
     bench = Stretched(design, spread, 1, BOARDS)
-    places = [ResponsePlace(r.omega, r.b, r.orbit.start) for r in found]
+    places = [OperatingPoint(r.omega, r.b, r.orbit.start) for r in found]
     scored = tuple(score(bench, r.spec, [p], BOARDS)[0] for r, p in zip(found, places, strict=True))
     return Candidate(choice, design, found, scored)
 

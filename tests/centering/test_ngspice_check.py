@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from designer.centering.answer_cache import AnswerCache
 from designer.centering.distance import STREAM, Stand, Stretched
-from designer.centering.memory import Memory
 from designer.centering.ngspice_check import (
     FEWER,
     LEAST,
@@ -21,7 +21,7 @@ from designer.centering.ngspice_check import (
     Agreement,
     Listener,
 )
-from designer.centering.windows import ResponsePlace
+from designer.centering.windows import OperatingPoint
 from designer.circuit.reduction import Reduction
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.pool import SpicePool
@@ -32,10 +32,10 @@ from designer.yields.ngspice_runs import NgspiceAnswer, Query
 from tests.shared.search_cases import made, spread
 
 
-def bench(memory: Memory | None = None) -> tuple[Stretched, Stand]:
+def bench(memory: AnswerCache | None = None) -> tuple[Stretched, Stand]:
     found = Stretched(made().design, spread(), 1, LISTENED, memory=memory)
     (response,) = made().found
-    place = ResponsePlace(response.omega, response.b, response.orbit.start)
+    place = OperatingPoint(response.omega, response.b, response.orbit.start)
     (stand,) = found.stands([(response.spec, place)])
     assert stand is not None
     return found, stand
@@ -100,7 +100,7 @@ def test_what_ngspice_says_is_counted(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=True)]
     )
     monkeypatch.setattr("designer.centering.ngspice_check.confirm", confirm)
-    assert Listener(None, Memory())(boards, [wanted]) == (found,)  # type: ignore[arg-type]
+    assert Listener(None, AnswerCache())(boards, [wanted]) == (found,)  # type: ignore[arg-type]
 
 
 def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,7 +108,7 @@ def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.M
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=False)]
     )
-    (found,) = Listener(None, Memory())(boards, [stand])  # type: ignore[arg-type]
+    (found,) = Listener(None, AnswerCache())(boards, [stand])  # type: ignore[arg-type]
     assert found == Agreement(LISTENED, 0, LISTENED)
     assert found.borne_out is None
 
@@ -132,7 +132,7 @@ def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(
             "designer.centering.ngspice_check.way_to_rung", lambda _, ways=ways: next(ways)
         )
-        assert Listener(None, Memory())(boards, [stand]) == (found,)  # type: ignore[arg-type]
+        assert Listener(None, AnswerCache())(boards, [stand]) == (found,)  # type: ignore[arg-type]
 
 
 def test_the_boards_are_those_of_the_prediction() -> None:
@@ -152,7 +152,7 @@ def test_the_boards_are_those_of_the_prediction() -> None:
 
 @pytest.mark.slow
 def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    memory = Memory(tmp_path / "said.jsonl", "mine")
+    memory = AnswerCache(tmp_path / "said.jsonl", "mine")
     boards, stand = bench()
     calls: list[int] = []
     with SpicePool(2) as pool:
@@ -167,6 +167,6 @@ def test_ngspice_keeps_what_it_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise AssertionError("asked again")
 
     monkeypatch.setattr("designer.centering.ngspice_check.numerics_gate.check", never)
-    known = Memory(tmp_path / "said.jsonl", "mine")
+    known = AnswerCache(tmp_path / "said.jsonl", "mine")
     with SpicePool(1) as pool:
         assert Listener(pool, known)(boards, [stand]) == (heard,)

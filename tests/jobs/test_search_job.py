@@ -17,8 +17,8 @@ from designer.base.errors import InputError
 from designer.base.manifest import StageName
 from designer.base.plain_json import dumps
 from designer.base.progress import Progress
+from designer.centering.answer_cache import AnswerCache
 from designer.centering.levers import DesignChoice
-from designer.centering.memory import Memory
 from designer.centering.resolved_file import resolved
 from designer.cli import entry as cli
 from designer.fidelity.trade_study import IDEAL, SHARE
@@ -297,17 +297,17 @@ def test_a_search_from_end_to_end(
     assert files(whole) == before
 
     # Interrupted and resumed, it ends with the same files.
-    write, left = Memory._write, [3]
+    write, left = AnswerCache._write, [3]
 
-    def interrupted(self: Memory, rows: dict[str, tuple[int, ...]]) -> None:
+    def interrupted(self: AnswerCache, rows: dict[str, tuple[int, ...]]) -> None:
         write(self, rows)
         left[0] -= 1
         if not left[0]:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Memory, "_write", interrupted)
+    monkeypatch.setattr(AnswerCache, "_write", interrupted)
     assert run("search", model, "--out", cut, *options) == 130
-    monkeypatch.setattr(Memory, "_write", write)
+    monkeypatch.setattr(AnswerCache, "_write", write)
     assert not read(cut / "manifest.json")["complete"]
     assert run("search", model, "--out", cut, *options) == 2
     assert run("search", model, "--out", cut, *options, "--resume") == 0

@@ -11,7 +11,7 @@ from designer.base import defaults, design_folder
 from designer.base.progress import SILENCE
 from designer.bifurcations import parameter_map
 from designer.board.bom_layouts import file_of
-from designer.centering import ngspice_check, places
+from designer.centering import ngspice_check, operating_points
 from designer.cli import command_line
 from designer.dynamics.steady_state import Course
 from designer.jobs import bifurcation_request, board_files, trade_job
@@ -135,9 +135,9 @@ SAID: list[tuple[str, str, object]] = [
     ("blame.md", r"the first (\d+) of a response, in order", blame_replay.LOST),
     ("blame.md", r"Up to (\d+) boards that were ok", blame_replay.KEPT),
     ("blame.md", r"on (\d+) base samples", worst_corner.CUBE),
-    ("search.md", r"scanned with (\d+) boards", places.SCAN),
-    ("search.md", r"again with (\d+), and around", places.SOME),
-    ("search.md", r"with (\d+) boards as long as", places.MANY),
+    ("search.md", r"scanned with (\d+) boards", operating_points.SCAN),
+    ("search.md", r"again with (\d+), and around", operating_points.SOME),
+    ("search.md", r"with (\d+) boards as long as", operating_points.MANY),
     ("search.md", r"about those of (\d+) boards", ngspice_check.LISTENED),
     ("bifurcations.md", r"At each value (\d+) drive periods", Course().settle),
     ("bifurcations.md", r"and (\d+) are shown \(`--keep`\)", Course().keep),

@@ -21,7 +21,7 @@ from designer.base.keyed_store import DAMAGED, UNSEALED, Note, quiet, read_line,
 FORMAT = 2
 
 
-class Memory:
+class AnswerCache:
     """Answers by key. path : where they are kept; in memory alone if None. whose : names the
     search; what another one left is not read. note : told of damaged lines.
 

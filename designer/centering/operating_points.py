@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from designer.centering.distance import LADDER, Counts, Stand, Stretched
-from designer.centering.windows import CLEARANCE_STEP, ResponsePlace, Stretch
+from designer.centering.windows import CLEARANCE_STEP, OperatingPoint, Stretch
 from designer.model.response_table import Response
 
 SHARES = (0.5, 0.3, 0.7, 0.1, 0.9)
@@ -34,7 +34,7 @@ MOST = 12
 class Scored:
     """A place with what boards showed there."""
 
-    place: ResponsePlace
+    place: OperatingPoint
     """Where the response is asked for."""
     stand: Stand | None
     """The nominal board's orbit there; None where it does not show the response."""
@@ -47,7 +47,7 @@ class Scored:
 
 
 @dataclass(frozen=True)
-class PlaceRange:
+class OperatingRange:
     """How far a place may go."""
 
     omega: tuple[float, float]
@@ -56,18 +56,18 @@ class PlaceRange:
     """Closed range of the clearance; equal ends where it is not open."""
 
 
-def room_of(spec: Response, b: float, omega: tuple[float, float]) -> PlaceRange:
+def room_of(spec: Response, b: float, omega: tuple[float, float]) -> OperatingRange:
     """What a response leaves open. b : the model's clearance. omega : band of a search."""
     one = spec.b if isinstance(spec.b, float) else b
     ends = spec.b if isinstance(spec.b, tuple) else (one, one)
-    return PlaceRange(omega if spec.omega is None else (spec.omega, spec.omega), ends)
+    return OperatingRange(omega if spec.omega is None else (spec.omega, spec.omega), ends)
 
 
-def places(
+def best_points(
     bench: Stretched,
     spec: Response,
     stretches: Sequence[Stretch],
-    room: PlaceRange,
+    room: OperatingRange,
     *,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[list[Scored], int]:
@@ -92,7 +92,7 @@ def places(
 def score(
     bench: Stretched,
     spec: Response,
-    wanted: Sequence[ResponsePlace],
+    wanted: Sequence[OperatingPoint],
     boards: int,
     ladder: Sequence[float] = LADDER,
     progress: Callable[[], None] = lambda: None,
@@ -114,7 +114,7 @@ def best(found: Sequence[Scored], count: int) -> list[Scored]:
     return sorted(there, key=lambda s: -s.distance)[:count]
 
 
-def _step(stretches: Sequence[Stretch], place: ResponsePlace) -> float:
+def _step(stretches: Sequence[Stretch], place: OperatingPoint) -> float:
     """Of ln ω: half the distance of the places that were scanned."""
     home = next(s for s in stretches if any(p is place for p in s.places))
     return max(math.log(home.high / home.low) * 0.1, 1e-3)
@@ -123,8 +123,8 @@ def _step(stretches: Sequence[Stretch], place: ResponsePlace) -> float:
 def _pattern(
     bench: Stretched,
     spec: Response,
-    start: ResponsePlace,
-    room: PlaceRange,
+    start: OperatingPoint,
+    room: OperatingRange,
     step: float,
     progress: Callable[[], None],
 ) -> tuple[list[Scored], int]:
@@ -134,17 +134,16 @@ def _pattern(
     for _ in range(MOST):
         if halved == PATTERN:
             break
-        around: list[ResponsePlace] = []
-        for i in (-1, 0, 1):
-            for j in (-1, 0, 1):
-                omega, b = (
-                    centre.place.omega * math.exp(i * step),
-                    centre.place.b * math.exp(j * wide),
-                )
-                omega = min(max(omega, room.omega[0]), room.omega[1])
-                b = min(max(b, room.b[0]), room.b[1])
-                if (omega, b) not in known and (omega, b) not in [(p.omega, p.b) for p in around]:
-                    around.append(replace(centre.place, omega=omega, b=b))
+        steps = itertools.product((-1, 0, 1), repeat=2)
+        pairs = (
+            (
+                _held(centre.place.omega * math.exp(i * step), room.omega),
+                _held(centre.place.b * math.exp(j * wide), room.b),
+            )
+            for i, j in steps
+        )
+        new = [pair for pair in dict.fromkeys(pairs) if pair not in known]
+        around = [replace(centre.place, omega=omega, b=b) for omega, b in new]
         for scored in score(bench, spec, around, MANY, LADDER[1:], progress):
             known[scored.place.omega, scored.place.b] = scored
         top = max(known.values(), key=lambda s: s.distance)

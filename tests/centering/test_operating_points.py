@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from designer.centering.distance import LADDER, Stretched
-from designer.centering.places import MANY, places, room_of, score
-from designer.centering.windows import ResponsePlace, stretches
+from designer.centering.operating_points import MANY, best_points, room_of, score
+from designer.centering.windows import OperatingPoint, stretches
 from designer.model.response_table import Expect, Response
 from designer.model.search_table import SearchSpec
 from tests.shared.search_cases import made, spread
@@ -21,14 +21,14 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
     model = made().modelfile.model
     bench = Stretched(made().design, spread(), 3, MANY)
     (seen,) = stretches(model, [SPEC], BAND)
-    ranked, tried = places(bench, SPEC, seen, room_of(SPEC, model.b, BAND.omega))
+    ranked, tried = best_points(bench, SPEC, seen, room_of(SPEC, model.b, BAND.omega))
     best = ranked[0]
     assert 0.25 <= best.place.b <= 0.265
     assert tried > 20
 
     near = {s.b: s for s in seen}
     grid = [
-        ResponsePlace(float(omega), float(b), start.start)
+        OperatingPoint(float(omega), float(b), start.start)
         for b in np.linspace(0.25, 0.265, 4)
         for stretch in [near[min(near, key=lambda v: abs(v - b))]]
         for omega in np.geomspace(0.49, 0.58, 24)
@@ -46,6 +46,6 @@ def test_what_is_fixed_stays_fixed() -> None:
     spec = Response(0.85, Expect(1, 2, 2), b=(0.25, 0.27))
     bench = Stretched(made().design, spread(), 3, MANY)
     (seen,) = stretches(model, [spec], SearchSpec(omega=(0.7, 1.0)))
-    ranked, _ = places(bench, spec, seen, room_of(spec, model.b, (0.7, 1.0)))
+    ranked, _ = best_points(bench, spec, seen, room_of(spec, model.b, (0.7, 1.0)))
     assert {s.place.omega for s in ranked} == {0.85}
     assert all(0.25 <= s.place.b <= 0.27 for s in ranked)
