@@ -1,6 +1,7 @@
 from . import (
     atomic_write as atomic_write,
     figure_style as figure_style,
+    jit as jit,
 )
 from .arrays import (
     Array as Array,

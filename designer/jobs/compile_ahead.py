@@ -23,8 +23,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
-from designer.synthesis.attempt import zone_of_spec
-from designer.synthesis.part_names import parts_of
+from designer.synthesis.part_checks import unit_circuit
 
 CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circuits()"
 
@@ -57,7 +56,7 @@ def compile_circuits() -> None:
         CircuitSpec(),
         load_catalog(),
     )
-    circuit = parts_of(model, spec, catalog, zone_of_spec(model, spec, catalog))
+    circuit = unit_circuit(model, spec, catalog)
     boards = Ensemble(Boards.of(circuit, [nominal_board(circuit)]))
     drive, rest = Drive(1.0), np.zeros(len(circuit.states))
     Flow(boards.reduction(0).system(), drive).run(rest, 1)
