@@ -115,11 +115,11 @@ class Folder:
         listed = {} if self.manifest is None else self.manifest.files
         for stage in todo:
             for name in wanted[stage][1]:
-                for found in [] if name in listed else self._there(name):
-                    if found in listed:
+                for foreign in [] if name in listed else self._there(name):
+                    if foreign in listed:
                         continue
                     raise InputError(
-                        self / found,
+                        self / foreign,
                         "the file",
                         "a file that manifest.json does not list",
                         "no file of this name: --overwrite replaces listed files only",

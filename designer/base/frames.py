@@ -18,8 +18,8 @@ def frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[str] = ()) -> pd.
     """The rows as a frame. columns : which it has where there are no rows."""
     import pandas as pd  # takes half a second, and few callers want a frame
 
-    found = [dict(row) for row in rows]
-    return pd.DataFrame(found) if found else pd.DataFrame(columns=list(columns))
+    listed = [dict(row) for row in rows]
+    return pd.DataFrame(listed) if listed else pd.DataFrame(columns=list(columns))
 
 
 def flat_frame(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
@@ -31,11 +31,11 @@ def flat_frame(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 
 def table_html(title: str, rows: Iterable[Mapping[str, Any]], note: str = "") -> str:
     """The rows as a table of HTML under a title, with a note below; every text is escaped."""
-    found = list(rows)
-    shown = list(islice(found, MOST_ROWS))
+    listed = list(rows)
+    shown = list(islice(listed, MOST_ROWS))
     heads = list(dict.fromkeys(name for row in shown for name in row))
     lines = [_row("th", heads), *(_row("td", [row.get(name) for name in heads]) for row in shown)]
-    left = len(found) - len(shown)
+    left = len(listed) - len(shown)
     notes = [text for text in (note, f"{left} more rows" if left else "") if text]
     table = f"<table>{''.join(lines)}</table>" if shown else ""
     return f"<p><b>{escape(title)}</b></p>{table}" + "".join(f"<p>{escape(n)}</p>" for n in notes)

@@ -156,7 +156,7 @@ class Lines:
 
     def read(self, content: bytes) -> tuple[dict[str, dict[str, Any]], int]:
         """The entries of this key that are whole, and how many lines are not."""
-        found: dict[str, dict[str, Any]] = {}
+        entries: dict[str, dict[str, Any]] = {}
         first, *lines = content.splitlines() or [b""]
         damaged = int(first != self._head().encode("ascii"))
         for line in _entries(lines):
@@ -167,8 +167,8 @@ class Lines:
                 continue
             entry.pop(SEAL)
             if entry.pop("key") == self.key:
-                found[name] = entry
-        return found, damaged
+                entries[name] = entry
+        return entries, damaged
 
     def load(
         self, path: Path, note: Note = quiet, vouch: Vouch = nobody
@@ -188,18 +188,18 @@ class Lines:
                 return self._plain(content, path)
             note(f"{path}: {UNSEALED}")
             return {}
-        found, damaged = self.read(content)
+        entries, damaged = self.read(content)
         if damaged:
             lines = "1 entry is" if damaged == 1 else f"{damaged} entries are"
             note(f"{path}: {lines} {DAMAGED}")
-        return found
+        return entries
 
     def _head(self) -> str:
         return json.dumps({"format": 1, self.name: {}})[:-2]
 
     def _line(self, name: str, entry: Mapping[str, Any]) -> str:
-        said = {**entry, "key": self.key, SEAL: BLANK}
-        text = json.dumps({name: said}, allow_nan=False)
+        fields = {**entry, "key": self.key, SEAL: BLANK}
+        text = json.dumps({name: fields}, allow_nan=False)
         return sealed(text.encode("ascii")).decode("ascii")[1:-1]
 
     def _plain(self, content: bytes, path: Path) -> dict[str, dict[str, Any]]:

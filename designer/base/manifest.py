@@ -173,21 +173,21 @@ def read_manifest(path: Path) -> Manifest | None:
         name: _stage(known[name], file, f"stages.{name}") for name in STAGES if name in known
     }
     files = {}
-    for name, said in listed.items():
+    for name, entry in listed.items():
         field = f"files.{name}"
-        said = _object(said, file, field)
-        stage, digest = said.get("stage"), said.get("sha256")
+        entry = _object(entry, file, field)
+        stage, digest = entry.get("stage"), entry.get("sha256")
         if not (isinstance(stage, str) and (digest is None or isinstance(digest, str))):
-            raise InputError(file, field, said, "a stage and a sha256")
+            raise InputError(file, field, entry, "a stage and a sha256")
         files[_inside(path, name)] = (stage, digest)
     return Manifest(stages, files, _object(value.get("provenance", {}), file, "provenance"))
 
 
 def _stage(value: object, file: Path, field: str) -> ManifestStage:
-    said = _object(value, file, field)
-    inputs = _object(said.get("inputs"), file, f"{field}.inputs")
-    kept = _object(said.get("kept", {}), file, f"{field}.kept")
-    complete = said.get("complete")
+    entry = _object(value, file, field)
+    inputs = _object(entry.get("inputs"), file, f"{field}.inputs")
+    kept = _object(entry.get("kept", {}), file, f"{field}.kept")
+    complete = entry.get("complete")
     if not isinstance(complete, bool):
         raise InputError(file, f"{field}.complete", complete, "true or false")
     layers = inputs.get("layers", [])

@@ -227,7 +227,7 @@ class Terminal(Progress):
         self._drawn = 0.0
 
     def stage(self, text: str, total: int | None = None) -> Callable[[], None]:
-        said = super().stage(text, total)
+        counted = super().stage(text, total)
         self._finish()
         bars, task = self._bars, self._bars.add_task(text, total=total, rate="")
         self._shown = task, text
@@ -241,7 +241,7 @@ class Terminal(Progress):
         self._open.append(finish)
 
         def step() -> None:
-            said()
+            counted()
             bars.advance(task)
             now = next(t for t in bars.tasks if t.id == task)
             if now.elapsed:

@@ -57,9 +57,9 @@ class CaseStore:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            said = error.strerror or str(error)
+            reason = error.strerror or str(error)
             raise InputError(
-                self._folder, self._place, said, "a place that can be written"
+                self._folder, self._place, reason, "a place that can be written"
             ) from None
 
     def expect(self, keys: str | Mapping[str, str]) -> None:

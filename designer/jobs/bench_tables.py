@@ -40,7 +40,7 @@ NO_RECIPE = "none: the nominal circuit does not show the wanted response"
 
 def setup_csv(
     design: Design,
-    found: Sequence[ModelResponse],
+    responses: Sequence[ModelResponse],
     recipes: Sequence[Recipe | None],
     mechanical: Mechanical | None = None,
 ) -> str:
@@ -49,7 +49,7 @@ def setup_csv(
     recipes : how to start each response; None where the nominal circuit does not show it.
     mechanical : adds what each frequency is in the mechanism, Hz, in a last column.
     """
-    known = settings(design, found)
+    known = settings(design, responses)
     omegas = [repr(s.omega) for s in known]
     if mechanical is not None:  # there ω follows from Hz or rad/s, and all its digits say nothing
         omegas = told_apart([s.omega for s in known], OMEGA_DIGITS)
@@ -65,7 +65,7 @@ def setup_csv(
             "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
             **({} if mechanical is None else {MECHANISM: hertz(mechanical.hertz(s.omega))}),
         }
-        for s, omega, r, recipe in zip(known, omegas, found, recipes, strict=True)
+        for s, omega, r, recipe in zip(known, omegas, responses, recipes, strict=True)
     ]
     return csv_text(COLUMNS if mechanical is None else (*COLUMNS, MECHANISM), rows)
 
@@ -91,7 +91,7 @@ def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
     return tuple(known.get(i) for i in range(len(checked)))
 
 
-def scales_csv(modelfile: ModelFile, design: Design, found: Sequence[ModelResponse]) -> str:
+def scales_csv(modelfile: ModelFile, design: Design, responses: Sequence[ModelResponse]) -> str:
     """``scales.csv``: what a volt and a second on the bench stand for.
 
     A response that is wanted at a clearance of its own is driven harder or softer instead of
@@ -109,7 +109,7 @@ def scales_csv(modelfile: ModelFile, design: Design, found: Sequence[ModelRespon
         rows.append(("threshold of contact", scales.threshold, "V", b0))
         if abs(scales.offcentre) > 1e-9:
             rows.append(("threshold of contact, lower stop", scales.threshold_lower, "V", b0))
-    for b in dict.fromkeys([b0, *(r.b for r in found)]):
+    for b in dict.fromkeys([b0, *(r.b for r in responses)]):
         rows += _amplitudes(modelfile, design, b)
     return csv_text(
         ("quantity", "value", "unit", "b"),

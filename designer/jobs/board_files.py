@@ -34,11 +34,11 @@ def texts(made: Synthesis) -> dict[str, str]:
 
     doing("bill of materials, drawing")
     circuit, choice = board_circuit(made)
-    found = components(circuit, made.catalog, choice)
+    parts = components(circuit, made.catalog, choice)
     return {
-        NOTES: board_notes.markdown(made, circuit, choice, found),
-        DRAWING: schematic_drawing.svg(circuit, made.modelfile.title, pin_numbers(found)),
-        **_bills(made, found, choice),
+        NOTES: board_notes.markdown(made, circuit, choice, parts),
+        DRAWING: schematic_drawing.svg(circuit, made.modelfile.title, pin_numbers(parts)),
+        **_bills(made, parts, choice),
     }
 
 
@@ -48,8 +48,8 @@ def bills(made: Synthesis) -> dict[str, str]:
     return _bills(made, components(circuit, made.catalog, choice), choice)
 
 
-def _bills(made: Synthesis, found: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
-    bought = bill(to_buy(found, choice))
+def _bills(made: Synthesis, parts: Sequence[Component], choice: BoardChoice) -> dict[str, str]:
+    bought = bill(to_buy(parts, choice))
     others = layouts(made.modelfile.board.bom, made.catalog.folders)
     return {
         BILL: bill_csv(bought),

@@ -98,7 +98,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
     """
     document, file = folder.json(DESIGN), folder / DESIGN
     model, spec = modelfile.model, modelfile.circuit
-    found = find(model, modelfile.responses)
+    responses = find(model, modelfile.responses)
     catalog = modelfile.choices(catalog)
     with naming(modelfile):
         opamp = catalog.opamp(spec.opamp, spec.supply)
@@ -115,7 +115,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
         )
         gain, bias = (float(document["circuit"][k]) for k in ("gain", "bias"))
         circuit = replace(circuit, gain=gain, bias=bias)
-        largest = peaks(model, found).states
+        largest = peaks(model, responses).states
         volts = np.array(list(document["scales"]["volts"].values()), dtype=float)
         swing = (float((volts * largest).max()), largest)
         errors = coefficient_errors(
@@ -136,7 +136,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
             checks=tuple(ConditionCheck(**check) for check in listed["checked"]),
             binding=dict(listed["binding"]),
         )
-    return Synthesis(modelfile, catalog, found, design)
+    return Synthesis(modelfile, catalog, responses, design)
 
 
 def _size(value: object, file: Path, name: str) -> float:

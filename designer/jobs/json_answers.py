@@ -26,7 +26,7 @@ STUDY_KEYS = ("samples", "until", "narrow", "all_on_one_board", "blame", "boards
 def synthesis_json(
     modelfile: ModelFile,
     design: Design,
-    found: Sequence[ModelResponse],
+    responses: Sequence[ModelResponse],
     provenance: Mapping[str, Any],
     seconds: float,
     better_grades: Mapping[str, BetterGrade] | None = None,
@@ -72,7 +72,7 @@ def synthesis_json(
                 "expected": r.expected,
                 "found": r.found,
             }
-            for s, r in zip(settings(design, found), found, strict=True)
+            for s, r in zip(settings(design, responses), responses, strict=True)
         ],
         "dead_zone": _dead_zone(modelfile, design),
         "distinct_values": design.distinct_values,

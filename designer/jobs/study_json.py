@@ -53,7 +53,7 @@ def study_json(
             {**_response(c, study, i), **hertz_json(c.model.omega, mechanical)}
             for i, c in enumerate(study.checked)
         ],
-        "maps": [_map(found) for found in study.maps],
+        "maps": [_map(each) for each in study.maps],
         "provenance": provenance,
         "cost": dict(cost),
     }
@@ -85,7 +85,7 @@ def _response(checked: CheckedResponse, study: Study, index: int) -> dict[str, A
         "reached": _reached(study, index),
         "blame": _blame(study, index),
         "trust": {
-            **{engine: said.verdict() for engine, said in checked.trust.items()},
+            **{engine: trust.verdict() for engine, trust in checked.trust.items()},
             "yield": None
             if counted is None
             else trust_of_yield(counted, checked.circuit_trust).verdict(),
@@ -158,13 +158,13 @@ def _reached(study: Study, index: int) -> dict[str, Any] | None:
 def _blame(study: Study, index: int) -> dict[str, Any] | None:
     if study.blame is None or index not in study.asked:
         return None
-    found: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
-    return found
+    blame: dict[str, Any] = study.blame.as_dict()["responses"][study.asked.index(index)]
+    return blame
 
 
-def _map(found: YieldMap) -> dict[str, Any]:
+def _map(yields: YieldMap) -> dict[str, Any]:
     """Without what it cost, which stands with the other costs."""
-    return {key: value for key, value in found.as_dict().items() if key != "cost"}
+    return {key: value for key, value in yields.as_dict().items() if key != "cost"}
 
 
 def _counted(counted: Yield) -> dict[str, Any]:
