@@ -7,8 +7,8 @@ stop of stiffness μ turns a rounding error of the displacement into sqrt(μ) ti
 velocity, and into μ times as much of the multipliers. The fixed point of the lap is off by that,
 times ‖(I - Φ)⁻¹‖, Φ the lap's linearised map. States count in units of their peaks.
 
-A result that says more than this error allows is *not to be trusted here*, and the reason is said:
-the tool gives no bare answer then. Where there is no answer there is nothing to trust either.
+A result that claims more than this error allows is *not to be trusted here*; the answer gives the
+reason. Where there is no answer there is nothing to trust either.
 """
 
 from __future__ import annotations
@@ -173,15 +173,15 @@ def _at_strobe(orbit: Orbit, span: float) -> bool:
 def _doubts_of_lap(runs: list[FlowResult], error: float, *, counted: bool) -> tuple[Reason, ...]:
     doubts = []
     if not error <= STROBE_TOLERANCE:
-        said = (
+        words = (
             "rounding errors, as the flow magnifies them, leave the state open by more than the "
             f"{STROBE_TOLERANCE:.0e} of its peak that to call a response periodic asks for"
         )
-        doubts.append(Reason(said, f"{error:.1g}"))
+        doubts.append(Reason(words, f"{error:.1g}"))
     counts = {tuple(int(c) for c in run.counts.sum(axis=(0, 1))) for run in runs}
     if counted and len(counts) > 1:
-        said = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
-        doubts.append(Reason("computed with other steps a lap has other impacts", said))
+        figures = " or ".join(f"{upper} and {lower}" for lower, upper in sorted(counts))
+        doubts.append(Reason("computed with other steps a lap has other impacts", figures))
     return tuple(doubts)
 
 
@@ -189,14 +189,14 @@ def _doubts_of_orbit(orbit: Orbit, error: float, open_by: float, peak: float) ->
     doubts = []
     nearest = min(orbit.penetration, orbit.miss) / peak
     if nearest <= error:
-        said = "a contact or a miss lies within the error: the count of impacts is open"
-        doubts.append(Reason(said, f"{nearest:.1g} of the peak, error {error:.1g}"))
+        words = "a contact or a miss lies within the error: the count of impacts is open"
+        doubts.append(Reason(words, f"{nearest:.1g} of the peak, error {error:.1g}"))
     if abs(1.0 - orbit.radius) <= open_by:
-        said = (
+        words = (
             "its largest multiplier cannot be told from 1: whether the response is stable is not "
             "known"
         )
-        doubts.append(Reason(said, f"it is open by {open_by:.1g}"))
+        doubts.append(Reason(words, f"it is open by {open_by:.1g}"))
     return tuple(doubts)
 
 

@@ -1,8 +1,8 @@
 """What a person with an oscilloscope and a generator finds: the procedure of docs/bench.md, played.
 
-The person sees v1 and fv on a screen of 8 bits, never the exact orbit: readings are off by up to
-one step of the screen, low pulses are not seen, small differences between periods neither. Where
-the person stops, the exact circuit says what the response really is.
+The person sees v1 and fv on a screen of 8 bits: readings are off by up to one step of the screen,
+low pulses and small differences between periods are not seen. Where the person stops, the exact
+circuit says what the response really is.
 """
 
 from __future__ import annotations

@@ -1,15 +1,8 @@
 """Which part is to blame when a board does not show a response.
 
-Three answers for each response, each with what it cost:
-
-- **losses avoided**: lost boards are replayed on the exact rung with one part at its nominal value
-  (and without offset, for an op-amp section), everything else as drawn; so are groups of parts. The
-  same is done with boards that were ok, which tells the losses that an exact part would *cause*.
-- **indices**: first-order and total Sobol indices of the margin (``yields.margins``) over the
-  spread's own coordinates: the shares of the margin's variance that a coordinate explains alone,
-  and together with others. With them stands how well the margin foretells verdicts.
-- **worst corner**: the coordinates of the largest indices at the ends of their ranges, all others
-  nominal, in every combination, on the exact rung.
+Three answers for each response, each with what it cost: the losses that an exact part avoids or
+causes (``blame_replay``); the Sobol indices of the margin over the coordinates of the spread, with
+how well the margin predicts verdicts; and the worst corner (``worst_corner``).
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """The cross-check of samples in ngspice: what it answers, and which samples it is asked about.
 
-Two kinds of run (``yields.ngspice_runs`` says how long): on the sample's *own* orbit of the
-exact circuit rung ngspice only has to stay there; from the *nominal* design's orbit it finds its
-way itself, which makes it a verdict of its own.
-
-Who is asked, for each response: boards are independent draws from (seed, index), so the first
-`SUBSET` are a random subset, and the same one however many samples follow. Of it the first are
-asked whatever their margins, and the slow ones all, since they are few and differ most. The boards
-nearest to losing the response are asked besides, since that is where two engines would differ.
+On a sample's *own* orbit of the exact circuit ngspice only has to stay there; from the *nominal*
+design's orbit it finds its way itself, which makes it a verdict of its own. Boards are independent
+draws from (seed, index), so the first `SUBSET` are a random subset, and the same one however many
+follow. Of it the first are asked, and every slow one, since these are few and differ most; so are
+the boards nearest to losing the response.
 """
 
 from __future__ import annotations

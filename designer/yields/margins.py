@@ -1,18 +1,11 @@
 """How far a board is from losing a response, as a smooth function of its parts.
 
-The margin is the least of a few linear functions of the quantities that differ between boards, each
-divided by its own standard deviation over the spread. They come from two places:
-
-- the nominal board: every function of ``dynamics.continued_orbit`` on the wanted orbit, linearised
-  by central differences;
-- lost boards: on the straight line from the nominal board to a lost one, the point where the
-  response is lost (``Crossing``), the function that ends there, and its gradient shortly
-  before. Such a limit sees what is curved near the nominal board.
-
-Which of them are kept is decided on the boards of even number: one after the other, the one that
-sets most verdicts right, as long as any does. How well the sign of the margin predicts the verdicts
-is measured on the boards of odd number and belongs to every result. What it cannot see: other
-attractors whose basin the nominal orbit lies in, and clipping.
+The margin is the least of a few linear functions of the quantities that differ between boards, in
+standard deviations over the spread. They come from the nominal board, by central differences of
+every function of ``dynamics.continued_orbit``, and from lost boards, at the point of the straight
+way from the nominal board where the response ends (``Crossing``): these see what is curved. Boards
+of even number decide which functions stay; boards of odd number tell how well the margin's sign
+predicts verdicts. It sees neither clipping nor other attractors that the nominal orbit leads to.
 """
 
 from __future__ import annotations

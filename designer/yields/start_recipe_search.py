@@ -1,10 +1,6 @@
-"""Which recipe to give a response: candidates tried from the simplest on.
-
-Each is tried on the nominal circuit and on sample boards of its own, from discharged
-capacitors, with phases of the generator that fill the circle. The first that always worked is
-taken. Where none did, all are tried on the same starts: the simplest of those that no other beats
-by more than chance is taken. Its sweep is then tried without steps, and slower: what a person does
-with a generator.
+"""Which recipe to give a response: candidates tried from the simplest on, as docs/definitions.md
+("Reached") states. The sweep of the one that is taken is then tried without steps, and slower: what
+a person does with a generator.
 """
 
 from __future__ import annotations

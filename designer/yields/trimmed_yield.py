@@ -1,11 +1,9 @@
 """The DC trimmer of a board: one setting for all responses, found once, and what the board shows
 there.
 
-The fitted trimmer (``board.board_parts``) is simulated with its track in two parts and the
-resistor from its wiper into the velocity integrator's summing node, by the same nodal equations as
-everything else. The person at the bench reads the two voltages of v1 at which fv leaves zero,
-switches the generator off and turns until v1 rests as far from them as it does on the nominal board
-(docs/bench.md). Then every response is judged at that setting, from its nominal orbit.
+The fitted trimmer is simulated with its track in two parts and the resistor from its wiper into the
+velocity integrator's summing node. It is set by the procedure of docs/bench.md, played as a person
+reads a screen. Then every response is judged at that setting, from its nominal orbit.
 """
 
 from __future__ import annotations

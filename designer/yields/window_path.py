@@ -1,15 +1,12 @@
 """The window of a response in the generator's settings, followed from the nominal board to another.
 
-A window may be a thousandth of the bands, too little to be met by trying. But on the nominal board
-the wanted orbit exists, and what ends it is known there: a contact that is lost, two that become
-one, a multiplier that leaves the unit circle (``dynamics.continued_orbit``). All these are smooth
-in the board and in the setting. So the nominal board is turned into the other one along the
-straight line between them, the orbit is followed by shooting, and the setting moves at each step to
-the middle of what the linearised functions leave within the bands: the largest ball on which all
-are positive, its radius measured in half-bands (the Chebyshev centre, a linear program).
-
-Shooting goes on where the orbit leaves its window (a function is negative), and the next linear
-program leads back. Windows need not be convex: a path finds one of them, if any.
+A window may be a thousandth of the bands, too little to be met by trying. So the nominal board is
+turned into the other one along the straight line between them, and the wanted orbit is followed by
+shooting. At each step the setting moves to the middle of what the functions that end the orbit
+(``dynamics.continued_orbit``), linearised, leave within the bands: the largest ball on which all
+are positive, its radius in half-bands (the Chebyshev centre, a linear program). Shooting goes on
+where the orbit leaves its window, and the next program leads back. Windows need not be convex: a
+path finds one of them, if any.
 """
 
 from __future__ import annotations
