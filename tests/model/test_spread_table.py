@@ -283,11 +283,11 @@ def test_halves_of_a_composite_may_come_to_be() -> None:
 def test_what_no_boards_can_be_is_refused_before_a_design_is_sought(
     spread: str, word: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from designer.check import checked_design, synthesis_result
+    from designer.check import synthesis_result
 
     def sought(*_: object) -> None:
         raise AssertionError("work before the refusal")
 
-    monkeypatch.setattr(checked_design, "find", sought)
+    monkeypatch.setattr(synthesis_result, "find", sought)
     with pytest.raises(InputError, match=word):
         synthesis_result.synthesise(parse_model_file(f"{PAPER}\n[spread]\n{spread}\n"), CATALOG)
