@@ -57,7 +57,6 @@ def test_it_compiles_what_a_circuit_needs() -> None:
     compile_circuits()
     kernels: list[Any] = [
         kernel_nodal.solve_all,
-        kernel_four_state.fill,
         kernel_four_state.advance,
         kernel_four_state.respond_all,
     ]
