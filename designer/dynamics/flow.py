@@ -17,7 +17,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import matrix_balance
 
 from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
@@ -28,16 +27,15 @@ from designer.dynamics import (
     kernel_modal,
     kernel_orbit,
     modal_tables,
+    mode_tables,
     working_modes,
 )
 from designer.dynamics.kernel_four_state import RunTrail
 from designer.dynamics.kernel_general import Log
 from designer.dynamics.kernel_modal import ModalTables
-from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
 
-STEP = 0.5
-"""‖A h‖ of one step, after balancing."""
 MAX_EVENTS = 10_000
 """Mode changes in one drive period past which the flow stops: chattering ends with a status."""
 
@@ -114,7 +112,7 @@ class Flow:
         self._working = working_modes.tables(system, drive) if fast else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
-        self._tables = _empty_tables(4, 2, system.size + 3, len(system.clearances))
+        self._tables = mode_tables.empty_tables(4, 2, system.size + 3, len(system.clearances))
         self._budget: Budget | None = None
 
     @contextmanager
@@ -132,7 +130,7 @@ class Flow:
         """Steps that the general kernel takes for one drive period in the mode of rest; more where
         a contact is stiffer."""
         A = self.system.mode(self.system.start).A
-        return self.drive.period / _step_length(A, self.drive.omega)
+        return self.drive.period / mode_tables.step_length(A, self.drive.omega)
 
     @property
     def kernel(self) -> str:
@@ -361,7 +359,7 @@ class Flow:
         mode = self.system.mode(key)
         rows, width, guards = len(self._tables.step), self.system.size + 3, len(mode.guards)
         if number >= rows or guards > self._tables.guard.shape[1]:
-            room = _empty_tables(
+            room = mode_tables.empty_tables(
                 max(rows, 2 * (number + 1)),
                 max(guards, self._tables.guard.shape[1]),
                 width,
@@ -373,7 +371,7 @@ class Flow:
         touched = [
             self.system.contact_rows(j)[side] if side else None for j, side in enumerate(mode.sides)
         ]
-        _fill(self._tables, number, mode, touched, self.drive)
+        mode_tables.fill(self._tables, number, mode, touched, self.drive)
         self._index[key] = number
         self._keys.append(key)
         return number
@@ -415,71 +413,4 @@ def _result(code: int, log: Log, done: int, met: int, mode: ModeKey, phi: Array)
         miss=float(log.graze[1]),
         tangencies=int(log.graze[2]),
         clipped_time=float(log.clipped[0]),
-    )
-
-
-def augmented(mode: Mode, drive: Drive) -> Array:
-    """(n + 3, n + 3) M with z' = M z for z = (x, sin, cos, 1)."""
-    n = len(mode.d)
-    M = np.zeros((n + 3, n + 3))
-    M[:n, :n] = mode.A
-    M[:n, n] = drive.amplitude * mode.B
-    M[:n, n + 2] = mode.d + drive.offset * mode.B
-    M[n, n + 1] = drive.omega
-    M[n + 1, n] = -drive.omega
-    return M
-
-
-def _augmented_row(C: Array, D: float, e: float, drive: Drive) -> Array:
-    """C·x + D·u + e as a row over (x, sin, cos, 1)."""
-    return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
-
-
-def _step_length(A: Array, omega: float) -> float:
-    balanced, _ = matrix_balance(A, permute=False)
-    return STEP / max(float(np.linalg.norm(balanced, 2)), omega)
-
-
-def _fill(
-    tables: kernel.ModeTables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
-) -> None:
-    """touched : for each clearance the row of the displacement past the stop in contact."""
-    M = augmented(mode, drive)
-    h = _step_length(mode.A, drive.omega)
-    powers = tables.taylor[i]
-    powers[0] = np.eye(len(M))
-    for k in range(1, kernel.ORDER + 1):
-        powers[k] = powers[k - 1] @ M * (h / k)
-    tables.step[i] = h
-    tables.propagator[i] = powers[::-1].sum(axis=0)
-    tables.guards[i] = len(mode.guards)
-    tables.side[i] = mode.sides
-    tables.clipped[i] = mode.clipped
-    for j, past in enumerate(touched):
-        if past is not None:
-            tables.depth[i, j] = _augmented_row(past[:-2], past[-2], past[-1], drive) @ powers
-    for g, guard in enumerate(mode.guards):
-        taylor = _augmented_row(guard.C, guard.D, guard.e, drive) @ powers
-        tables.guard[i, g] = taylor
-        # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
-        weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
-        tables.chord[i, g] = weights @ np.abs(taylor) * (1.0 + 1e-9)
-        tables.target[i, g] = -1
-        tables.clearance[i, g] = guard.clearance
-
-
-def _empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.ModeTables:
-    order = kernel.ORDER + 1
-    return kernel.ModeTables(
-        step=np.zeros(modes),
-        propagator=np.zeros((modes, width, width)),
-        taylor=np.zeros((modes, order, width, width)),
-        guard=np.zeros((modes, guards, order, width)),
-        chord=np.zeros((modes, guards, width)),
-        guards=np.zeros(modes, dtype=np.int64),
-        target=np.full((modes, guards), -1, dtype=np.int64),
-        clearance=np.full((modes, guards), -1, dtype=np.int64),
-        depth=np.zeros((modes, clearances, order, width)),
-        side=np.zeros((modes, clearances), dtype=np.int64),
-        clipped=np.zeros(modes, dtype=np.int64),
     )

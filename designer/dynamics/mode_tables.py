@@ -1,0 +1,85 @@
+"""Tables of the general kernel: Taylor terms of each mode and of its guards."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import matrix_balance
+
+from designer.base.arrays import Array
+from designer.dynamics import kernel_general as kernel
+from designer.dynamics.piecewise_linear import Drive, Mode
+
+STEP = 0.5
+"""‖A h‖ of one step, after balancing."""
+
+
+def augmented(mode: Mode, drive: Drive) -> Array:
+    """(n + 3, n + 3) M with z' = M z for z = (x, sin, cos, 1)."""
+    n = len(mode.d)
+    M = np.zeros((n + 3, n + 3))
+    M[:n, :n] = mode.A
+    M[:n, n] = drive.amplitude * mode.B
+    M[:n, n + 2] = mode.d + drive.offset * mode.B
+    M[n, n + 1] = drive.omega
+    M[n + 1, n] = -drive.omega
+    return M
+
+
+def _augmented_row(C: Array, D: float, e: float, drive: Drive) -> Array:
+    """C·x + D·u + e as a row over (x, sin, cos, 1)."""
+    return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
+
+
+def step_length(A: Array, omega: float) -> float:
+    """Length of a step in a mode with the state matrix A."""
+    balanced, _ = matrix_balance(A, permute=False)
+    return STEP / max(float(np.linalg.norm(balanced, 2)), omega)
+
+
+def fill(
+    tables: kernel.ModeTables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
+) -> None:
+    """Write the tables of mode number i.
+
+    touched : for each clearance the row of the displacement past the stop in contact.
+    """
+    M = augmented(mode, drive)
+    h = step_length(mode.A, drive.omega)
+    powers = tables.taylor[i]
+    powers[0] = np.eye(len(M))
+    for k in range(1, kernel.ORDER + 1):
+        powers[k] = powers[k - 1] @ M * (h / k)
+    tables.step[i] = h
+    tables.propagator[i] = powers[::-1].sum(axis=0)
+    tables.guards[i] = len(mode.guards)
+    tables.side[i] = mode.sides
+    tables.clipped[i] = mode.clipped
+    for j, past in enumerate(touched):
+        if past is not None:
+            tables.depth[i, j] = _augmented_row(past[:-2], past[-2], past[-1], drive) @ powers
+    for g, guard in enumerate(mode.guards):
+        taylor = _augmented_row(guard.C, guard.D, guard.e, drive) @ powers
+        tables.guard[i, g] = taylor
+        # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
+        weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
+        tables.chord[i, g] = weights @ np.abs(taylor) * (1.0 + 1e-9)
+        tables.target[i, g] = -1
+        tables.clearance[i, g] = guard.clearance
+
+
+def empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.ModeTables:
+    """Room for so many modes with so many guards each."""
+    order = kernel.ORDER + 1
+    return kernel.ModeTables(
+        step=np.zeros(modes),
+        propagator=np.zeros((modes, width, width)),
+        taylor=np.zeros((modes, order, width, width)),
+        guard=np.zeros((modes, guards, order, width)),
+        chord=np.zeros((modes, guards, width)),
+        guards=np.zeros(modes, dtype=np.int64),
+        target=np.full((modes, guards), -1, dtype=np.int64),
+        clearance=np.full((modes, guards), -1, dtype=np.int64),
+        depth=np.zeros((modes, clearances, order, width)),
+        side=np.zeros((modes, clearances), dtype=np.int64),
+        clipped=np.zeros(modes, dtype=np.int64),
+    )
