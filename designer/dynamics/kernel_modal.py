@@ -255,15 +255,19 @@ def _first_crossing(
 
 
 @callee
-def _least(data: Float, m: int, m4: float, end: float, work: Float, values: Float) -> float:
-    """The least displacement from now to ``end``."""
+def _least(
+    data: Float, m: int, m4: float, end: float, work: Float, values: Float, least: float
+) -> float:
+    """The smaller of ``least`` and the least displacement from now to ``end``."""
     o = (m & 3) * WIDTH
-    h = data[o + STEP]
-    least, _, _ = series_value(work, end - _expand(data, m, end, work))
-    least = min(least, work[F])
-    for k in range(_turning_values(data, m, end, h, m4, work, values)):
-        least = min(least, values[0, k])
-    return float(least + data[o + CENTRE])
+    h, centre = data[o + STEP], data[o + CENTRE]
+    least -= centre
+    if suspect_step(h, m4 * data[o + REST], least, np.inf, STEPS, work, 0) < STEPS:
+        f, _, _ = series_value(work, end - _expand(data, m, end, work))
+        least = min(least, min(f, work[F]))
+        for k in range(_turning_values(data, m, end, h, m4, work, values)):
+            least = min(least, values[0, k])
+    return float(least + centre)
 
 
 @callee
@@ -299,7 +303,7 @@ def carry(
         crosses = 0.0 <= first <= left
         end = first if crosses else min(block, left)
         if watched:
-            low = min(low, _least(data, m, m4, end, work, values))
+            low = _least(data, m, m4, end, work, values, low)
         if crosses:
             n = 0
             if m == 0:
