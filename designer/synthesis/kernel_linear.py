@@ -1,8 +1,8 @@
 """Compiled loops of the linear block: joining ratios, and completing them to values.
 
 Everything is in logarithms and all loops are exhaustive: what they leave out cannot reach the
-level or breaks a condition. The mathematics stands in ``synthesis.linear_block``, the conditions in
-``synthesis.linear_rules``. Parts are numbered as in ``synthesis.linear_block.PARTS``.
+level or breaks a condition. The mathematics and the conditions stand in ``synthesis.linear_block``;
+parts are numbered as in its ``PARTS``.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ class Rules(NamedTuple):
     seconds: Array
     """(2,) range of ln(time scale)."""
     level: float
-    """ln of ``linear_rules.Bounds.level``."""
+    """ln of ``linear_block.Bounds.level``."""
     share: float
-    """ln of ``linear_rules.Bounds.share``."""
+    """ln of ``linear_block.Bounds.share``."""
     stop: Array
     """(2,) range of ln R4."""
     peaks: Array
