@@ -73,7 +73,8 @@ class ModelSubject:
         try:
             _changed(self.model, {name: value})
         except InputError as error:
-            raise InputError(None, option, value, f"{name}: {error.expected}") from None
+            expected = error.expected if math.isfinite(value) else "a finite number"
+            raise InputError(None, option, value, f"{name}: {expected}") from None
 
     def settings(self, changes: Sequence[Mapping[str, float]]) -> list[DrivenSystem]:
         """One for each set of changes, the others as they stand."""

@@ -87,7 +87,7 @@ def test_what_ngspice_says_is_counted(
 ) -> None:
     """ngspice is played: these answers."""
 
-    def confirm(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
+    def run_queries(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
         assert all(q.subject.rung == "dynamic" for q in queries)
         assert {q.expected for q in queries} == {"1-2-2"}
         return [
@@ -99,7 +99,7 @@ def test_what_ngspice_says_is_counted(
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=True)]
     )
-    monkeypatch.setattr("designer.centering.ngspice_check.confirm", confirm)
+    monkeypatch.setattr("designer.centering.ngspice_check.run_queries", run_queries)
     assert Listener(None, AnswerCache())(boards, [wanted]) == (found,)  # type: ignore[arg-type]
 
 
@@ -116,14 +116,14 @@ def test_a_gate_that_does_not_pass_leaves_every_board_open(monkeypatch: pytest.M
 def test_a_long_way_is_not_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where eight boards are left the others are unanswered, where fewer are nobody is asked."""
 
-    def confirm(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
+    def run_queries(_: object, queries: Sequence[Query]) -> list[NgspiceAnswer]:
         return [NgspiceAnswer("1-2-2")] * len(queries)
 
     boards, stand = bench()
     monkeypatch.setattr(
         "designer.centering.ngspice_check.numerics_gate.check", lambda *_: [Gate(passed=True)]
     )
-    monkeypatch.setattr("designer.centering.ngspice_check.confirm", confirm)
+    monkeypatch.setattr("designer.centering.ngspice_check.run_queries", run_queries)
     for near, found in (
         (LEAST, Agreement(16, LEAST, 16 - LEAST)),
         (LEAST - 1, Agreement(16, 0, 16)),
