@@ -167,7 +167,7 @@ def extent_of(
     costs = (len(changes), ROUNDS + around)
     whole = least + len(again) * costs[0] + len(followed) * costs[1]
     if budget is not None and budget < whole:
-        share = max(budget - least, 0) / (whole - least)
+        share = max(budget - least, 0) / max(whole - least, 1)  # nothing lost: no more to do
         # The first boards in turn are one of each response.
         again = again[: max(int(share * len(again)), len({r.question for r in again}))]
         followed = followed[: max(int(share * len(followed)), len({q for q, _ in followed}))]

@@ -31,7 +31,7 @@ HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [
 BASE = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}'
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 SMALL = BASE + WANTED
-SAMPLES = 60
+SAMPLES = 20
 
 
 def _process(*arguments: str | Path, **more: Any) -> subprocess.Popen[str]:
@@ -118,7 +118,7 @@ def test_run_prints_one_object_and_nothing_else(
     assert counted["samples"] == SAMPLES
     assert counted["ok"] + counted["lost"] + counted["grazing"] + counted["failed"] == SAMPLES
     assert response["agreement"]["asked"] >= OWN_SAMPLES
-    assert response["agreement"]["nominal_start"]["asked"] >= 40
+    assert response["agreement"]["nominal_start"]["asked"] == SAMPLES
     assert "Traceback" not in done.stderr
     assert out.is_dir()
 
@@ -244,7 +244,7 @@ def test_overwrite_replaces_listed_files_only(
         (out / name).write_text("mine")
     before = _tree(out)
     fewer = ["tolerance", str(out), "--samples", "10", "-q"]
-    _refused(fewer, capfd, "manifest.json", "samples 60", "--overwrite")
+    _refused(fewer, capfd, "manifest.json", f"samples {SAMPLES}", "--overwrite")
     _refused([*fewer, "--resume"], capfd, "manifest.json", "--overwrite")
     assert _tree(out) == before
     assert entry.status([*fewer, "--overwrite", "--json"]) == 0
