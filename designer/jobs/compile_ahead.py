@@ -36,7 +36,8 @@ def compiling_ahead(jobs: int) -> Iterator[None]:
         yield
         return
     process = subprocess.Popen(
-        [sys.executable, "-c", CALL],
+        # -P: no file of the user's working directory is taken for a module.
+        [sys.executable, "-P", "-c", CALL],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,  # what goes wrong here goes wrong again where it is needed

@@ -11,6 +11,7 @@ import pytest
 from designer.base import jit
 from designer.circuit import kernel_nodal
 from designer.dynamics import kernel_boards, kernel_four_state, kernel_mode_tables
+from designer.jobs import compile_ahead
 from designer.jobs.compile_ahead import compile_circuits, compiling_ahead
 
 
@@ -51,6 +52,26 @@ def test_a_process_works_beside_a_first_run(
     with compiling_ahead(jobs):
         said.append("work")
     assert said == expected
+
+
+def test_no_file_of_the_working_directory_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "numpy.py").write_text("open('planted', 'w')")
+    (tmp_path / "cache").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(jit, "CACHE", tmp_path / "cache")
+    monkeypatch.setattr(compile_ahead, "CALL", "import numpy; numpy.zeros(1)")
+    popen, processes = subprocess.Popen, []
+
+    def start(*words: Any, **more: Any) -> Any:
+        processes.append(popen(*words, **more))
+        return processes[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    with compiling_ahead(2):
+        assert processes[0].wait(timeout=60) == 0
+    assert not (tmp_path / "planted").exists()
 
 
 def test_it_compiles_what_a_circuit_needs() -> None:
