@@ -27,12 +27,12 @@ from designer.model.model_file import ModelFile, read_model_file
 from designer.spice import convergence_aids, numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.yields import exact_rung as exact
-from designer.yields.cross_check import SLOW, CrossCheck, StartKind
+from designer.verdicts import exact_rung as exact
+from designer.verdicts.cross_check import SLOW, CrossCheck, StartKind
+from designer.verdicts.verdict import Answer
 from designer.yields.study import Study
 from designer.yields.tolerance_study import tolerance
 from designer.yields.two_engine_yield import Explanation, differences
-from designer.yields.verdict import Answer
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "agreement"

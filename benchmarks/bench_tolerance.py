@@ -34,10 +34,10 @@ from designer.dynamics.flow import Flow
 from designer.model.model_file import read_model_file
 from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread, draw
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.layers import Here, samples_task
 from designer.yields.study import plan_study
-from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict
 
 ROOT = Path(__file__).parent.parent
 REPORT = ROOT / "reports" / "tolerance-speed"

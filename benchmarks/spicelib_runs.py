@@ -19,7 +19,7 @@ import numpy as np
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.spice.deck import SolverSettings, write
 from designer.spice.numerics_gate import RELTOL, STEPS_PER_PERIOD
-from designer.yields.verdict import StudyPlan
+from designer.verdicts.verdict import StudyPlan
 
 
 def seconds_a_board(

@@ -23,7 +23,7 @@ from designer.spice import convergence_aids, equation_check, numerics_gate
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
 from designer.yields.study import plan_study
 
 MODEL: dict[str, Any] = {

@@ -29,10 +29,10 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
+from designer.verdicts.verdict import StudyPlan
 from designer.yields import margins
 from designer.yields.margins import Margin
 from designer.yields.trimmed_yield import DcTrim
-from designer.yields.verdict import StudyPlan
 
 DRAWN = 4000
 """Boards that a linear form's distribution is taken from."""

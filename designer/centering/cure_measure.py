@@ -15,11 +15,12 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.model.find_responses import ModelResponse
 from designer.model.tuning_bands import Bands
 from designer.spread.part_rules import spread_of
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.study_identity import study_hash
 from designer.yields.trimmed_yield import DcTrim, trimmed_answers
 from designer.yields.tuned_yield import benched_block
-from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
+from designer.yields.yield_count import Yield
 
 MOST = 8000
 """Boards of a study at which it gives up."""

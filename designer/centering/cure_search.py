@@ -39,8 +39,8 @@ from designer.check.synthesis_result import Synthesis
 from designer.circuit.board_arrays import Boards
 from designer.model.model_file import need_responses
 from designer.spread.part_rules import spread_of
+from designer.verdicts.verdict import StudyPlan
 from designer.yields.trimmed_yield import DcTrim
-from designer.yields.verdict import StudyPlan
 
 FRONT = 100
 """Number of the boards of the front; no round comes so far."""

@@ -21,10 +21,10 @@ from designer.centering.cure_branch import TRIMMER
 from designer.centering.cure_ways import FEW, SAMPLES, Looker, ResponseWay, foretold
 from designer.spread.board_quantities import column
 from designer.spread.spread import draw_many
+from designer.verdicts.verdict import StudyPlan
 from designer.yields import margins
 from designer.yields.margins import Margin
 from designer.yields.trimmed_yield import HIGH, LOW, DcTrim, trimmed_boards
-from designer.yields.verdict import StudyPlan
 
 FITTED = 1000
 """Boards from which is learnt what moves the wiper."""

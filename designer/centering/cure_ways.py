@@ -23,8 +23,9 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
+from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, judge
 from designer.yields.margins import Margin
-from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, count, judge
+from designer.yields.yield_count import count
 from designer.yields.yield_maps import YieldMap, settle_open, yield_map
 
 SAMPLES = 250

@@ -32,8 +32,8 @@ from designer.model.response_table import Response
 from designer.spice.numerics_gate import GateSubject
 from designer.spread.board_quantities import between
 from designer.spread.spread import Spread, draw_many
+from designer.verdicts.verdict import Verdict, judge
 from designer.yields.study_identity import nine_digits
-from designer.yields.verdict import Verdict, judge
 
 STREAM = "search:"
 """Before the names of the coordinates: no study draws these boards, whatever its seed."""

@@ -21,9 +21,9 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import Quantity, column
 from designer.spread.spread import Spread, draw_many
+from designer.verdicts.verdict import Answer, StudyPlan
 from designer.yields import margins
 from designer.yields.margins import DRAWN, Limit, Margin
-from designer.yields.verdict import Answer, StudyPlan
 
 OFFSET, NULL, RAILS = "offset", "null", "rails"
 GRAZING, NEIGHBOUR, COEXISTING = "grazing", "neighbour window", "coexisting attractor"

@@ -20,8 +20,8 @@ from designer.spice import numerics_gate
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
-from designer.yields.cross_check import survives
-from designer.yields.ngspice_runs import Query, run_queries, way_to_rung
+from designer.verdicts.cross_check import survives
+from designer.verdicts.ngspice_runs import Query, run_queries, way_to_rung
 
 RUNG: Rung = "dynamic"
 STRETCH, LISTENED = 2.0, 16

@@ -13,8 +13,8 @@ from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
 from designer.centering.ngspice_check import RUNG, STRETCH
-from designer.yields.cross_check import CrossCheck
-from designer.yields.verdict import Answer, Verdict
+from designer.verdicts.cross_check import CrossCheck
+from designer.verdicts.verdict import Answer, Verdict
 
 Rank = tuple[float, float] | None
 

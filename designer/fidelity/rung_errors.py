@@ -17,7 +17,7 @@ from designer.base.arrays import Array
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.fidelity.label import ResponseLabel
 from designer.fidelity.rungs import CIRCUIT, MODEL, RK4, TOP, RungAnswer
-from designer.yields.exact_rung import images, waveform_error
+from designer.verdicts.exact_rung import images, waveform_error
 
 BOARD, EQUATIONS = "board", "equations"
 

@@ -23,11 +23,11 @@ from designer.fidelity import rungs
 from designer.fidelity.label import ResponseLabel
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
-from designer.yields import exact_rung
-from designer.yields.cross_check import Ask, StartKind, Why
-from designer.yields.ngspice_runs import cross_checks
+from designer.verdicts import exact_rung
+from designer.verdicts.cross_check import Ask, StartKind, Why
+from designer.verdicts.ngspice_runs import cross_checks
+from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.study import plan_study
-from designer.yields.verdict import StudyPlan, Verdict
 
 REFINEMENTS = 3
 """How often ngspice's step is halved for a board at most: further than in a study, for here ngspice

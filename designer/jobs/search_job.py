@@ -37,11 +37,11 @@ from designer.spice import numerics_gate
 from designer.spice.batch_backend import program_version
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.yields import ngspice_runs
-from designer.yields.cross_check import Ask, StartKind, Why
+from designer.verdicts import ngspice_runs
+from designer.verdicts.cross_check import Ask, StartKind, Why
+from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.layers import Here
 from designer.yields.tolerance_study import StudyEngine, check
-from designer.yields.verdict import Answer, Verdict
 
 CONFIRMATION = "confirmation.json"
 DIFFERING = 0.05

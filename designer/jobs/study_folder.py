@@ -11,6 +11,7 @@ from designer.base.design_folder import REPORTS, TOLERANCE, Folder
 from designer.base.keyed_store import Vouch, nobody
 from designer.base.manifest import StageName
 from designer.jobs.study_cache import CACHE, StudyCache
+from designer.verdicts.verdict import StudyPlan
 from designer.yields.blame_analysis import Blame
 from designer.yields.layers import LAYERS, LayerName
 from designer.yields.row_store import BlockStore
@@ -18,7 +19,6 @@ from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
 from designer.yields.study_identity import blame_hash, study_hash
 from designer.yields.tolerance_study import Stores
-from designer.yields.verdict import StudyPlan
 from designer.yields.yield_maps import OVERS
 
 if TYPE_CHECKING:

@@ -14,12 +14,13 @@ from designer.jobs.json_answers import hertz_json
 from designer.model.model import Mechanical
 from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
-from designer.yields.cross_check import CrossCheck, NgspiceVerdict
+from designer.verdicts.cross_check import CrossCheck, NgspiceVerdict
+from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.study import Study, trust_of_yield
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
-from designer.yields.verdict import Answer, Verdict, Yield, count, count_verdicts, reasons
+from designer.yields.yield_count import Yield, count, count_verdicts, reasons
 from designer.yields.yield_maps import YieldMap
 
 MARGINS = ("radius", "penetration", "miss", "asymmetry", "waveform")

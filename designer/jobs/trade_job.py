@@ -31,7 +31,7 @@ from designer.jobs.stage_runner import StageRunner
 from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, need_responses, read_model_file
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.yields.verdict import StudyPlan
+from designer.verdicts.verdict import StudyPlan
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -31,7 +31,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.yields.exact_rung import waveform_error
+from designer.verdicts.exact_rung import waveform_error
 
 PERIODS = 20
 """Drive periods after which errors are taken, and of every run of ngspice."""

@@ -24,7 +24,8 @@ from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse
 from designer.model.response_table import Response
 from designer.paper.circuits import Built
-from designer.yields.verdict import Verdict, Yield, judge
+from designer.verdicts.verdict import Verdict, judge
+from designer.yields.yield_count import Yield
 
 PATTERNS = 512
 """Sign patterns, at most; twelve sections have 4096."""

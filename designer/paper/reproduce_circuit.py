@@ -47,7 +47,7 @@ from designer.paper.circuits import (
 )
 from designer.paper.report_files import README, write_files
 from designer.spice.pool import SpicePool, require_ngspice
-from designer.yields.verdict import rounded
+from designer.verdicts.verdict import rounded
 
 FORMAT = 1
 COMMAND = "designer reproduce circuit --out reports/paper-circuit"

@@ -31,13 +31,13 @@ from designer.paper.circuits import OMEGA, model_file
 from designer.paper.report_files import README, write_files
 from designer.paper.tolerance_cases import TITLES, SpreadCase, YieldRow, cases
 from designer.paper.tolerance_page import tolerance_page, yield_sheet
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import blame
 from designer.yields.power_up import power_up_block
 from designer.yields.start_recipe_search import find_recipes
 from designer.yields.study_identity import study_hash
 from designer.yields.tuned_yield import tuned_block
-from designer.yields.verdict import Verdict
 
 FORMAT = 1
 SAMPLES, SEED = 250, 20260

@@ -45,11 +45,13 @@ from designer.paper.report_files import README, write_files
 from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
-from designer.yields import exact_rung, study_identity
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import StudyPlan
+from designer.yields import study_identity
 from designer.yields.blame_analysis import blame
 from designer.yields.study import Study, plan_study
 from designer.yields.tolerance_study import tolerance
-from designer.yields.verdict import StudyPlan, Yield, all_on_one, count
+from designer.yields.yield_count import Yield, all_on_one, count
 
 FORMAT = 1
 MODEL = Path("examples/robust.toml")

@@ -18,7 +18,8 @@ from designer.model.find_responses import ModelResponse, find
 from designer.model.model_file import ModelFile
 from designer.paper.circuits import CORRECTED, OMEGA, PRINTED, RECTIFIER, build, model_file
 from designer.spread.spread import Spread
-from designer.yields.verdict import Question, StudyPlan, Verdict, Yield, judge
+from designer.verdicts.verdict import Question, StudyPlan, Verdict, judge
+from designer.yields.yield_count import Yield
 
 RESISTORS = (0.05, 0.01, 0.001)
 CAPACITORS = (0.05, 0.01)

@@ -15,9 +15,10 @@ from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model import Dimensionless, Mechanical
 from designer.spread.part_grades import BetterGrade, better_grades
+from designer.verdicts.verdict import StudyPlan
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.study import RunResult, Study
-from designer.yields.verdict import StudyPlan, Yield
+from designer.yields.yield_count import Yield
 
 
 @dataclass(frozen=True)

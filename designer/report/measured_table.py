@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from designer.base.csv_tables import csv_text
-from designer.yields.verdict import Answer, StudyPlan, Verdict, worst
+from designer.verdicts.verdict import Answer, StudyPlan, Verdict
+from designer.yields.yield_count import worst
 
 if TYPE_CHECKING:
     from designer.yields.study import Study

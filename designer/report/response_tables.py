@@ -20,8 +20,9 @@ from designer.report.data import ReportData
 from designer.report.spread_words import words_of
 from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import shortest_contact
-from designer.yields.cross_check import CrossCheck, NgspiceVerdict, StartKind
-from designer.yields.verdict import Answer, Yield, reasons
+from designer.verdicts.cross_check import CrossCheck, NgspiceVerdict, StartKind
+from designer.verdicts.verdict import Answer
+from designer.yields.yield_count import Yield, reasons
 
 REASONS_SHOWN = 5
 """Kinds of loss that are named; the rest is counted."""

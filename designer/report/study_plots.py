@@ -22,7 +22,8 @@ from designer.base.figure_style import (
     styled,
 )
 from designer.circuit.coefficients import EXACT
-from designer.yields.verdict import Answer, Verdict, Yield
+from designer.verdicts.verdict import Answer, Verdict
+from designer.yields.yield_count import Yield
 
 VERDICTS = {
     Verdict.OK: "#0072b2",

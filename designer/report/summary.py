@@ -7,7 +7,7 @@ import math
 from designer.circuit.coefficients import EXACT
 from designer.report import words
 from designer.report.data import ReportData
-from designer.yields.verdict import Yield
+from designer.yields.yield_count import Yield
 
 FEW = 100
 """Below so many samples the report says that the intervals are wide."""

@@ -13,11 +13,12 @@ from designer.report import words
 from designer.report.data import ReportData
 from designer.report.measured_table import table as measured_boards
 from designer.report.response_tables import STARTED
+from designer.verdicts.verdict import BoardRow
 from designer.yields.blame_analysis import ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.two_engine_yield import Combined
-from designer.yields.verdict import BoardRow, Yield, count
 from designer.yields.worst_corner import Corner
+from designer.yields.yield_count import Yield, count
 from designer.yields.yield_maps import YieldMap
 
 PARTS_SHOWN = 4

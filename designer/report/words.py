@@ -11,7 +11,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.trust import WORDS
 from designer.circuit.coefficients import EXACT
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.yields.verdict import Yield
+from designer.yields.yield_count import Yield
 
 NONE = "–"
 

@@ -1,7 +1,7 @@
 """How many boards keep a response: tolerance studies and what they say.
 
 As built, tuned, trimmed and reached yields, both engines' estimate, margins, blame and maps.
-``tolerance`` runs a study; ``count`` is where a yield is counted.
+``tolerance`` runs a study; ``yield_count`` is where a yield is counted.
 """
 
 import lazy_loader

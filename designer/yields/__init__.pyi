@@ -1,7 +1,5 @@
 from . import (
-    exact_rung as exact_rung,
     margins as margins,
-    ngspice_runs as ngspice_runs,
     study_identity as study_identity,
 )
 from .blame_analysis import (
@@ -15,20 +13,6 @@ from .blame_analysis import (
 from .blame_replay import (
     BUDGET as BUDGET,
     BlamedPart as BlamedPart,
-)
-from .cross_check import (
-    NOMINAL_SAMPLES as NOMINAL_SAMPLES,
-    OWN_SAMPLES as OWN_SAMPLES,
-    Ask as Ask,
-    CrossCheck as CrossCheck,
-    NgspiceVerdict as NgspiceVerdict,
-    StartKind as StartKind,
-    Why as Why,
-    survives as survives,
-)
-from .exact_rung import (
-    images as images,
-    waveform_error as waveform_error,
 )
 from .layers import (
     LAYERS as LAYERS,
@@ -44,12 +28,6 @@ from .margins import (
     Limit as Limit,
     Margin as Margin,
     Prediction as Prediction,
-)
-from .ngspice_runs import (
-    Query as Query,
-    cross_checks as cross_checks,
-    run_queries as run_queries,
-    way_to_rung as way_to_rung,
 )
 from .power_up import (
     PowerUp as PowerUp,
@@ -109,25 +87,17 @@ from .tuned_yield import (
 from .two_engine_yield import (
     Combined as Combined,
 )
-from .verdict import (
-    BLOCK as BLOCK,
-    Answer as Answer,
-    BoardRow as BoardRow,
-    Question as Question,
-    StudyPlan as StudyPlan,
-    Verdict as Verdict,
+from .worst_corner import (
+    Corner as Corner,
+    Index as Index,
+)
+from .yield_count import (
     Yield as Yield,
     all_on_one as all_on_one,
     count as count,
     count_verdicts as count_verdicts,
-    judge as judge,
     reasons as reasons,
-    rounded as rounded,
     worst as worst,
-)
-from .worst_corner import (
-    Corner as Corner,
-    Index as Index,
 )
 from .yield_maps import (
     OVERS as OVERS,

@@ -16,8 +16,8 @@ from designer.base.arrays import Array
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.model.tuning_bands import Bands
+from designer.verdicts.verdict import Question
 from designer.yields.adjustment import AS_BUILT, Adjustment
-from designer.yields.verdict import Question
 
 BITS = 8
 SCREEN = 2.5

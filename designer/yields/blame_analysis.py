@@ -15,11 +15,11 @@ from enum import StrEnum
 from typing import Any
 
 from designer.base.plain_json import plain
+from designer.verdicts.verdict import Answer, StudyPlan, Verdict
 from designer.yields import margins as margin_limits
 from designer.yields.blame_replay import KEPT, LOST, BlamedPart, extent_of, replay
 from designer.yields.margins import Margin, Prediction
 from designer.yields.stored_parts import StoredParts
-from designer.yields.verdict import Answer, StudyPlan, Verdict
 from designer.yields.worst_corner import Corner, Index, sobol, worst_corners
 
 SHOWN_LIMITS = 4

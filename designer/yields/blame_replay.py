@@ -25,10 +25,10 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Capacitor, Circuit, Reference, Resistor, Section
 from designer.spread.board_quantities import exact_in, quantities
 from designer.spread.spread import draw_many
-from designer.yields.exact_rung import Case, settled
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Answer, StudyPlan, Verdict
 from designer.yields.margins import DRAWN, ROUNDS, lost_boards
 from designer.yields.stored_parts import StoredParts
-from designer.yields.verdict import Answer, StudyPlan, Verdict
 from designer.yields.worst_corner import CORNER
 
 LOST, KEPT = 50, 20

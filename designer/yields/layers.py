@@ -14,13 +14,13 @@ from typing import Any, Literal, Protocol
 
 from designer.base.threads import parallel
 from designer.spice.pool import SpicePool
-from designer.yields import exact_rung, ngspice_runs
-from designer.yields.cross_check import Ask, CrossCheck
+from designer.verdicts import exact_rung, ngspice_runs
+from designer.verdicts.cross_check import Ask, CrossCheck
+from designer.verdicts.verdict import BLOCK, Answer, BoardRow, StudyPlan
 from designer.yields.power_up import PowerUp
 from designer.yields.row_store import BlockStore, Row
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
-from designer.yields.verdict import BLOCK, Answer, BoardRow, StudyPlan
 
 CHUNK = 10
 """Samples of a block of ngspice's runs: they take seconds each."""

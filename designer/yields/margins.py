@@ -27,9 +27,9 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Orbit
 from designer.dynamics.piecewise_linear import Drive
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
-from designer.yields.exact_rung import Case, settled
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Answer, Question, Verdict
 from designer.yields.stored_parts import StoredParts, counted
-from designer.yields.verdict import Answer, Question, Verdict
 
 STEP = 0.02
 """Of a quantity's standard deviation: half the span of a central difference."""

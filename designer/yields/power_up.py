@@ -22,9 +22,9 @@ from designer.dynamics.orbit import Orbit, failed
 from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 from designer.spread.random_streams import uniforms
 from designer.spread.spread import draw_many
-from designer.yields.exact_rung import Case, settled
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import BoardRow, Question, StudyPlan, Verdict
 from designer.yields.start_recipe import Recipe
-from designer.yields.verdict import BoardRow, Question, StudyPlan, Verdict
 
 WATCHED = 20
 """Drive periods after switching on in which clipping is looked for."""

@@ -19,8 +19,8 @@ import pyarrow as pa
 from designer.base.atomic_write import appearing
 from designer.base.keyed_store import KeyedStore, Vouch, nobody, quiet
 from designer.base.parquet_entry import ParquetForm, Rows
-from designer.yields.cross_check import CrossCheck
-from designer.yields.verdict import BLOCK, BoardRow
+from designer.verdicts.cross_check import CrossCheck
+from designer.verdicts.verdict import BLOCK, BoardRow
 
 Row = TypeVar("Row", bound=BoardRow | CrossCheck)
 FORMAT = 2

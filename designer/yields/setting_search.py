@@ -19,10 +19,10 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Question, Verdict
 from designer.yields import window_path
 from designer.yields.adjustment import AS_BUILT, Adjustment, widths
-from designer.yields.exact_rung import Case, settled
-from designer.yields.verdict import Question, Verdict
 from designer.yields.window_path import PathSetting, find_window
 
 HALVED = 4

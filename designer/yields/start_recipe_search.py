@@ -18,10 +18,10 @@ from designer.circuit.netlist import Excitation, nominal_board
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spread.spread import draw_many
-from designer.yields.exact_rung import Case, settled
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.power_up import switched_on
 from designer.yields.start_recipe import SLOWER, Recipe, RecipeKind
-from designer.yields.verdict import Question, StudyPlan, Verdict
 
 TRIALS = 12
 """Phases at which the nominal circuit is switched on."""

@@ -18,16 +18,17 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile
 from designer.spice.equation_check import EquationCheck
 from designer.spread.part_rules import spread_of
+from designer.verdicts.cross_check import CrossCheck
+from designer.verdicts.verdict import Answer, BoardRow, Question, StudyPlan
 from designer.yields import two_engine_yield
 from designer.yields.blame_analysis import Blame, BlameStatus
-from designer.yields.cross_check import CrossCheck
 from designer.yields.power_up import PowerUp
 from designer.yields.row_store import Row
 from designer.yields.start_recipe import Recipe
 from designer.yields.trimmed_yield import Trimmed
 from designer.yields.tuned_yield import Tuned
 from designer.yields.two_engine_yield import Combined
-from designer.yields.verdict import Answer, BoardRow, Question, StudyPlan, Yield, all_on_one, count
+from designer.yields.yield_count import Yield, all_on_one, count
 from designer.yields.yield_maps import YieldMap
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from typing import Any
 from designer.base.plain_json import plain
 from designer.base.version import __version__
 from designer.circuit.netlist import Part
-from designer.yields import cross_check, ngspice_runs
-from designer.yields.verdict import StudyPlan, rounded
+from designer.verdicts import cross_check, ngspice_runs
+from designer.verdicts.verdict import StudyPlan, rounded
 
 RULES = {
     "samples": 1,

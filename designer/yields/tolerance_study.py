@@ -18,10 +18,12 @@ from designer.model.tuning_bands import Bands
 from designer.spice.numerics_gate import GateResult
 from designer.spice.pool import SpicePool
 from designer.spread.spread import NO_BANDWIDTH
-from designer.yields import cross_check, layers
+from designer.verdicts import cross_check
+from designer.verdicts.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
+from designer.verdicts.verdict import BLOCK, StudyPlan
+from designer.yields import layers
 from designer.yields.blame_analysis import Blame, blame
 from designer.yields.blame_replay import BUDGET, extent_of
-from designer.yields.cross_check import NOMINAL_SAMPLES, Ask, CrossCheck
 from designer.yields.layers import LayerName, Runner, Task
 from designer.yields.power_up import power_up_block
 from designer.yields.row_store import BlockStore
@@ -31,7 +33,6 @@ from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study, plan_study
 from designer.yields.trimmed_yield import DcTrim, dc_trim, trimmed_block
 from designer.yields.tuned_yield import tuned_block
-from designer.yields.verdict import BLOCK, StudyPlan
 from designer.yields.yield_maps import Over, yield_map
 
 MOST_UNTIL = 100_000
@@ -109,7 +110,7 @@ def tolerance(
     """How many boards show each response, under the spread of the model file.
 
     samples : at least. until : width of the 95 % intervals at which the study stops growing; it
-    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``yields.cross_check``
+    does not grow if None. rung : ``exact`` asks no ngspice, ``auto`` as ``verdicts.cross_check``
     says, ``ngspice`` about every board. tuned, reached, blamed : whether these are wanted; a fitted
     trimmer is always asked for. blame_budget : steps of the blame (``blame_replay``). maps :
     settings over which the yield is wanted (``yield_maps.OVERS``). checked : of the same design, to

@@ -22,9 +22,9 @@ from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.netlist import Circuit, Resistor, nominal_board
 from designer.circuit.working_modes import at_rest
 from designer.spread.spread import draw_many
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, rounded
 from designer.yields.bench_procedure import BITS, READINGS
-from designer.yields.verdict import Answer, BoardRow, StudyPlan, rounded
 
 if TYPE_CHECKING:
     from designer.check.synthesis_result import Synthesis

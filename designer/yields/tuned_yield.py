@@ -20,11 +20,11 @@ from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.dynamics.orbit import Orbit
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import draw_many
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import Answer, BoardRow, StudyPlan, Verdict, rounded
 from designer.yields.adjustment import AS_BUILT, Adjustment, centring_offset
 from designer.yields.bench_procedure import BenchResult, find_on_bench
-from designer.yields.exact_rung import Case, settled
 from designer.yields.setting_search import BoardCase, seek
-from designer.yields.verdict import Answer, BoardRow, StudyPlan, Verdict, rounded
 
 DIGITS = 6
 """Decimals of the centring DC offset over the amplitude."""

@@ -32,7 +32,7 @@ import numpy as np
 from designer.base.proportion import wilson
 from designer.dynamics.orbit import OrbitStatus
 from designer.spice.read_orbit import STROBE_TOLERANCE
-from designer.yields.cross_check import (
+from designer.verdicts.cross_check import (
     BOUNDARY_SAMPLES,
     SLOW,
     CrossCheck,
@@ -40,7 +40,7 @@ from designer.yields.cross_check import (
     Why,
     margin_share,
 )
-from designer.yields.verdict import Answer, Question, Verdict
+from designer.verdicts.verdict import Answer, Question, Verdict
 
 
 class Explanation(StrEnum):

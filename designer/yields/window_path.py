@@ -25,8 +25,8 @@ from designer.dynamics.continued_orbit import ContinuedOrbit, Function, follow, 
 from designer.dynamics.flow import Flow
 from designer.model.tuning_bands import Bands
 from designer.spread.board_quantities import between
+from designer.verdicts.verdict import Question
 from designer.yields.adjustment import Adjustment, widths
-from designer.yields.verdict import Question
 
 PROBE = 0.01
 """Of a half-band, and of the way: the step of a difference quotient."""

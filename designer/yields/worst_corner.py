@@ -23,10 +23,10 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Circuit
 from designer.spread.board_quantities import column
 from designer.spread.spread import BOARD, Spread, part_of
-from designer.yields.exact_rung import Case, settled
+from designer.verdicts.exact_rung import Case, settled
+from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields.margins import Margin
 from designer.yields.stored_parts import StoredParts, counted
-from designer.yields.verdict import StudyPlan, Verdict
 
 CUBE = 512
 """Base samples of the Sobol indices; a power of two."""

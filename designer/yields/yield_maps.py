@@ -27,7 +27,8 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.spread import draw_many
-from designer.yields.verdict import Question, StudyPlan, Verdict, Yield
+from designer.verdicts.verdict import Question, StudyPlan, Verdict
+from designer.yields.yield_count import Yield
 
 Over = Literal["omega", "b", "grade", "omega-grade"]
 OVERS: tuple[Over, ...] = ("omega", "b", "grade", "omega-grade")

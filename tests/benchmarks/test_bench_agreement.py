@@ -11,8 +11,8 @@ from benchmarks import bench_agreement
 from benchmarks.bench_agreement import Difference, Row
 from designer.base.manifest import read_json
 from designer.model.model_file import read_model_file
+from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.two_engine_yield import Explanation
-from designer.yields.verdict import Answer, Verdict
 
 ROW = Row("1-2-2", 0.85, 200, 196, 198, 1, 0, 1, 40, 40, 1)
 UNEXPLAINED = Difference(0.85, "1-2-2", 7, "1-2-2", "1-1-1", "1-1-1", 0.1, 0.2, 0.5, "unexplained")

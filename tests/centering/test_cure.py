@@ -44,11 +44,12 @@ from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import Spread, draw_many
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
 from designer.yields.margins import Limit, Margin
 from designer.yields.tolerance_study import StudyEngine
 from designer.yields.trimmed_yield import trimmed_block
-from designer.yields.verdict import BLOCK, Question, StudyPlan, Verdict, Yield
+from designer.yields.yield_count import Yield
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared import bench_plans, paper_cases
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE

@@ -11,7 +11,7 @@ from designer.centering.cure_measure import MeasuredYield
 from designer.centering.cure_plots import front_chart
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades, WindowPlace
-from designer.yields.verdict import Yield
+from designer.yields.yield_count import Yield
 from tests.shared import paper_cases
 
 

@@ -23,8 +23,9 @@ from designer.model.model_file import parse_model_file
 from designer.spread.board_quantities import quantities
 from designer.spread.part_rules import spread_of
 from designer.spread.spread import draw_many
+from designer.verdicts.verdict import Question, StudyPlan
 from designer.yields.margins import Limit, Margin
-from designer.yields.verdict import Question, StudyPlan, Yield
+from designer.yields.yield_count import Yield
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 BAND = 0.05

@@ -17,11 +17,11 @@ from designer.circuit.netlist import nominal_board
 from designer.circuit.working_modes import at_rest
 from designer.spread.board_quantities import quantities
 from designer.spread.spread import draw_many
+from designer.verdicts.exact_rung import block
+from designer.verdicts.verdict import StudyPlan, Verdict
 from designer.yields import margins
-from designer.yields.exact_rung import block
 from designer.yields.margins import Limit, Margin
 from designer.yields.trimmed_yield import trimmed_answers, trimmed_boards
-from designer.yields.verdict import StudyPlan, Verdict
 from tests.shared.bench_plans import plan
 from tests.yields.test_trimmed_yield import ROUGH, trim
 

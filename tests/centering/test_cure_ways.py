@@ -32,7 +32,8 @@ from designer.dynamics.flow import Flow
 from designer.model.model import Dimensionless
 from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread
-from designer.yields.verdict import Question, StudyPlan, Verdict, Yield
+from designer.verdicts.verdict import Question, StudyPlan, Verdict
+from designer.yields.yield_count import Yield
 from tests.circuit.test_coefficients import exact_for_paper
 from tests.circuit.test_reduction import circuit_of
 

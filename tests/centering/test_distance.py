@@ -14,7 +14,7 @@ from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import STAGES
 from designer.spread.board_quantities import between
 from designer.spread.spread import draw_many
-from designer.yields.verdict import Verdict, judge
+from designer.verdicts.verdict import Verdict, judge
 from tests.shared.search_cases import made, spread
 
 COUNT = 6

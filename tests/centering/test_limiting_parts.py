@@ -25,7 +25,7 @@ from designer.centering.limiting_parts import (
 from designer.check import checked_design
 from designer.spread.board_quantities import Quantity, quantities
 from designer.spread.spread import Group
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
 from designer.yields.margins import Limit, Margin
 from designer.yields.study import plan_study
 from tests.shared import bench_plans, paper_cases

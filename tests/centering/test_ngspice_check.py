@@ -27,8 +27,8 @@ from designer.dynamics.orbit import OrbitStatus
 from designer.spice.pool import SpicePool
 from designer.spread.board_quantities import between
 from designer.spread.spread import draw_many
-from designer.yields.cross_check import OR, UNDECIDED
-from designer.yields.ngspice_runs import NgspiceAnswer, Query
+from designer.verdicts.cross_check import OR, UNDECIDED
+from designer.verdicts.ngspice_runs import NgspiceAnswer, Query
 from tests.shared.search_cases import made, spread
 
 

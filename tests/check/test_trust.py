@@ -37,7 +37,7 @@ from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.yields.study import RunResult, trust_of_yield
-from designer.yields.verdict import Yield
+from designer.yields.yield_count import Yield
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 STIFFEST = 1.0 - 2.0**-52

@@ -23,7 +23,7 @@ from designer.cli import entry
 from designer.cli.app import VERBS
 from designer.jobs.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
-from designer.yields.cross_check import OWN_SAMPLES
+from designer.verdicts.cross_check import OWN_SAMPLES
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -55,7 +55,7 @@ from designer.spice.numerics_gate import BOUND, RELTOL
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
-from designer.yields import cross_check
+from designer.verdicts import cross_check
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.paper_cases import synthesised
 

@@ -19,12 +19,12 @@ from designer.base.errors import EnvironmentMissing
 from designer.cli import entry
 from designer.jobs import dask_runner
 from designer.jobs.dask_runner import Cluster
+from designer.verdicts.verdict import Answer, StudyPlan
 from designer.yields.layers import Here, fill, samples_task
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
-from designer.yields.verdict import Answer, StudyPlan
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
-from tests.yields.test_verdict import nothing, plan
+from tests.verdicts.test_verdict import nothing, plan
 
 ROOT = Path(__file__).resolve().parents[2]
 LOCAL: Any = distributed.LocalCluster

@@ -27,7 +27,7 @@ from designer.jobs.options import Options
 from designer.jobs.search_job import confirms, to_confirm
 from designer.jobs.search_stage import searched_into
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
-from designer.yields.verdict import Verdict
+from designer.verdicts.verdict import Verdict
 from tests.shared.search_cases import asked, made
 
 OPEN = 'omega = "best"\nexpect = "1-2-2"\nb = [0.25, 0.27]'

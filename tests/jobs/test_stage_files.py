@@ -24,9 +24,9 @@ from designer.model.model_file import ModelFile, read_model_file
 from designer.report.data import ReportData
 from designer.report.write import render_html, render_markdown
 from designer.spice.pool import SpicePool
-from designer.yields.cross_check import ask_random
+from designer.verdicts.cross_check import ask_random
+from designer.verdicts.ngspice_runs import cross_checks
 from designer.yields.layers import samples_task
-from designer.yields.ngspice_runs import cross_checks
 from designer.yields.study import RunResult, Study, plan_study
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED

@@ -15,10 +15,10 @@ from designer.spice.deck import SolverSettings
 from designer.spice.equation_check import EquationCheck, EquationFinding
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
+from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
 from designer.yields.margins import Crossing, Limit, Prediction
-from designer.yields.verdict import Verdict
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.shared.bench_plans import question

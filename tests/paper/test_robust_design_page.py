@@ -13,7 +13,8 @@ from designer.base.page import markdown
 from designer.model.model_file import parse_model_file
 from designer.paper.robust_design import _decided, at_model_clearance
 from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
-from designer.yields.verdict import Verdict, Yield
+from designer.verdicts.verdict import Verdict
+from designer.yields.yield_count import Yield
 from tests.shared.search_cases import asked
 
 

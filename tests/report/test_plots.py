@@ -24,7 +24,8 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
-from designer.yields.verdict import Answer, Verdict, Yield
+from designer.verdicts.verdict import Answer, Verdict
+from designer.yields.yield_count import Yield
 from tests.shared.figure_text import clipped, overlapping
 
 PNG = b"\x89PNG\r\n\x1a\n"

@@ -25,12 +25,12 @@ from designer.report.tolerance_tables import (
     recipes,
 )
 from designer.report.write import render_html, render_markdown
+from designer.verdicts.exact_rung import block
+from designer.verdicts.verdict import Verdict
 from designer.yields.blame_analysis import Blame, NearLimit, ResponseBlame
 from designer.yields.blame_replay import BlamedPart
-from designer.yields.exact_rung import block
 from designer.yields.margins import Prediction
 from designer.yields.study import RunResult, Study, plan_study
-from designer.yields.verdict import Verdict
 from designer.yields.worst_corner import Corner, Index
 from designer.yields.yield_maps import Axis, YieldMap
 from tests.report.test_write import Page

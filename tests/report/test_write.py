@@ -27,11 +27,11 @@ from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed
-from designer.yields.cross_check import CrossCheck, StartKind, ask_random
+from designer.verdicts.cross_check import CrossCheck, StartKind, ask_random
+from designer.verdicts.ngspice_runs import cross_checks
+from designer.verdicts.verdict import Verdict
 from designer.yields.layers import samples_task
-from designer.yields.ngspice_runs import cross_checks
 from designer.yields.study import RunResult, Study, plan_study
-from designer.yields.verdict import Verdict
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed
 

@@ -19,15 +19,9 @@ from designer.jobs.study_cache import CACHE
 from designer.model import find_responses, si_units
 from designer.model.board_table import BoardSpec
 from designer.spice import numerics_gate
-from designer.yields import (
-    blame_replay,
-    cross_check,
-    layers,
-    ngspice_runs,
-    tolerance_study,
-    worst_corner,
-)
-from designer.yields.verdict import BLOCK
+from designer.verdicts import cross_check, ngspice_runs
+from designer.verdicts.verdict import BLOCK
+from designer.yields import blame_replay, layers, tolerance_study, worst_corner
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTRACT = (DOCS / "contract.md").read_text("utf-8")

@@ -26,7 +26,7 @@ from designer.jobs import cure_job, search_job, trade_job
 from designer.jobs.board_files import bills
 from designer.model.measured_values import MeasuredBoards
 from designer.paper import reproduce_circuit, reproduce_dynamics, reproduce_tolerance
-from designer.yields.verdict import Verdict
+from designer.verdicts.verdict import Verdict
 from tests.shared.house import ORDER
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import quick_folder

@@ -12,8 +12,9 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Board
 from designer.model.response_table import Expect, Response
 from designer.spread.spread import Spread
-from designer.yields import exact_rung
-from designer.yields.verdict import Answer, Question, StudyPlan, Yield, count
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import Answer, Question, StudyPlan
+from designer.yields.yield_count import Yield, count
 from tests.shared.paper_cases import OMEGA, subject
 
 SPREAD = Spread(0.01, 0.01, 1e-3, 4e-3)

@@ -20,6 +20,7 @@ ORDER = (
     "spread",
     "spice",
     "check",
+    "verdicts",
     "board",
     "yields",
     "design_rules",

@@ -21,13 +21,13 @@ from designer.model.distributions import Uniform
 from designer.model.response_table import Expect, Response
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
 from designer.spread.spread import Group, Spread, draw_many
+from designer.verdicts.exact_rung import block
+from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, judge
 from designer.yields import blame_replay
 from designer.yields.blame_analysis import NOTHING_LOST, Blame, blame
 from designer.yields.blame_replay import PROBE, extent_of
-from designer.yields.exact_rung import block
 from designer.yields.margins import Limit, Margin, Prediction, crossings
 from designer.yields.stored_parts import StoredParts
-from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, judge
 from designer.yields.worst_corner import Index, sobol, worst_corners
 from tests.shared import paper_cases
 

@@ -20,10 +20,10 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Expect, Response
 from designer.spice.deck import SolverSettings
 from designer.spread.spread import Spread
+from designer.verdicts.verdict import BLOCK, Answer, BoardRow, Question, StudyPlan, Verdict
 from designer.yields.layers import Here, fill
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import RULES, study_hash
-from designer.yields.verdict import BLOCK, Answer, BoardRow, Question, StudyPlan, Verdict
 
 
 @pytest.fixture

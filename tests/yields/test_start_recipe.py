@@ -16,6 +16,7 @@ from designer.circuit.netlist import Excitation, Resistor, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.flow import Flow
 from designer.spread.spread import draw, draw_many
+from designer.verdicts.verdict import Verdict
 from designer.yields import start_recipe_search
 from designer.yields.power_up import (
     PowerUp,
@@ -36,7 +37,6 @@ from designer.yields.start_recipe_search import (
     highest_resonance,
     phase,
 )
-from designer.yields.verdict import Verdict
 from tests.shared.bench_plans import answers, ensemble, period_counts, plan, question
 from tests.shared.paper_cases import OMEGA, subject
 

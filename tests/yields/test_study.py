@@ -27,20 +27,21 @@ from designer.jobs import design_source, study_json
 from designer.jobs.study_folder import NGSPICE, PIECES
 from designer.model.distributions import Uniform
 from designer.spice import equation_check, numerics_gate
-from designer.yields import exact_rung, layers, ngspice_runs, tolerance_study
+from designer.verdicts import exact_rung, ngspice_runs
+from designer.verdicts.cross_check import CrossCheck, StartKind, Why, ask_random
+from designer.verdicts.verdict import BLOCK, Answer, Verdict
+from designer.yields import layers, tolerance_study
 from designer.yields.blame_analysis import blame
-from designer.yields.cross_check import CrossCheck, StartKind, Why, ask_random
 from designer.yields.layers import CHUNK, Here
 from designer.yields.row_store import BlockStore
 from designer.yields.stored_parts import StoredParts
 from designer.yields.study import Study
 from designer.yields.tolerance_study import Stores, Work, tolerance
-from designer.yields.verdict import BLOCK, Answer, Verdict
 from tests.jobs.test_study_cache import MAP
 from tests.shared.model_text import COARSE_CIRCUIT, PAPER_TABLE
 from tests.shared.quick_folders import without_starts
+from tests.verdicts.test_verdict import plan
 from tests.yields.test_blame_analysis import _Memory
-from tests.yields.test_verdict import plan
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
 

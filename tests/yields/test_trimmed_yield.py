@@ -25,7 +25,8 @@ from designer.dynamics.flow import Flow
 from designer.jobs.study_json import study_json
 from designer.model.model_file import parse_model_file
 from designer.spread.spread import Spread, draw, draw_many
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
+from designer.verdicts.verdict import StudyPlan, Verdict, judge
 from designer.yields.adjustment import rest_distances
 from designer.yields.tolerance_study import tolerance
 from designer.yields.trimmed_yield import (
@@ -42,7 +43,7 @@ from designer.yields.trimmed_yield import (
     trimmed_block,
     trimmed_boards,
 )
-from designer.yields.verdict import StudyPlan, Verdict, all_on_one, judge
+from designer.yields.yield_count import all_on_one
 from tests.shared.bench_plans import period_counts, plan
 from tests.shared.paper_cases import subject, synthesised
 

@@ -17,11 +17,12 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.jobs.study_json import tuned_json
 from designer.model.tuning_bands import Bands
 from designer.spread.spread import Spread, draw
+from designer.verdicts.verdict import Answer, Question, Verdict, judge
 from designer.yields import tuned_yield
 from designer.yields.adjustment import AS_BUILT, Adjustment
 from designer.yields.setting_search import MOST_FOLLOWED, MOST_TRIES, BoardCase, Try, seek
 from designer.yields.tuned_yield import Tuned, benched_block, tuned_block
-from designer.yields.verdict import Answer, Question, Verdict, all_on_one, judge
+from designer.yields.yield_count import all_on_one
 from tests.shared.bench_plans import answers, ensemble, period_counts, plan, question, shifted
 from tests.shared.paper_cases import subject
 

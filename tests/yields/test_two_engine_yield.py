@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from designer.yields.cross_check import (
+from designer.verdicts.cross_check import (
     BOUNDARY_SAMPLES,
     OR,
     Ask,
@@ -19,6 +19,7 @@ from designer.yields.cross_check import (
     ask_random,
     is_answer,
 )
+from designer.verdicts.verdict import Answer, Verdict
 from designer.yields.two_engine_yield import (
     Combined,
     Explanation,
@@ -27,8 +28,8 @@ from designer.yields.two_engine_yield import (
     differences,
     interval,
 )
-from designer.yields.verdict import Answer, Verdict, Yield
-from tests.yields.test_ngspice_sampling import BLANK, HEARD, question
+from designer.yields.yield_count import Yield
+from tests.verdicts.test_ngspice_sampling import BLANK, HEARD, question
 
 OK, LOST = "1-2-2", "1-1-1"
 QUESTION = question()

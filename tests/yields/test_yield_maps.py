@@ -19,8 +19,8 @@ from designer.dynamics.flow import Flow
 from designer.model.response_table import Expect, Response
 from designer.report.map_plots import map_chart, map_files
 from designer.spread.spread import Spread, draw
+from designer.verdicts.verdict import Question, StudyPlan, Verdict, judge
 from designer.yields import yield_maps
-from designer.yields.verdict import Question, StudyPlan, Verdict, judge
 from designer.yields.yield_maps import SEED_SHIFT, Axis, Over, YieldMap, yield_map
 from tests.shared import paper_cases
 

@@ -11,7 +11,7 @@ import pytest
 from designer.circuit.netlist import Excitation
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Expect, Response
-from designer.yields.cross_check import (
+from designer.verdicts.cross_check import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,
     OWN_SAMPLES,
@@ -26,7 +26,7 @@ from designer.yields.cross_check import (
     ask_random,
     margin_share,
 )
-from designer.yields.verdict import Answer, Question, Verdict
+from designer.verdicts.verdict import Answer, Question, Verdict
 
 BLANK = Answer(0, 0, Verdict.OK, "1-2-2", "", 0.5, 1.0, 1.0, 0.0, 40)
 HEARD = CrossCheck(0, 0, StartKind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)

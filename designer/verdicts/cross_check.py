@@ -16,7 +16,7 @@ from enum import StrEnum
 
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
-from designer.yields.verdict import Answer, Question, Verdict
+from designer.verdicts.verdict import Answer, Question, Verdict
 
 OWN_SAMPLES = 10
 """Of the first so many samples of each response ngspice starts those with a period from their own

@@ -24,8 +24,8 @@ from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed, SpiceJob
 from designer.spread.spread import draw
-from designer.yields import ngspice_runs
-from designer.yields.cross_check import (
+from designer.verdicts import ngspice_runs
+from designer.verdicts.cross_check import (
     OR,
     UNDECIDED,
     Ask,
@@ -35,8 +35,7 @@ from designer.yields.cross_check import (
     ask_random,
     is_answer,
 )
-from designer.yields.layers import fill_cross_checks, samples_task
-from designer.yields.ngspice_runs import (
+from designer.verdicts.ngspice_runs import (
     MOST_PERIODS,
     REMAINDER,
     NgspiceAnswer,
@@ -45,11 +44,12 @@ from designer.yields.ngspice_runs import (
     periods_to_settle,
     run_queries,
 )
+from designer.verdicts.verdict import StudyPlan, Verdict
+from designer.yields.layers import fill_cross_checks, samples_task
 from designer.yields.row_store import BlockStore
 from designer.yields.study_identity import study_hash
-from designer.yields.verdict import StudyPlan, Verdict
 from tests.shared.paper_cases import flow_of, subject
-from tests.yields.test_verdict import nothing, plan
+from tests.verdicts.test_verdict import nothing, plan
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.numerics_gate import GateSubject
 from designer.spread.spread import draw_many
-from designer.yields.verdict import Answer, Question, StudyPlan, Verdict, rounded
+from designer.verdicts.verdict import Answer, Question, StudyPlan, Verdict, rounded
 
 Case = tuple[int, Question, Excitation, Array]
 """A board, by its place in an ensemble, what it is asked, the generator's setting, the start."""

@@ -16,9 +16,9 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.spread import draw, draw_many
-from designer.yields import exact_rung
+from designer.verdicts import exact_rung
 from tests.circuit.test_ensemble import FEW, STAGES, nominal
-from tests.yields.test_verdict import plan
+from tests.verdicts.test_verdict import plan
 
 
 def integrated(system: PiecewiseLinearSystem, drive: Drive, x: Array, periods: int) -> Array:

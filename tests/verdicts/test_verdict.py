@@ -1,4 +1,4 @@
-"""Verdicts, yields, blocks: the logic of the study against closed formulas and by hand."""
+"""Verdicts and blocks of boards: the logic of the study by hand."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.netlist import Excitation, Resistor, nominal_board
+from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
@@ -19,9 +18,8 @@ from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from designer.model.response_table import Expect, Response
-from designer.spread.spread import Spread, draw
-from designer.yields.layers import samples_task
-from designer.yields.verdict import BLOCK, Answer, Question, StudyPlan, Verdict, Yield, count, judge
+from designer.spread.spread import Spread
+from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict, judge
 from tests.circuit.test_coefficients import exact_for_paper
 from tests.circuit.test_reduction import circuit_of
 
@@ -89,40 +87,6 @@ def test_symmetry_of_even_periods() -> None:
     )
 
 
-# Yields.
-
-
-@given(
-    ok=st.integers(0, 300), lost=st.integers(0, 300), grazing=st.integers(0, 50),
-    failed=st.integers(0, 50),
-)  # fmt: skip
-def test_wilson_interval_is_the_closed_formula(
-    ok: int, lost: int, grazing: int, failed: int
-) -> None:
-    y = Yield(ok, lost, grazing, failed)
-    n = ok + lost + grazing
-    assert y.samples == n + failed
-    if n == 0:
-        assert math.isnan(y.rate)
-        assert y.interval == (0.0, 1.0)
-        return
-    p, z = ok / n, 1.959963984540054
-    assert y.rate == pytest.approx(p)
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-    low, high = y.interval
-    assert low == pytest.approx(max(centre - half, 0.0), abs=1e-12)
-    assert high == pytest.approx(min(centre + half, 1.0), abs=1e-12)
-    assert low - 1e-12 <= p <= high + 1e-12
-
-
-def test_count_sorts_verdicts() -> None:
-    blank = Answer(0, 0, Verdict.OK, "", "", 0.0, 0.0, 0.0, 0.0, 0)
-    order = [Verdict.OK] * 4 + [Verdict.LOST] * 3 + [Verdict.GRAZING] * 2 + [Verdict.FAILED]
-    got = count([replace(blank, verdict=v) for v in order])
-    assert (got.ok, got.lost, got.grazing, got.failed) == (4, 3, 2, 1)
-
-
 # A small study on the exact rung.
 
 
@@ -149,46 +113,3 @@ def test_blocks_cover_every_sample_once(samples: int) -> None:
     blocks = list(replace(plan(), samples=samples).blocks())
     assert [i for block in blocks for i in block] == list(range(samples))
     assert all(block.start % BLOCK == 0 for block in blocks)
-
-
-def test_jobs_do_not_change_the_answers() -> None:
-    one = [a for block in plan().blocks() for a in samples_task(plan(), block)(1, nothing)]
-    two = [a for block in plan().blocks() for a in samples_task(plan(), block)(2, nothing)]
-    assert [repr(a) for a in one] == [repr(a) for a in two]
-    assert [(a.sample, a.question) for a in one] == [(i, q) for i in range(30) for q in range(2)]
-    longer = samples_task(replace(plan(), samples=60), range(25))(2, nothing)
-    assert [repr(a) for a in longer] == [repr(a) for a in one[:50]]
-
-
-def test_answers_are_those_of_the_boards_one_by_one() -> None:
-    p = plan()
-    answers = samples_task(p, range(5, 9))(2, nothing)
-    for a in answers:
-        question = p.questions[a.question]
-        board = draw(p.circuit, p.spread, p.seed, a.sample)
-        flow = Flow(
-            Reduction(p.circuit, board).system(),
-            Drive(2 * np.pi * question.excitation.frequency, -question.excitation.amplitude),
-        )
-        orbit = settle(flow, question.start.start)
-        assert a.response == orbit.response
-        assert a.verdict is judge(orbit, question.spec, question.start)[0]
-        # Independently of settling: a long plain run ends on the same strobe and counts.
-        if orbit.status is OrbitStatus.PERIODIC:
-            run = flow.run(question.start.start, 600)
-            lap = run.counts[-orbit.n :].sum(axis=(0, 1))
-            assert lap.tolist() == [orbit.q, orbit.p]
-
-
-def test_progress_is_called_once_an_answer() -> None:
-    calls: list[int] = []
-    answers = samples_task(plan(), range(4))(2, lambda: calls.append(1))
-    assert len(calls) == len(answers) == 8
-
-
-def test_a_board_that_cannot_be_reduced_is_failed_with_its_reason() -> None:
-    p = plan()
-    broken = replace(p.circuit, parts=(*p.circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
-    answers = samples_task(replace(p, circuit=broken), range(2))(1, nothing)
-    assert {a.verdict for a in answers} <= {Verdict.FAILED}
-    assert all(a.reason for a in answers)

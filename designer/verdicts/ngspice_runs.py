@@ -3,7 +3,7 @@
 Two starts. On the sample's own orbit of the exact circuit rung ngspice only has to stay there. From
 the nominal design's orbit it has to find its way, as the exact rung did: at least 5/(1 - ρ) drive
 periods (times n for a period of n), and no fewer than the exact trajectory from that very start
-takes to come within `REMAINDER` of its attractor. `yields.cross_check` says who is asked.
+takes to come within `REMAINDER` of its attractor. `verdicts.cross_check` says who is asked.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from designer.spice.opamp_model import Rung
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
-from designer.yields import exact_rung
-from designer.yields.cross_check import OR, UNDECIDED, Ask, CrossCheck, StartKind, is_answer
-from designer.yields.verdict import StudyPlan
+from designer.verdicts import exact_rung
+from designer.verdicts.cross_check import OR, UNDECIDED, Ask, CrossCheck, StartKind, is_answer
+from designer.verdicts.verdict import StudyPlan
 
 T = TypeVar("T")
 
