@@ -30,9 +30,10 @@ from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.nominal import on_circuit
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import describe, shoot
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.model.model_file import read_model_file
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.spread.spread import Spread, draw
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict
@@ -89,7 +90,7 @@ class Row:
 def plan_of(stage: str, most: int) -> StudyPlan:
     """The study of a stage's 1-p-p responses, p = 1 … most; its spread is bench-1 or FINE."""
     wanted = tuple(
-        Response(omega=w, expect=Expect(1, p, p), b=CLEARANCE.get(p))
+        Response(omega=w, expect=Counts(1, ((p, p),)), b=CLEARANCE.get(p))
         for p, w in BEST.items()
         if p <= most
     )

@@ -14,7 +14,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Circuit
-from designer.dynamics.orbit import MAX_PERIOD
+from designer.dynamics.counts import MAX_PERIOD
 from designer.spice import numerics_gate, settling_periods
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject

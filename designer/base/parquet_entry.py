@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pyarrow as pa
@@ -26,11 +26,15 @@ class ParquetForm:
 
     schema: pa.Schema
     """Columns and their types."""
+    optional: pa.Schema = field(default_factory=lambda: pa.schema([]))
+    """Further columns, of which a file has those in which a row has something."""
 
     def encode(self, head: Mapping[str, Any], value: Rows) -> bytes:
         """The file; equal heads and rows give equal bytes."""
         known = {HEAD: json.dumps(head, sort_keys=True), SEAL: BLANK}
-        table = pa.Table.from_pylist([dict(row) for row in value], schema=self.schema)
+        given = [f for f in self.optional if any(row.get(f.name) for row in value)]
+        schema = pa.schema([*self.schema, *given])
+        table = pa.Table.from_pylist([dict(row) for row in value], schema=schema)
         out = pa.BufferOutputStream()
         pq.write_table(table.replace_schema_metadata(known), out)
         content: bytes = out.getvalue().to_pybytes()
@@ -51,7 +55,8 @@ class ParquetForm:
             raise ValueError(str(error)) from None
         if not isinstance(head, dict):
             raise TypeError("a head that is no object")
-        if not table.schema.remove_metadata().equals(self.schema.remove_metadata()):
+        given = [f for f in self.optional if f.name in table.column_names]
+        if not table.schema.remove_metadata().equals(pa.schema([*self.schema, *given])):
             raise ValueError("other columns")
         rows: Rows = table.to_pylist()
         return head, rows

@@ -12,7 +12,7 @@ from designer.bifurcations.continuation import Branch, BranchPoint, End, apart, 
 from designer.bifurcations.orbit_curve import Curve, Solved
 from designer.bifurcations.points import Bifurcation, Birth, PointKind
 from designer.dynamics.attractors import mirrored_strobes
-from designer.dynamics.orbit import MAX_PERIOD
+from designer.dynamics.counts import MAX_PERIOD
 
 ASIDE = (3e-3, 1e-3, 1e-2, 3e-4, 3e-2, 1e-4, 3e-5, 1e-5)
 """Arclengths, in scaled units, at which the other branch is looked for, in this order."""

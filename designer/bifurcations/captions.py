@@ -13,6 +13,7 @@ import numpy as np
 from designer.bifurcations.point_captions import caption, doubled, label
 from designer.bifurcations.points import Bifurcation, Birth, PointKind
 from designer.bifurcations.sweep import DOWN, Sweep
+from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
 
@@ -60,8 +61,8 @@ def changes(sweep: Sweep, point: Bifurcation) -> list[TrackChange]:
 
 def family(response: str) -> str:
     """The response up to its mirror image, which swaps p and q."""
-    parts = response.split("-")
-    return "-".join([parts[0], *sorted(parts[1:])])
+    counts = read_counts(response)
+    return response if counts is None else str(counts.family)
 
 
 def _on(sweep: Sweep, track: str, point: Bifurcation) -> tuple[str, str] | None:

@@ -21,6 +21,7 @@ from designer.bifurcations.flow_family import Family
 from designer.bifurcations.loop_check import images, place
 from designer.bifurcations.orbit_curve import Curve, Solved
 from designer.dynamics.attractors import describe
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 
 FIRST, LEAST, GREATEST = 5e-3, 1e-9, 5e-2
@@ -73,14 +74,14 @@ class BranchPoint:
         return self.orbit.radius < 1.0
 
     @property
-    def counts(self) -> tuple[int, int, int]:
-        """n, p, q: known at a grazing point too."""
-        return self.orbit.n, self.orbit.p, self.orbit.q
+    def counts(self) -> Counts:
+        """Known at a grazing point too."""
+        return self.orbit.counts
 
     @property
     def response(self) -> str:
         """ "n-p-q"."""
-        return "-".join(str(k) for k in self.counts)
+        return str(self.counts)
 
 
 @dataclass(frozen=True)

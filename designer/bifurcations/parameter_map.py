@@ -11,7 +11,8 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.bifurcations.subject import Subject
-from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.counts import Pairs
+from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import Course, Steady
 
 COURSE = Course(settle=134, keep=16, patience=1000)
@@ -19,7 +20,7 @@ COURSE = Course(settle=134, keep=16, patience=1000)
 
 
 @dataclass(frozen=True)
-class MapCell:
+class MapCell(Motion):
     """What a grid point shows; the fields are those of ``Steady``."""
 
     i: int
@@ -31,9 +32,9 @@ class MapCell:
     n: int
     """Least period in drive periods; 0 unless periodic."""
     p: int
-    """Impacts on the upper stop in n drive periods; 0 unless periodic."""
+    """Impacts on the first clearance's upper stop in n drive periods; 0 unless periodic."""
     q: int
-    """Impacts on the lower stop in n drive periods; 0 unless periodic."""
+    """Impacts on the first clearance's lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
     """Whether the motion is its own mirror image; None unless periodic."""
     lyapunov: float
@@ -42,13 +43,8 @@ class MapCell:
     """A state of the motion at drive phase 0."""
     attractor: int = 0
     """Its number in a basin, 0 in a map."""
-
-    @property
-    def response(self) -> str:
-        """ "n-p-q" of a periodic motion, otherwise its status."""
-        if self.status is OrbitStatus.PERIODIC:
-            return f"{self.n}-{self.p}-{self.q}"
-        return str(self.status)
+    more: Pairs = ()
+    """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
 
 
 class CellStore(Protocol):
@@ -133,8 +129,9 @@ def run(
 
 def cell_of(i: int, j: int, steady: Steady) -> MapCell:
     """The cell that shows this motion."""
-    s = steady
-    return MapCell(i, j, s.status, s.n, s.p, s.q, s.symmetric, s.lyapunov, tuple(s.start.tolist()))
+    s, strobe = steady, tuple(steady.start.tolist())
+    named = (s.status, s.n, s.p, s.q, s.symmetric, s.lyapunov)
+    return MapCell(i, j, *named, strobe, more=s.more)
 
 
 def count(cells: tuple[MapCell, ...]) -> dict[str, int]:

@@ -7,6 +7,7 @@ first orbits of what leaves it. What a sweep shows there is another matter (``po
 from __future__ import annotations
 
 from designer.bifurcations.points import SIDES, Bifurcation, PointKind
+from designer.dynamics.counts import read_counts
 
 NAMES = {
     PointKind.PITCHFORK: "pitchfork",
@@ -34,12 +35,13 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
 def label(response: str, symmetric: bool | None) -> str:
     """The response with its symmetry, where it has one."""
     words = {True: " symmetric", False: " asymmetric", None: ""}
-    return response + words[symmetric if response.count("-") == 2 else None]
+    return response + words[symmetric if read_counts(response) else None]
 
 
 def doubled(response: str) -> str:
     """The counts over twice the period: "1-2-2" becomes "2-4-4"."""
-    return "-".join(str(2 * int(k)) for k in response.split("-"))
+    counts = read_counts(response)
+    return response if counts is None else str(counts.doubled)
 
 
 def _what(point: Bifurcation) -> str:

@@ -22,7 +22,7 @@ from designer.base.keyed_store import KeyedStore, Note, Vouch, nobody, quiet
 from designer.base.parquet_entry import ParquetForm, Rows
 from designer.bifurcations.parameter_map import MapCell
 from designer.bifurcations.sweep import Sweep
-from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import Steady
 
 FORMAT = 1
@@ -42,6 +42,9 @@ _COLUMNS = [
     ("velocities", pa.list_(pa.float64())),
     ("periods", pa.int64()),
 ]
+
+_MORE = pa.schema([("more", pa.list_(pa.list_(pa.int64())))])
+"""Of systems with more clearances than one."""
 
 
 def work_hash(said: Mapping[str, Any]) -> str:
@@ -65,7 +68,7 @@ def write_sweep(path: Path, made: Sweep, provenance: Mapping[str, Any]) -> None:
         for row in _rows(parameter, track, [float(v) for v in made.plan.values], steps)
     ]
     key = {"format": FORMAT, "work": work_hash(made.plan.as_dict())}
-    store: KeyedStore[Rows] = KeyedStore(path.parent, ParquetForm(_sweep_schema(parameter)))
+    store: KeyedStore[Rows] = KeyedStore(path.parent, ParquetForm(_sweep_schema(parameter), _MORE))
     store.write(path.name, key, rows, {"provenance": provenance})
 
 
@@ -77,9 +80,18 @@ def _rows(
     parameter: str, track: str, values: Sequence[float], steps: Sequence[Steady]
 ) -> list[dict[str, Any]]:
     return [
-        {"track": track, parameter: v, **s.__dict__, "status": str(s.status)}
-        for v, s in zip(values, steps, strict=True)
+        {"track": track, parameter: v, **_columns(s)} for v, s in zip(values, steps, strict=True)
     ]
+
+
+def _columns(motion: Motion) -> dict[str, Any]:
+    return {**motion.__dict__, "status": str(motion.status)}
+
+
+def _named(row: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``_columns`` says otherwise than the record does."""
+    more = tuple((p, q) for p, q in row.get("more") or ())
+    return {"status": OrbitStatus(row["status"]), "more": more}
 
 
 @dataclass(frozen=True)
@@ -112,7 +124,7 @@ class SweepStore:
         out = []
         for row in map(dict, rows):
             del row["track"], row[self.parameter]
-            row["status"] = OrbitStatus(row["status"])
+            row.update(_named(row))
             for key in ("start", "end", "minima", "velocities"):
                 row[key] = np.array(row[key], dtype=float)
             out.append(Steady(**row))
@@ -126,7 +138,7 @@ class SweepStore:
 
     @cached_property
     def _store(self) -> KeyedStore[Rows]:
-        form = ParquetForm(_sweep_schema(self.parameter))
+        form = ParquetForm(_sweep_schema(self.parameter), _MORE)
         return KeyedStore(self.root, form, self.note, self.vouch)
 
     def _key(self, track: str, block: int) -> dict[str, Any]:
@@ -171,7 +183,7 @@ class GridStore:
         out = []
         for each in map(dict, rows):
             del each[self.x], each[self.y]
-            each["status"] = OrbitStatus(each["status"])
+            each.update(_named(each))
             each["strobe"] = tuple(each["strobe"])
             out.append(MapCell(**each))
         return out
@@ -181,13 +193,13 @@ class GridStore:
         rows = []
         for cell in cells:
             said = {self.x: float(self.xs[cell.j]), self.y: float(self.ys[cell.i])}
-            rows.append({**said, **cell.__dict__, "status": str(cell.status)})
+            rows.append({**said, **_columns(cell)})
         name = self.name(self.kind, row)
         self._store.write(name, self._key(row), rows, {"provenance": self.provenance})
 
     @cached_property
     def _store(self) -> KeyedStore[Rows]:
-        return KeyedStore(self.root, ParquetForm(self._schema), self.note, self.vouch)
+        return KeyedStore(self.root, ParquetForm(self._schema, _MORE), self.note, self.vouch)
 
     @property
     def _schema(self) -> pa.Schema:

@@ -15,6 +15,7 @@ from designer.bifurcations.flow_family import Family
 from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.sweep import Sweep, Window
 from designer.dynamics import attractors
+from designer.dynamics.counts import read_counts
 
 LEAST_STEPS, LONGEST = 4, 4
 """Of a window whose ends are looked for: steps, and period."""
@@ -32,8 +33,8 @@ def windows(sweep: Sweep) -> list[Window]:
 
 def period(window: Window) -> int:
     """n of a periodic window; 0 of others."""
-    parts = window.response.split("-")
-    return int(parts[0]) if len(parts) == 3 else 0
+    counts = read_counts(window.response)
+    return 0 if counts is None else counts.n
 
 
 def locate(

@@ -11,6 +11,7 @@ from designer.bifurcations.continuation import Branch, BranchPoint, End, start, 
 from designer.bifurcations.flow_family import Family
 from designer.bifurcations.points import Bifurcation, PointKind, locate
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit
 
 OUTSIDE = 5e-4
@@ -99,7 +100,7 @@ def windows(branch: Branch, points: Sequence[Bifurcation], number: int = 0) -> l
 def _alike(branch: Branch, first: int, last: int) -> list[tuple[int, int]]:
     """First and last number of each run of points that agree in stability and counts."""
 
-    def key(i: int) -> tuple[bool, tuple[int, int, int]]:
+    def key(i: int) -> tuple[bool, Counts]:
         return branch.points[i].stable, branch.points[i].counts
 
     runs = [list(run) for _, run in itertools.groupby(range(first, last + 1), key)]

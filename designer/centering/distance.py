@@ -44,7 +44,7 @@ FARTHEST = 20.0
 
 
 @dataclass(frozen=True)
-class Counts:
+class StretchCounts:
     """What boards showed at several stretches of the spread."""
 
     stretches: tuple[float, ...]
@@ -134,7 +134,7 @@ class Stretched:
         boards: range,
         stretches: Sequence[float] = LADDER,
         progress: Callable[[], None] = lambda: None,
-    ) -> list[Counts]:
+    ) -> list[StretchCounts]:
         """What these boards show at each place. stretches : some of ``LADDER``."""
         said = [self.said(stand, boards, stretches) for stand in stands]
 
@@ -143,7 +143,7 @@ class Stretched:
 
         asked = (len(boards),) * len(stretches)
         known = self._memory.get_all(said, make)
-        return [Counts(tuple(stretches), asked, ok) for ok in known]
+        return [StretchCounts(tuple(stretches), asked, ok) for ok in known]
 
     def _made(
         self,

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from designer.centering.distance import LADDER, Counts, Stand, Stretched
+from designer.centering.distance import LADDER, Stand, StretchCounts, Stretched
 from designer.centering.windows import CLEARANCE_STEP, OperatingPoint, Stretch
 from designer.model.response_table import Response
 
@@ -38,7 +38,7 @@ class Scored:
     """Where the response is asked for."""
     stand: Stand | None
     """The nominal board's orbit there; None where it does not show the response."""
-    counts: Counts
+    counts: StretchCounts
     """What boards showed there."""
 
     @property
@@ -101,7 +101,7 @@ def score(
     stands = bench.stands([(spec, place) for place in wanted])
     there = [s for s in stands if s is not None]
     counts = iter(bench.ask(there, range(boards), ladder, progress) if there else [])
-    nothing = Counts(tuple(ladder), (0,) * len(ladder), (0,) * len(ladder))
+    nothing = StretchCounts(tuple(ladder), (0,) * len(ladder), (0,) * len(ladder))
     return [
         Scored(place, stand, nothing if stand is None else next(counts))
         for place, stand in zip(wanted, stands, strict=True)

@@ -157,7 +157,7 @@ def shows(response: Response, step: Steady) -> bool:
     """Whether a step of a sweep is the response that is wanted."""
     if step.status is not OrbitStatus.PERIODIC or not step.radius < 1.0:
         return False
-    if not response.accepts(step.n, step.p, step.q):
+    if not response.accepts(step.counts):
         return False
     return response.symmetric is None or step.symmetric is response.symmetric
 

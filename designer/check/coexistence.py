@@ -206,8 +206,8 @@ class _Tally:
     def _place(self, orbit: Orbit) -> tuple[int, int] | None:
         """Number of the attractor that this is, and whether it is the twin (1) or itself (0)."""
         for number, other in enumerate(self._orbits):
-            counts = {(other.n, other.p, other.q), (other.n, other.q, other.p)}
-            if orbit.status is not other.status or (orbit.n, orbit.p, orbit.q) not in counts:
+            named = other.counts.family == orbit.counts.family
+            if orbit.status is not other.status or not named:
                 continue
             if orbit.status is not OrbitStatus.PERIODIC:
                 return number, 0

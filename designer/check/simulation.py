@@ -28,8 +28,9 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace, circuit_flow, trace_of
 from designer.dynamics import attractors, step_budget
 from designer.dynamics.attractors import coexisting, settle, starts as sobol_starts
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
-from designer.dynamics.orbit import ANSWERS, MAX_PERIOD, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
+from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.step_budget import Budget
 from designer.model.find_responses import (
@@ -262,8 +263,7 @@ def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
     if found is None:
         return None
     near = attractors.describe(flow, found[0], orbit.n, found[1])
-    swapped = (near.n, near.p, near.q) == (orbit.n, orbit.q, orbit.p)
-    if not (swapped and near.symmetric is False and near.radius < 1.0):
+    if not (near.counts == orbit.counts.mirrored and near.symmetric is False and near.radius < 1.0):
         return None
     return near if coexistence.alike(orbit, near, NEAR_TWIN, mirrored=True) else None
 
@@ -409,7 +409,7 @@ def _distinct(orbits: Sequence[Orbit]) -> list[int]:
 
 
 def _alike(a: Orbit, b: Orbit) -> bool:
-    if a.status is not b.status or a.n != b.n or {a.p, a.q} != {b.p, b.q}:
+    if a.status is not b.status or a.counts.family != b.counts.family:
         return False
     if not (len(a.extremes) and len(b.extremes)):
         return True

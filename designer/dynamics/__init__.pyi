@@ -27,6 +27,12 @@ from .continued_orbit import (
     functions as functions,
     valleys as valleys,
 )
+from .counts import (
+    MAX_PERIOD as MAX_PERIOD,
+    Counts as Counts,
+    Pairs as Pairs,
+    read_counts as read_counts,
+)
 from .flow import (
     MAX_EVENTS as MAX_EVENTS,
     Flow as Flow,
@@ -61,9 +67,9 @@ from .modal_tables import (
 )
 from .orbit import (
     ANSWERS as ANSWERS,
-    MAX_PERIOD as MAX_PERIOD,
     SYMMETRY_TOLERANCE as SYMMETRY_TOLERANCE,
     Complex as Complex,
+    Motion as Motion,
     Orbit as Orbit,
     OrbitStatus as OrbitStatus,
     failed as failed,

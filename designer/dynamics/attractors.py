@@ -18,6 +18,7 @@ from scipy.stats import qmc
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics import step_budget
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow, FlowResult, FlowStatus
 from designer.dynamics.kernel_orbit import (
     CHAOS,
@@ -26,7 +27,7 @@ from designer.dynamics.kernel_orbit import (
     STROBE_TOLERANCE as STROBE_TOLERANCE,
     WORTH,
 )
-from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.step_budget import Budget
 
@@ -181,9 +182,9 @@ def describe(
     peak = np.abs(run.extremes).max(axis=1)
     drift = np.abs(run.strobes - np.tile(run.strobes[:n], (laps + 1, 1))[: laps * n + 1])
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
-    counts = run.counts.reshape(laps, n, -1, 2).sum(axis=(1, 2))
     # Entries at the very strobe may fall into one lap or the next: judge them together.
-    lower, upper = (round(c / laps) for c in counts.sum(axis=0))
+    met = run.counts.sum(axis=0) / laps
+    first, *more = [(round(upper), round(lower)) for lower, upper in met] or [(0, 0)]
     once = run.impacts.time < n * flow.drive.period
     status = OrbitStatus.PERIODIC
     floor = ENGINE_ERROR * peak[j]
@@ -198,14 +199,16 @@ def describe(
     return Orbit(
         status=status,
         n=n,
-        p=upper,
-        q=lower,
+        p=first[0],
+        q=first[1],
+        more=tuple(more),
         start=run.strobes[0],
         mode=flow.system.mode_at(x, flow.drive.offset, mode),
         extremes=run.extremes,
         impact_times=run.impacts.time[once],
         impact_velocities=run.impacts.state[once, j + 1] if len(peak) > j + 1 else np.zeros(0),
         impact_sides=run.impacts.side[once].astype(float),
+        impact_clearances=run.impacts.clearance[once],
         asymmetry=asymmetry(flow, x, n, peak),
         multipliers=multipliers,
         lyapunov=float(np.log(radius) / span) if radius > 0.0 else -np.inf,
@@ -276,7 +279,7 @@ def coexisting(flow: Flow, states: Iterable[Array]) -> list[Orbit]:
 
 def same(flow: Flow, a: Orbit, b: Orbit) -> bool:
     """Whether two orbits are one, up to the strobe they start at and the mirror."""
-    if a.status is not b.status or {(a.n, a.p, a.q), (a.n, a.q, a.p)}.isdisjoint({(b.n, b.p, b.q)}):
+    if a.status is not b.status or a.counts.family != b.counts.family:
         return False
     if a.status is not OrbitStatus.PERIODIC:
         return True

@@ -8,11 +8,10 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Index
+from designer.dynamics.counts import Counts, Pairs
 
 Complex = NDArray[np.complex128]
-MAX_PERIOD = 16
-"""Largest n of an n-p-q response, in drive periods (docs/definitions.md)."""
 SYMMETRY_TOLERANCE = 1e-3
 """Of the peak: below it an orbit counts as symmetric."""
 
@@ -35,8 +34,28 @@ ANSWERS = frozenset(
 """Statuses that answer the question where no response was wanted."""
 
 
+class Motion:
+    """What a steady motion is called: a base of the records that say how one was found."""
+
+    status: OrbitStatus
+    n: int
+    p: int
+    q: int
+    more: Pairs
+
+    @property
+    def counts(self) -> Counts:
+        """n, and the impacts on the stops of every clearance; n = 0 where there is no period."""
+        return Counts(self.n, ((self.p, self.q), *self.more))
+
+    @property
+    def response(self) -> str:
+        """ "n-p-q" of a periodic motion, otherwise its status."""
+        return str(self.counts if self.status is OrbitStatus.PERIODIC else self.status)
+
+
 @dataclass(frozen=True)
-class Orbit:
+class Orbit(Motion):
     """A steady response."""
 
     status: OrbitStatus
@@ -44,9 +63,9 @@ class Orbit:
     n: int = 0
     """Least period in drive periods; 0 unless periodic, grazing or clipped."""
     p: int = 0
-    """Impacts on the upper stop in n drive periods."""
+    """Impacts on the first clearance's upper stop in n drive periods."""
     q: int = 0
-    """Impacts on the lower stop in n drive periods."""
+    """Impacts on the first clearance's lower stop in n drive periods."""
     start: Array = field(default_factory=lambda: np.zeros(0))
     """(states,) state at a strobe of the orbit."""
     mode: tuple[int, ...] = ()
@@ -59,6 +78,8 @@ class Orbit:
     """(k,) velocity of the moving state at entry into contact."""
     impact_sides: Array = field(default_factory=lambda: np.zeros(0))
     """(k,) side of each impact: 1 upper, -1 lower."""
+    impact_clearances: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(k,) index of the clearance of each impact."""
     asymmetry: float = float("nan")
     """Max |x(t + nT/2) + x(t)| over the peak of each state, worst state (n odd; else nan)."""
     multipliers: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
@@ -73,6 +94,8 @@ class Orbit:
     """Why, where the status is failed, not settled or diverged."""
     periods: int = 0
     """Drive periods that the search cost."""
+    more: Pairs = ()
+    """Impacts on the upper and the lower stop of each further clearance in n drive periods."""
 
     @property
     def symmetric(self) -> bool | None:
@@ -82,13 +105,6 @@ class Orbit:
         if self.n % 2 == 0:
             return False
         return bool(self.asymmetry < SYMMETRY_TOLERANCE) if np.isfinite(self.asymmetry) else None
-
-    @property
-    def response(self) -> str:
-        """ "n-p-q" of a periodic orbit, otherwise its status."""
-        if self.status is OrbitStatus.PERIODIC:
-            return f"{self.n}-{self.p}-{self.q}"
-        return str(self.status)
 
     @property
     def radius(self) -> float:

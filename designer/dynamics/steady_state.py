@@ -18,10 +18,11 @@ from designer.base.arrays import Array
 from designer.base.threads import interrupt
 from designer.dynamics import attractors, kernel_orbit, kernel_sweep as kernel
 from designer.dynamics.attractors import lyapunov, peaks_near, settle
+from designer.dynamics.counts import MAX_PERIOD, Pairs
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.dynamics.kernel_modal import ModalTables, Watch
 from designer.dynamics.kernel_orbit import CHAOS, WORTH
-from designer.dynamics.orbit import MAX_PERIOD, SYMMETRY_TOLERANCE, OrbitStatus
+from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Motion, OrbitStatus
 
 SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
@@ -56,7 +57,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Steady:
+class Steady(Motion):
     """What a start leads to."""
 
     status: OrbitStatus
@@ -65,9 +66,9 @@ class Steady:
     n: int
     """Least period in drive periods; 0 unless periodic."""
     p: int
-    """Impacts on the upper stop in n drive periods; 0 unless periodic."""
+    """Impacts on the first clearance's upper stop in n drive periods; 0 unless periodic."""
     q: int
-    """Impacts on the lower stop in n drive periods; 0 unless periodic."""
+    """Impacts on the first clearance's lower stop in n drive periods; 0 unless periodic."""
     symmetric: bool | None
     """Whether the motion is its own mirror image; None unless periodic."""
     lyapunov: float
@@ -84,13 +85,8 @@ class Steady:
     """(k,) first velocity where contact with the upper stop begins, in those periods."""
     periods: int
     """Drive periods that were run in all."""
-
-    @property
-    def response(self) -> str:
-        """ "n-p-q" of a periodic motion, otherwise its status."""
-        if self.status is OrbitStatus.PERIODIC:
-            return f"{self.n}-{self.p}-{self.q}"
-        return str(self.status)
+    more: Pairs = ()
+    """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +138,7 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
         velocities += [float(v) for v in run.impacts.state[upper, j + 1]] if upper.any() else []
     end = strobes[-1]
     n = p = q = 0
+    more: Pairs = ()
     symmetric, radius, start = None, float("nan"), end
     growth = exponent * flow.drive.period
     if course.tangents >= kernel.SPAN and growth > CHAOS and not _repeats(flow, strobes):
@@ -152,7 +149,8 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
             orbit = replace(orbit, status=OrbitStatus.PERIODIC)
         status, spent = orbit.status, spent + orbit.periods
         if status is OrbitStatus.PERIODIC:
-            n, p, q, symmetric, radius = orbit.n, orbit.p, orbit.q, orbit.symmetric, orbit.radius
+            n, p, q, more = orbit.n, orbit.p, orbit.q, orbit.more
+            symmetric, radius = orbit.symmetric, orbit.radius
         if np.isfinite(orbit.lyapunov):
             exponent = orbit.lyapunov
         start = orbit.start if len(orbit.start) else end
@@ -169,6 +167,7 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
         np.array(minima),
         np.array(velocities),
         spent,
+        more,
     )
 
 

@@ -106,7 +106,7 @@ def compare(
         for a in some
     )
     periodic = {of: o.status is OrbitStatus.PERIODIC for of, (o, _) in against.items()}
-    impacts = {of: periodic[of] and o.p + o.q > 0 for of, (o, _) in against.items()}
+    impacts = {of: periodic[of] and o.counts.total > 0 for of, (o, _) in against.items()}
     return rows, Truth(label, last.response, sure, error, velocity, periodic, impacts)
 
 
@@ -135,7 +135,7 @@ def alike(first: Orbit, second: Orbit) -> bool:
     """Whether two orbits are the same n-p-q, either twin; both without a period are alike too."""
     if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
         return first.status is second.status and first.status is OrbitStatus.APERIODIC
-    return first.n == second.n and sorted((first.p, first.q)) == sorted((second.p, second.q))
+    return first.counts.family == second.counts.family
 
 
 def _numerical(answer: RungAnswer, some: Sequence[RungAnswer]) -> float:

@@ -24,9 +24,10 @@ from designer.circuit import nominal
 from designer.circuit.ensemble import displacement
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
-from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.fidelity import runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds

@@ -155,9 +155,7 @@ def _find_one(model: Dimensionless, spec: Response, b: float) -> ModelResponse:
 def _with_twin(flow: Flow, orbit: Orbit, spec: Response) -> list[Orbit]:
     """The orbit, and its mirror twin first where that is the one named by ``expect``."""
     expect = spec.expect
-    if expect is None or (orbit.n, orbit.p, orbit.q) != (expect.n, expect.q, expect.p):
-        return [orbit]
-    if expect.p == expect.q:
+    if expect is None or orbit.counts == expect or orbit.counts != expect.mirrored:
         return [orbit]
     other = twin(flow, orbit)
     return [orbit] if other is None else [other, orbit]

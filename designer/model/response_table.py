@@ -3,53 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, NoReturn
 
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, shown, span
+from designer.dynamics.counts import MAX_PERIOD, Counts, read_counts
 from designer.dynamics.orbit import Orbit
 from designer.model.model import Mechanical
 from designer.model.si_units import FREQUENCIES, angular_frequency
 
 Twin = Literal["either", "exact"]
-
-MAX_PERIODS = 16
-"""Largest n of an n-p-q response (docs/definitions.md)."""
-
-_EXPECT = re.compile(r"([1-9]\d?)-(0|[1-9]\d{0,3})-(0|[1-9]\d{0,3})", re.ASCII)
-
-
-@dataclass(frozen=True)
-class Expect:
-    """An n-p-q response."""
-
-    n: int
-    """Least period, in forcing periods."""
-    p: int
-    """Impacts at the upper stop in n forcing periods."""
-    q: int
-    """Impacts at the lower stop in n forcing periods."""
-
-    def __str__(self) -> str:
-        return f"{self.n}-{self.p}-{self.q}"
-
-    @classmethod
-    def parse(cls, text: str) -> Expect:
-        """Read "1-2-2"; ValueError unless n is 1 to 16 and p and q are integers >= 0."""
-        match = _EXPECT.fullmatch(text)
-        if not match or int(match[1]) > MAX_PERIODS:
-            raise ValueError(f"not n-p-q with n from 1 to {MAX_PERIODS}")
-        return cls(int(match[1]), int(match[2]), int(match[3]))
-
-    def accepts(self, n: int, p: int, q: int, twin_exact: bool = False) -> bool:
-        """Whether n-p-q is this response, or its mirror twin n-q-p unless ``twin_exact``."""
-        if (n, p, q) == (self.n, self.p, self.q):
-            return True
-        return not twin_exact and (n, p, q) == (self.n, self.q, self.p)
-
 
 _OMEGA = 'a number > 0, or "best"'
 _FREQUENCY = ("omega", "Omega", "frequency")
@@ -81,13 +46,13 @@ def _frequency() -> Accepts:
 
 
 def _expect() -> Accepts:
-    def check(value: object) -> Expect:
+    def check(value: object) -> Counts:
         try:
-            return Expect.parse(str(value))
+            return Counts.parse(str(value))
         except ValueError:
             raise ValueError from None
 
-    return Accepts(f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIODS} and p, q >= 0', check)
+    return Accepts(f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIOD} and p, q >= 0', check)
 
 
 def _clearance() -> Accepts:
@@ -102,7 +67,7 @@ class Response(FileTable):
 
     omega: Annotated[float | None, _omega()]
     """Dimensionless frequency; None for "best": the tool chooses it."""
-    expect: Annotated[Expect | None, _expect()] = None
+    expect: Annotated[Counts | None, _expect()] = None
     """The wanted n-p-q, or None where any is of interest."""
     twin: Annotated[Twin, choice("either", "exact")] = "either"
     """"either" accepts the mirror twin of ``expect`` as well; "exact" does not."""
@@ -116,26 +81,27 @@ class Response(FileTable):
         """The same; where no n-p-q is expected, the nominal orbit's or its twin is wanted."""
         if self.expect is not None:
             return self
-        return replace(self, expect=Expect(nominal.n, nominal.p, nominal.q))
+        return replace(self, expect=nominal.counts)
 
-    def accepts(self, n: int, p: int, q: int) -> bool:
-        """Whether n-p-q is what is expected here; without an expectation, anything is."""
-        return self.expect is None or self.expect.accepts(n, p, q, self.twin == "exact")
+    def accepts(self, counts: Counts) -> bool:
+        """Whether these, or those of the mirror twin unless ``twin`` is "exact", are expected here;
+        without an expectation, any are."""
+        if self.expect is None or counts == self.expect:
+            return True
+        return self.twin != "exact" and counts.mirrored == self.expect
 
     def accepts_text(self, response: str, *, symmetric: bool) -> bool:
         """Whether a response in words, "1-2-2" or a status, survives as this one."""
-        try:
-            shown = Expect.parse(response)
-        except ValueError:
-            return False
-        return self.accepts(shown.n, shown.p, shown.q) and (symmetric or not self.symmetric)
+        counts = read_counts(response)
+        accepted = counts is not None and self.accepts(counts)
+        return accepted and (symmetric or not self.symmetric)
 
     def difference(self, orbit: Orbit) -> str:
         """Why a periodic orbit does not survive as this response; "" where it does.
 
         Boards are never exactly symmetric: ``symmetric = false`` refuses no orbit.
         """
-        if not self.accepts(orbit.n, orbit.p, orbit.q):
+        if not self.accepts(orbit.counts):
             return f"to {orbit.response}"
         if self.symmetric and not orbit.symmetric:
             return f"asymmetric by {orbit.asymmetry:.2g} of the peak"

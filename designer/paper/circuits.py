@@ -178,7 +178,7 @@ def follow(one: Built, wanted: Sequence[ModelResponse]) -> tuple[SettledResponse
         shown = np.zeros(0)
         if orbit.status is OrbitStatus.PERIODIC:
             shown = displacement(flow, orbit) / one.volts[0]
-        kept = orbit.status is OrbitStatus.PERIODIC and r.spec.accepts(orbit.n, orbit.p, orbit.q)
+        kept = orbit.status is OrbitStatus.PERIODIC and r.spec.accepts(orbit.counts)
         assert r.expected is not None
         out.append(SettledResponse(r.omega, r.expected, orbit, kept, error_of(r, shown)))
     return tuple(out)

@@ -14,6 +14,7 @@ import numpy as np
 
 from designer.bifurcations import sweep
 from designer.bifurcations.windows import BranchWindow
+from designer.dynamics.counts import read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.model import Dimensionless
 from designer.model.swept_model import ModelSubject
@@ -120,7 +121,5 @@ def strays(windows: Sequence[BranchWindow], mains: Sequence[tuple[int, BranchWin
 
 def equal(name: str) -> int | None:
     """q of "1-q-q", or None."""
-    parts = name.split("-")
-    if len(parts) != 3 or parts[0] != "1" or parts[1] != parts[2]:
-        return None
-    return int(parts[1])
+    counts = read_counts(name)
+    return counts.p if counts and counts.n == 1 and counts == counts.mirrored else None

@@ -17,6 +17,7 @@ from designer.bifurcations.branch_survey import Survey
 from designer.bifurcations.doubling_cascade import Cascade, cascade
 from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import BranchWindow
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit
 from designer.paper.response_order import Gap, equal, faults, strays
 
@@ -207,12 +208,12 @@ def _chattering(
     survey: Survey, windows: Sequence[BranchWindow], chatter: Sequence[tuple[float, Orbit]]
 ) -> Statement:
     shown = ", ".join(f"{orbit.response} at {w:g}" for w, orbit in chatter)
-    most = max((w for w in windows if w.symmetric), key=lambda w: int(w.response.split("-")[1]))
+    most = max((w for w in windows if w.symmetric), key=lambda w: Counts.parse(w.response).p)
     down_to = min(p.value for branch in survey.branches for p in branch.points)
     lowest, orbit = chatter[-1]
     speeds = np.abs(orbit.impact_velocities[orbit.impact_sides > 0.0])
     dying = _dying(speeds)
-    grows = orbit.p >= int(most.response.split("-")[1])
+    grows = orbit.p >= Counts.parse(most.response).p
     return Statement(
         "Sec. 4: as ω falls further p grows until the impacts become chattering",
         f"The most impacts of a symmetric response on the branches followed, for ω ≥ {down_to:g}, "

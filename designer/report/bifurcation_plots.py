@@ -20,6 +20,7 @@ from designer.bifurcations.points import Bifurcation
 from designer.bifurcations.subject import Subject
 from designer.bifurcations.sweep import DOWN, UP, Sweep, SweepPlan, Window
 from designer.bifurcations.titles import NAMES, title
+from designer.dynamics.counts import Counts, read_counts
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Steady
 from designer.report.si_axes import si_x, si_y
@@ -171,9 +172,10 @@ def basins(result: Basins, name: str = "") -> Figure:
         if a.twin is not None and a.twin < a.number:
             text += f", twin of {result.attractors[a.twin].response}"
         handles.append(_patch(colour, text, a.share))
-        if a.response.count("-") != 2:
+        counts = read_counts(a.response)
+        if counts is None:
             continue
-        strobes = flow.run(np.array(a.strobe), int(a.response.split("-")[0])).strobes[:-1]
+        strobes = flow.run(np.array(a.strobe), counts.n).strobes[:-1]
         axes.plot(*strobes[:, column].T, ls="", marker="o", ms=6, mfc=colour, mec="white", mew=1.2)
     axes.set_xlim(plan.xs[0], plan.xs[-1])
     axes.set_ylim(plan.ys[0], plan.ys[-1])
@@ -241,13 +243,12 @@ def _coloured(sweep: Sweep) -> list[Coloured]:
 
 def _family(step: Steady) -> str:
     """The response up to its mirror image."""
-    p, q = sorted((step.p, step.q))
-    return f"{step.n}-{p}-{q}" if step.status is OrbitStatus.PERIODIC else step.response
+    return str(step.counts.family) if step.status is OrbitStatus.PERIODIC else step.response
 
 
 def _twins(plan: SweepPlan, value: float, a: Steady, b: Steady) -> bool:
     """Whether b is the mirror image of a: one of a's strobes half a period on, reflected."""
-    alike = a.status is OrbitStatus.PERIODIC and (a.n, a.p, a.q) == (b.n, b.q, b.p)
+    alike = a.status is OrbitStatus.PERIODIC and a.counts == b.counts.mirrored
     if not alike or a.symmetric or b.symmetric:
         return False
     flow = plan.subject.settings([{plan.parameter: value}])[0].flow()
@@ -298,7 +299,7 @@ def _strip(axes: Axes, windows: Sequence[Window], values: Array, name: str) -> N
             top = 1.0 if window.track in (DOWN, UP) else 0.3
             ends = (window.low - half, window.high + half)
             axes.axvspan(*ends, ymax=top, color=CHAOS, lw=0, zorder=1.5)
-    named = [w for w in windows if w.response.count("-") == 2]
+    named = [w for w in windows if read_counts(w.response)]
     last = -np.inf
     for window in sorted(named, key=lambda w: w.low):
         low, high = window.low - half, window.high + half
@@ -342,7 +343,7 @@ def _palette(cells: Sequence[MapCell], counts: Mapping[str, int]) -> dict[str, s
     """Colour by response: the most frequent ones, then one for all others."""
     periodic = {c.response for c in cells if c.status is OrbitStatus.PERIODIC}
     named = [r for r in counts if r in periodic][:NAMED]
-    named.sort(key=lambda r: [int(k) for k in r.split("-")])
+    named.sort(key=Counts.parse)
     looks = dict(zip(named, OTHERS, strict=False))
     for response in counts:
         if response in periodic:

@@ -220,8 +220,7 @@ def _show(
     kept = matches(orbit, response.spec)
     if response.expected is None:
         own = response.orbit
-        counts = (orbit.status, orbit.n, {orbit.p, orbit.q})
-        kept = counts == (own.status, own.n, {own.p, own.q})
+        kept = (orbit.status, orbit.counts.family) == (own.status, own.counts.family)
     return Shown(response.omega, response.expected, orbit, kept)
 
 

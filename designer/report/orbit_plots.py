@@ -215,7 +215,7 @@ def _look(name: str, orbit: Orbit) -> dict[str, Any]:
     periodic = orbit.status is OrbitStatus.PERIODIC
     if name == "ngspice":
         return {"ls": "", "marker": "o", "ms": 3.0, "mew": 0, "color": NGSPICE_COLOUR, "zorder": 4}
-    dense = orbit.p + orbit.q > 6 * max(orbit.n, 1) or orbit.n > 2
+    dense = orbit.counts.total > 6 * max(orbit.n, 1) or orbit.n > 2
     broad = 2.6 if dense else 4.0
     width = {"model": broad, "circuit": 0.9} if periodic else {"model": 1.0, "circuit": 0.4}
     style: dict[str, Any] = {"lw": width[name], "solid_capstyle": "round"}

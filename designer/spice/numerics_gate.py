@@ -25,8 +25,9 @@ from designer.base.reason import Reason
 from designer.circuit.netlist import Board, Circuit, Excitation
 from designer.circuit.noise_gains import stages
 from designer.circuit.reduction import Reduction
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice import convergence_aids as remedies, deck, settling_periods
 from designer.spice.convergence_aids import AidedRun, Remedy, Task

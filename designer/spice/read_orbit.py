@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.counts import MAX_PERIOD
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice.simulator import Waveforms
 
 STROBE_TOLERANCE = 2e-3
@@ -131,6 +132,7 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         impact_times=np.array(times)[order],
         impact_velocities=np.array(velocities)[order],
         impact_sides=np.array(sides, dtype=float)[order],
+        impact_clearances=np.zeros(len(sides), dtype=np.int64),
         asymmetry=_asymmetry(t, y, marks[-1], n, reading.period, peak),
         penetration=float(depth),
         miss=float(miss),

@@ -18,8 +18,9 @@ from typing import TypeVar
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow, FlowStatus
-from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.spice import convergence_aids as remedies, numerics_gate
 from designer.spice.convergence_aids import RunQueue, Task
 from designer.spice.deck import SolverSettings

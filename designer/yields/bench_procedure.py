@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.model.tuning_bands import Bands
@@ -168,7 +169,7 @@ class _Person:
         if any(count % shown for count in pulses):
             return False
         p, q = (count // shown for count in pulses)
-        return self.question.wanted.accepts(n, p, q)
+        return self.question.wanted.accepts(Counts(n, ((p, q),)))
 
     def _pulses(self, trace: Array, side: int) -> int:
         """How often v1 goes far enough beyond a stop to be seen on fv; the trace is a loop."""

@@ -182,21 +182,21 @@ def _brackets(case: BoardCase, bands: Bands) -> list[tuple[Try, Try]]:
     impacts there, or both too few; one stop of which that holds is enough, two are better."""
     expect = case.question.wanted.expect
     assert expect is not None
-    n, p, q = expect.n, expect.p, expect.q
     counted = [t for t in case.tries if t.orbit.n]
     pairs = []
-    for wanted in {(p, q), (q, p)}:
+    for wanted in {expect, expect.mirrored}:
         off = [
-            (t.orbit.p / t.orbit.n - wanted[0] / n, t.orbit.q / t.orbit.n - wanted[1] / n)
+            [a - b for a, b in zip(t.orbit.counts.rates, wanted.rates, strict=True)]
             for t in counted
         ]
         # The right counts over the wrong period are wrong too.
         cost = [
-            abs(a) + abs(b) + 0.5 * (t.orbit.n != n) for (a, b), t in zip(off, counted, strict=True)
+            sum(map(abs, row)) + 0.5 * (t.orbit.n != wanted.n)
+            for row, t in zip(off, counted, strict=True)
         ]
         for i, j in combinations(range(len(counted)), 2):
             outside = sum(a * b > 0.0 for a, b in zip(off[i], off[j], strict=True))
-            if outside == 2 or off[i] == off[j]:
+            if outside == len(off[i]) or off[i] == off[j]:
                 continue
             i, j = (i, j) if cost[i] <= cost[j] else (j, i)
             apart = _distance(counted[i].setting, counted[j].setting, bands)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from designer.base.errors import InputError
@@ -236,6 +237,20 @@ def test_damaged_blocks_are_computed_again(tmp_path: Path) -> None:
     assert parameter_map.run(mapped, store=grid) == made
     assert notes[2:] == [f"{path}: damaged, computed again"]
     assert path.read_bytes() == before
+
+
+def test_further_clearances_are_kept(tmp_path: Path) -> None:
+    """In a column of their own, which files of systems with one clearance do not have."""
+    (one,) = sweep.run(_plan(0.9, 0.9, 1, "down", course=QUICK)).steps["down"]
+    both = replace(one, more=((1, 0), (0, 3)))
+    store = SweepStore(tmp_path, "omega", "w", {})
+    for block, steps in enumerate(([one, both], [one])):
+        store.write("down", block, [0.9] * len(steps), steps)
+        found = store.read("down", block)
+        assert found is not None
+        assert [(s.counts, s.response) for s in found] == [(s.counts, s.response) for s in steps]
+        names = pq.read_schema(tmp_path / SweepStore.name("down", block)).names
+        assert ("more" in names) == (block == 0)
 
 
 def test_map_by_settling(tmp_path: Path) -> None:

@@ -28,9 +28,10 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.model.model import Dimensionless
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.spread.spread import Spread
 from designer.verdicts.verdict import Question, StudyPlan, Verdict
 from designer.yields.yield_count import Yield
@@ -119,7 +120,7 @@ def lightly_damped() -> tuple[StudyPlan, Question]:
     orbit = settle(Flow(reduction.system(), excitation.drive), np.zeros(4))
     assert orbit.response == "1-0-0"
     assert float(np.abs(orbit.multipliers).max()) == pytest.approx(0.990, abs=1e-3)
-    question = Question(Response(2.5, Expect(1, 0, 0)), excitation, orbit, None)
+    question = Question(Response(2.5, Counts(1, ((0, 0),))), excitation, orbit, None)
     return StudyPlan(circuit, Spread(1e-3, 1e-3, 1e-5, 4e-5), 11, FEW, (question,)), question
 
 

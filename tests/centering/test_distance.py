@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from scipy.stats import norm
 
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.distance import LADDER, STREAM, Counts, Stretched
+from designer.centering.distance import LADDER, STREAM, StretchCounts, Stretched
 from designer.centering.windows import OperatingPoint
 from designer.circuit.ensemble import Ensemble
 from designer.dynamics.attractors import STAGES
@@ -22,10 +22,10 @@ PATIENCE = sum(STAGES[:3])
 """Drive periods after which the compiled way gives up."""
 
 
-def counts(distance: float, boards: int = 10**7) -> Counts:
+def counts(distance: float, boards: int = 10**7) -> StretchCounts:
     """What so many boards show where the law holds."""
     shown = [round(boards * float(norm.cdf(distance / s))) for s in LADDER]
-    return Counts(LADDER, (boards,) * len(LADDER), tuple(shown))
+    return StretchCounts(LADDER, (boards,) * len(LADDER), tuple(shown))
 
 
 @given(st.floats(-3.0, 4.5))
@@ -38,12 +38,12 @@ def test_more_boards_that_show_it_are_never_nearer(shown: list[int], rung: int, 
     better = list(shown)
     better[rung] = min(better[rung] + more, 40)
     asked = (40,) * 4
-    near = Counts(LADDER, asked, tuple(shown)).distance
-    assert Counts(LADDER, asked, tuple(better)).distance >= near - 1e-3
+    near = StretchCounts(LADDER, asked, tuple(shown)).distance
+    assert StretchCounts(LADDER, asked, tuple(better)).distance >= near - 1e-3
 
 
 def test_without_a_loss_it_is_finite() -> None:
-    found = Counts(LADDER, (64,) * 4, (64,) * 4)
+    found = StretchCounts(LADDER, (64,) * 4, (64,) * 4)
     # All but half a board at the largest stretch: the law's own answer for that yield.
     assert 4.0 < found.distance < 12.0
     assert found.predicted > 0.9999

@@ -8,11 +8,12 @@ import pytest
 from designer.centering.distance import LADDER, Stretched
 from designer.centering.operating_points import MANY, best_points, room_of, score
 from designer.centering.windows import OperatingPoint, stretches
-from designer.model.response_table import Expect, Response
+from designer.dynamics.counts import Counts
+from designer.model.response_table import Response
 from designer.model.search_table import SearchSpec
 from tests.shared.search_cases import made, spread
 
-SPEC = Response(None, Expect(1, 3, 3), b=(0.25, 0.265))
+SPEC = Response(None, Counts(1, ((3, 3),)), b=(0.25, 0.265))
 BAND = SearchSpec(omega=(0.49, 0.58))
 
 
@@ -43,7 +44,7 @@ def test_the_place_is_as_good_as_a_dense_grid_s_best() -> None:
 
 def test_what_is_fixed_stays_fixed() -> None:
     model = made().modelfile.model
-    spec = Response(0.85, Expect(1, 2, 2), b=(0.25, 0.27))
+    spec = Response(0.85, Counts(1, ((2, 2),)), b=(0.25, 0.27))
     bench = Stretched(made().design, spread(), 3, MANY)
     (seen,) = stretches(model, [spec], SearchSpec(omega=(0.7, 1.0)))
     ranked, _ = best_points(bench, spec, seen, room_of(spec, model.b, (0.7, 1.0)))

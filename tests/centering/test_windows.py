@@ -10,13 +10,14 @@ import pytest
 from designer.base.errors import InputError
 from designer.bifurcations import windows
 from designer.centering.windows import STEP, check, clearances, stretches
+from designer.dynamics.counts import Counts
 from designer.model import find_responses, swept_model
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.model.search_table import SearchSpec
 from tests.shared.search_cases import file
 
 MODEL = file('omega = 0.85\nexpect = "1-2-2"').model
-WANTED = Response(None, Expect(1, 2, 2))
+WANTED = Response(None, Counts(1, ((2, 2),)))
 BAND = SearchSpec(omega=(0.7, 1.0))
 
 
@@ -45,7 +46,7 @@ def test_every_place_shows_the_response() -> None:
 
 
 def test_a_fixed_place_is_one_place() -> None:
-    (found,) = stretches(MODEL, [Response(0.85, Expect(1, 2, 2))], BAND)
+    (found,) = stretches(MODEL, [Response(0.85, Counts(1, ((2, 2),)))], BAND)
     (one,) = found
     assert (one.low, one.high, one.b) == (0.85, 0.85, 0.25)
 
@@ -62,7 +63,7 @@ def test_clearances_are_close_together() -> None:
     [
         (Response(None), "response[1].expect", "window"),
         (Response(0.85, None, b=(0.2, 0.3)), "response[1].expect", "range"),
-        (Response(None, Expect(1, 2, 2), b=(0.3, 0.3)), "response[1].b", "low < high"),
+        (Response(None, Counts(1, ((2, 2),)), b=(0.3, 0.3)), "response[1].b", "low < high"),
     ],
 )
 def test_what_cannot_be_sought_is_refused(spec: Response, field: str, word: str) -> None:

@@ -24,13 +24,14 @@ from designer.circuit.netlist import Excitation
 from designer.cli import entry, tables
 from designer.dynamics import attractors
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.jobs.study_stage import satisfied
 from designer.model.find_responses import ModelResponse
 from designer.model.model import Dimensionless
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.report import words as report_words
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult
@@ -199,7 +200,7 @@ def test_a_yield_is_no_better_than_the_nominal_response() -> None:
 def _checked(k0: float, gate: GateResult | None = None) -> checked_design.CheckedResponse:
     """A response whose circuit's flow is the model's, against a stop of this stiffness."""
     flow, orbit = found(k0)
-    response = ModelResponse(Response(0.9, Expect(1, 1, 0)), 0.5, orbit, (), True)
+    response = ModelResponse(Response(0.9, Counts(1, ((1, 0),))), 0.5, orbit, (), True)
     return checked_design.CheckedResponse(response, orbit, Excitation(200.0, 4.0), gate, flow=flow)
 
 

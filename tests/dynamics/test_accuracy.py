@@ -14,8 +14,9 @@ import pytest
 from benchmarks.references import Problem, Truth, truth
 from designer.base.arrays import Array
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow, FlowStatus
-from designer.dynamics.orbit import MAX_PERIOD, OrbitStatus
+from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
 from tests.shared.oracles import Plain, integrate

@@ -23,12 +23,13 @@ from designer.dynamics.attractors import (
     starts,
     twin,
 )
+from designer.dynamics.counts import MAX_PERIOD, Counts
 from designer.dynamics.flow import Flow
-from designer.dynamics.orbit import MAX_PERIOD, Orbit, OrbitStatus
+from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.find_responses import find
 from designer.model.model import Dimensionless
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from tests.shared.oracles import Plain, integrate, response_amplitude
 
 REST = np.zeros(4)
@@ -267,7 +268,7 @@ def test_mirrored_strobes_of_a_period_three_orbit() -> None:
 def test_an_exact_twin_is_found_whichever_of_the_two_is_met_first() -> None:
     omega = 0.6789473684210526
     model = Dimensionless(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25)
-    for expect in (Expect(4, 8, 12), Expect(4, 12, 8)):
+    for expect in (Counts(4, ((8, 12),)), Counts(4, ((12, 8),))):
         (got,) = find(model, [Response(omega=omega, expect=expect, twin="exact")])
         assert got.found
         assert got.orbit.response == str(expect)

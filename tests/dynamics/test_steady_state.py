@@ -19,9 +19,10 @@ from designer.dynamics import (
     modal_tables,
     steady_state,
 )
+from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow
 from designer.dynamics.kernel_modal import CHANGE, WIDTH
-from designer.dynamics.orbit import MAX_PERIOD, OrbitStatus
+from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import Course, DrivenSystem, Steady, by_flow
 from designer.model.model import Dimensionless

@@ -17,10 +17,11 @@ from hypothesis import given, strategies as st
 
 from designer.base.errors import MISSING, InputError
 from designer.base.schema import FileTable, keys_of
+from designer.dynamics.counts import Counts
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
-from designer.model.response_table import Expect, Response, ResponseTable
+from designer.model.response_table import Response, ResponseTable
 from designer.model.search_table import SearchSpec
 from designer.model.spread_table import SpreadSpec
 from designer.model.template import TEXT
@@ -165,8 +166,8 @@ def test_everything_that_a_response_may_say() -> None:
         "[[response]]\nomega = 0.5\nb = [0.2, 0.3]\n"
     )
     assert parse_model_file(text).responses == (
-        Response(None, Expect(2, 4, 4)),
-        Response(1.0, Expect(1, 1, 2), "exact", False, 0.3),
+        Response(None, Counts(2, ((4, 4),))),
+        Response(1.0, Counts(1, ((1, 2),)), "exact", False, 0.3),
         Response(0.5, None, "either", None, (0.2, 0.3)),
     )
 
@@ -238,31 +239,20 @@ def test_what_was_read_does_not_change() -> None:
 # n-p-q.
 
 
-@given(st.integers(1, 16), st.integers(0, 9999), st.integers(0, 9999))
-def test_expect_round_trips(n: int, p: int, q: int) -> None:
-    expect = Expect(n, p, q)
-    assert Expect.parse(str(expect)) == expect
-    assert expect.accepts(n, p, q)
-    assert expect.accepts(n, q, p)
-    assert expect.accepts(n, q, p, twin_exact=True) == (p == q)
-    assert not expect.accepts(n + 1, p, q)
-    assert not expect.accepts(n, p + 1, q)
+def test_a_response_accepts_its_twin_unless_it_is_to_be_exact() -> None:
+    one, other = Counts.parse("1-2-1;0-1"), Counts.parse("1-1-2;1-0")
+    assert Response(1.0).accepts(one)
+    assert Response(1.0, one).accepts(one)
+    assert Response(1.0, one).accepts(other)
+    assert Response(1.0, one, twin="exact").accepts(one)
+    assert not Response(1.0, one, twin="exact").accepts(other)
+    assert not Response(1.0, one).accepts(Counts.parse("1-1-2;0-1"))
+    assert not Response(1.0, one).accepts(Counts.parse("1-2-1"))
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["", "1-1", "1-1-1-1", "0-1-1", "17-1-1", "1--1", "-1-1-1", "1-1-1 ", "1.0-1-1", "01-1-1",
-     "1-01-1", "a-b-c", "1-1-10000", "١-1-1", "1-1-1\n"],
-)  # fmt: skip
-def test_expect_refuses(text: str) -> None:
-    with pytest.raises(ValueError, match="n-p-q"):
-        Expect.parse(text)
-
-
-def test_a_response_without_expectation_accepts_anything() -> None:
-    assert Response(1.0).accepts(3, 5, 7)
-    assert Response(1.0, Expect(1, 2, 1)).accepts(1, 1, 2)
-    assert not Response(1.0, Expect(1, 2, 1), twin="exact").accepts(1, 1, 2)
+def test_a_response_of_two_clearances_is_read() -> None:
+    text = PAPER.replace('expect = "1-2-2"', 'expect = "1-2-2;0-1"')
+    assert Counts(1, ((2, 2), (0, 1))) in [r.expect for r in parse_model_file(text).responses]
 
 
 # What is wrong, one thing at a time: (old, new, field, found, part of what was expected).

@@ -16,9 +16,10 @@ from designer.base import figure_style
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import Trace
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.model.find_responses import ModelResponse
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.report import orbit_plots, study_plots
 from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateResult
@@ -50,7 +51,7 @@ def _orbit(n: int = 1, p: int = 1, q: int = 1) -> Orbit:
 def _checked(
     model: Orbit | None = None, circuit: Orbit | None = None, gate: GateResult | None = None
 ) -> CheckedResponse:
-    spec = Response(1.0, Expect(1, 1, 1))
+    spec = Response(1.0, Counts(1, ((1, 1),)))
     response = ModelResponse(spec, 0.25, model or _orbit(), (), True)
     return CheckedResponse(response, circuit or _orbit(), Excitation(200.0, 4.0), gate)
 

@@ -16,12 +16,12 @@ from designer.base.page import Table
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
 from designer.check.synthesis_result import synthesise
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
 from designer.model.ascii_sketch import sketch
 from designer.model.mechanics import Sides
 from designer.model.model_file import parse_model_file
-from designer.model.response_table import Expect
 from designer.report.data import ReportData
 from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
@@ -113,7 +113,7 @@ def _broken(data: ReportData) -> ReportData:
     assert first.gate is not None
     read = SimulationFailed("timestep too small <at> 1 ms")
     first = replace(first, gate=replace(first.gate, read=read, passed=False))
-    spec = replace(second.model.spec, expect=Expect(3, 4, 5))
+    spec = replace(second.model.spec, expect=Counts(3, ((4, 5),)))
     second = replace(second, model=replace(second.model, spec=spec, found=False))
     third = replace(third, circuit=Orbit(OrbitStatus.APERIODIC, start=third.circuit.start))
     plan = replace(data.plan, questions=data.plan.questions[:1])

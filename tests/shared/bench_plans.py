@@ -10,7 +10,8 @@ import numpy as np
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Board
-from designer.model.response_table import Expect, Response
+from designer.dynamics.counts import Counts
+from designer.model.response_table import Response
 from designer.spread.spread import Spread
 from designer.verdicts import exact_rung
 from designer.verdicts.verdict import Answer, Question, StudyPlan
@@ -23,7 +24,7 @@ SPREAD = Spread(0.01, 0.01, 1e-3, 4e-3)
 def question(p: int) -> Question:
     """The 1-p-p response of the nominal circuit."""
     known = subject(p)
-    spec = Response(OMEGA[p], Expect(1, p, p))
+    spec = Response(OMEGA[p], Counts(1, ((p, p),)))
     return Question(spec, known.excitation, known.orbit, None)
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from designer.circuit.netlist import Excitation
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.verdicts.cross_check import (
     BOUNDARY_SAMPLES,
     NOMINAL_SAMPLES,
@@ -36,7 +37,7 @@ NOMINAL = Orbit(
 
 
 def question(expect: str | None = "1-2-2", nominal: Orbit = NOMINAL, **more: object) -> Question:
-    wanted = None if expect is None else Expect.parse(expect)
+    wanted = None if expect is None else Counts.parse(expect)
     spec = Response(1.0, wanted, **more)  # type: ignore[arg-type]
     return Question(spec, Excitation(300.0, 2.0), nominal, None)
 

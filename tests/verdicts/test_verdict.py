@@ -13,11 +13,12 @@ from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.model import Dimensionless
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.spread.spread import Spread
 from designer.verdicts.verdict import BLOCK, Question, StudyPlan, Verdict, judge
 from tests.circuit.test_coefficients import exact_for_paper
@@ -31,7 +32,7 @@ def periodic(n: int, p: int, q: int, asymmetry: float = 0.0) -> Orbit:
 
 
 def wanted(text: str | None, **more: object) -> Response:
-    expect = None if text is None else Expect.parse(text)
+    expect = None if text is None else Counts.parse(text)
     return Response(omega=1.0, expect=expect, **more)  # type: ignore[arg-type]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from designer.circuit.reduction import Reduction
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
-from designer.model.response_table import Expect
 from designer.model.tuning_bands import Bands
 from designer.yields import bench_procedure
 from designer.yields.adjustment import AS_BUILT, Adjustment
@@ -35,7 +35,7 @@ def test_the_state_where_the_person_stops_is_the_board_s() -> None:
 
 def test_another_number_of_pulses_is_not_taken_for_the_wanted_one() -> None:
     asked = question(4)
-    other = replace(asked, spec=replace(asked.spec, expect=Expect(1, 3, 3)))
+    other = replace(asked, spec=replace(asked.spec, expect=Counts(1, ((3, 3),))))
     bands = Bands(0.0, 0.0, 0.0)
     found = find_on_bench(subject(4).system, other, bands, seed=SEED)
     assert not found.seen
@@ -45,7 +45,7 @@ def test_another_number_of_pulses_is_not_taken_for_the_wanted_one() -> None:
 def test_a_multiple_of_the_period_is_not_taken_for_the_wanted_one() -> None:
     """1-1-1 shows two pulses a side in two periods, but repeats after one."""
     asked = question(1)
-    other = replace(asked, spec=replace(asked.spec, expect=Expect(2, 2, 2)))
+    other = replace(asked, spec=replace(asked.spec, expect=Counts(2, ((2, 2),))))
     found = find_on_bench(subject(1).system, other, Bands(0.0, 0.0, 0.0), seed=SEED)
     assert not found.seen
 
@@ -70,7 +70,7 @@ def test_a_constant_force_is_found_and_cancelled(ratio: float) -> None:
 
 def test_the_procedure_ends_and_stays_inside_the_bands(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = question(1)
-    never = replace(asked, spec=replace(asked.spec, expect=Expect(1, 7, 7)))
+    never = replace(asked, spec=replace(asked.spec, expect=Counts(1, ((7, 7),))))
     visited = []
     look = bench_procedure._Person.look
 

@@ -16,9 +16,10 @@ from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.continued_orbit import Function, follow, functions
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
 from designer.model.distributions import Uniform
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.spread.board_quantities import Quantity, between, column, quantities, with_column
 from designer.spread.spread import Group, Spread, draw_many
 from designer.verdicts.exact_rung import block
@@ -40,7 +41,7 @@ SPREADS = {"offsets": OFFSETS, "tiny": replace(NO_SPREAD, resistor=1e-5)}
 @cache
 def plan(p: int, spread: str, samples: int = 24) -> StudyPlan:
     subject = paper_cases.subject(p)
-    spec = Response(omega=paper_cases.OMEGA[p], expect=Expect(1, p, p))
+    spec = Response(omega=paper_cases.OMEGA[p], expect=Counts(1, ((p, p),)))
     question = Question(spec, subject.excitation, subject.orbit, None)
     return StudyPlan(subject.reduction.circuit, SPREADS[spread], 5, samples, (question,))
 
@@ -415,7 +416,7 @@ def test_where_every_board_is_lost_whatever_is_exact_few_are_replayed() -> None:
     """Boards without any spread to speak of do what the nominal one does: not what is asked."""
     study = plan(1, "tiny", PROBE + 4)
     asked = replace(
-        study.questions[0], spec=replace(study.questions[0].spec, expect=Expect(1, 5, 5))
+        study.questions[0], spec=replace(study.questions[0].spec, expect=Counts(1, ((5, 5),)))
     )
     study = replace(study, questions=(asked,))
     rows = block(study, range(study.samples), 2)

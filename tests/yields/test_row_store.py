@@ -16,8 +16,9 @@ import pytest
 
 from designer.base.errors import InputError
 from designer.circuit.netlist import Capacitor, Circuit, Excitation, Generator, Resistor, Section
+from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.spice.deck import SolverSettings
 from designer.spread.spread import Spread
 from designer.verdicts.verdict import BLOCK, Answer, BoardRow, Question, StudyPlan, Verdict
@@ -45,7 +46,7 @@ def plan() -> StudyPlan:
         saturation=13.0,
     )
     question = Question(
-        Response(0.85, Expect(1, 2, 2)),
+        Response(0.85, Counts(1, ((2, 2),))),
         Excitation(300.0, 2.0),
         Orbit(OrbitStatus.PERIODIC, n=1, p=2, q=2, start=np.array([0.25])),
         SolverSettings("trap", 1e-5),

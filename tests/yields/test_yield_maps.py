@@ -15,8 +15,9 @@ from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import coexisting, settle, starts
+from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow
-from designer.model.response_table import Expect, Response
+from designer.model.response_table import Response
 from designer.report.map_plots import map_chart, map_files
 from designer.spread.spread import Spread, draw
 from designer.verdicts.verdict import Question, StudyPlan, Verdict, judge
@@ -30,7 +31,7 @@ B = 0.25
 @cache
 def plan(p: int = 2) -> StudyPlan:
     subject = paper_cases.subject(p)
-    spec = Response(omega=paper_cases.OMEGA[p], expect=Expect(1, p, p))
+    spec = Response(omega=paper_cases.OMEGA[p], expect=Counts(1, ((p, p),)))
     question = Question(spec, subject.excitation, subject.orbit, None)
     spread = Spread(0.01, 0.01, 1e-3, 4e-3)
     return StudyPlan(subject.reduction.circuit, spread, 3, 10, (question,))
@@ -135,7 +136,7 @@ def asymmetric() -> StudyPlan:
         Flow(subject.system, excitation.drive), starts(3.0 * np.abs(subject.orbit.start), 32)
     )
     orbit = next(o for o in met if o.response == "1-1-1" and not o.symmetric)
-    spec = Response(omega=1.43, expect=Expect(1, 1, 1), symmetric=False)
+    spec = Response(omega=1.43, expect=Counts(1, ((1, 1),)), symmetric=False)
     return replace(study, questions=(Question(spec, excitation, orbit, None),))
 
 

@@ -1,0 +1,48 @@
+"""n-p-q as text and back, and what mirrors do to it."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, strategies as st
+
+from designer.dynamics.counts import Counts, read_counts
+
+PAIRS = st.lists(st.tuples(st.integers(0, 9999), st.integers(0, 9999)), min_size=1, max_size=4)
+
+
+@given(st.integers(1, 16), PAIRS)
+def test_text_and_back(n: int, pairs: list[tuple[int, int]]) -> None:
+    counts = Counts(n, tuple(pairs))
+    assert Counts.parse(str(counts)) == counts
+    assert read_counts(str(counts)) == counts
+    assert counts.family == counts.mirrored.family
+    assert counts.mirrored.mirrored == counts
+
+
+def test_what_is_written() -> None:
+    counts = Counts(1, ((2, 3), (0, 1)))
+    assert str(counts) == "1-2-3;0-1"
+    assert str(counts.mirrored) == "1-3-2;1-0"
+    assert str(counts.doubled) == "2-4-6;0-2"
+    assert (counts.p, counts.q, counts.total) == (2, 3, 6)
+    assert Counts(2, ((2, 3), (0, 1))).rates == (1.0, 1.5, 0.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "1-1", "1-1-1-1", "0-1-1", "17-1-1", "1--1", "-1-1-1", "1-1-1 ", "1.0-1-1", "01-1-1",
+     "1-01-1", "a-b-c", "1-1-10000", "\u0661-1-1", "1-1-1\n", "1-1-1;", "1-1-1;1", "1-1-1;1-1-1",
+     "1-1-1; 1-1", "1-1-1;01-1"],
+)  # fmt: skip
+def test_what_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="n-p-q"):
+        Counts.parse(text)
+
+
+@pytest.mark.parametrize("text", ["aperiodic", "not settled", "17-1-1x"])
+def test_a_status_has_no_counts(text: str) -> None:
+    assert read_counts(text) is None
+
+
+def test_long_periods_and_many_impacts_are_read_from_a_response() -> None:
+    assert read_counts("32-20000-0") == Counts(32, ((20000, 0),))
