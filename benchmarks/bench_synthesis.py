@@ -154,7 +154,7 @@ def whole(series: str, index: int) -> Whole:
     spec = CircuitSpec(
         resistors=SERIES[series], capacitors=("E12",), frequency=BAND, side_conditions=False
     )
-    file = ModelFile("benchmark", target(index), None, (Response(omega=1.0),), spec, "")
+    file = ModelFile("benchmark", target(index), None, None, (Response(omega=1.0),), spec, "")
     before = time.process_time()
     try:
         made = designer.synthesise(file).design

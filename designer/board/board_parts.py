@@ -90,7 +90,7 @@ def board_choice(
     The trim reaches as far as the DC offset that a bench may set at the largest amplitude of the
     wanted responses (``[tuning]``, ``offset``), and at least ``LEAST_TRIM`` of that amplitude.
     """
-    amplitude = max((design.amplitude(r.b) for r in responses), default=design.amplitude())
+    amplitude = max((design.amplitude(r.b, r.omega) for r in responses), default=design.amplitude())
     reach = amplitude * max(modelfile.tuning.offset, LEAST_TRIM)
     return replace(BoardChoice.of(modelfile.circuit, modelfile.board), trim=reach)
 

@@ -83,7 +83,7 @@ def branches(
         now = catalog.opamp(spec.opamp)
         names += [o.name for o in better_opamps(now, spec.supply, catalog)]
     zones: list[str | None] = [None]
-    if DEAD_ZONE not in without and base.modelfile.model.k0 > 0.0:
+    if DEAD_ZONE not in without and base.modelfile.model.second_order().clearances:
         zones.append("rectifier" if spec.dead_zone == "saturation" else "saturation")
     for zone in zones:
         for name in names:

@@ -203,7 +203,7 @@ def with_parts_kept(
         binding={},
     )
     kept = modelfile.circuit.kept
-    amplitudes = [design.amplitude(r.b) for r in found] or [design.amplitude()]
+    amplitudes = [design.amplitude(r.b, r.omega) for r in found] or [design.amplitude()]
     needed = None
     if found and kept & {"swing", "load"}:
         loading = found if loaded is None else [found[number] for number in loaded]

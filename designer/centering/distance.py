@@ -174,7 +174,7 @@ class Stretched:
     def excitation(self, place: OperatingPoint) -> Excitation:
         """The generator's setting for a place."""
         frequency = self.design.errors.scales.frequency(place.omega)
-        return Excitation(frequency, self.design.amplitude(place.b))
+        return Excitation(frequency, self.design.amplitude(place.b, place.omega))
 
     def nominal(self, stand: Stand) -> GateSubject:
         """The nominal board at a place, for ngspice."""

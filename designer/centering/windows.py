@@ -20,7 +20,7 @@ from designer.bifurcations.sweep import DOWN, UP, SweepPlan
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course, Steady
 from designer.model import find_responses
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 from designer.model.response_table import Response
 from designer.model.search_table import SearchSpec
 from designer.model.swept_model import ModelSubject
@@ -101,7 +101,7 @@ def check(wanted: Sequence[Response]) -> None:
 
 
 def stretches(
-    model: Dimensionless,
+    model: MechanicalModel,
     wanted: Sequence[Response],
     spec: SearchSpec,
     *,
@@ -122,7 +122,7 @@ def stretches(
 
     def at(b: float) -> list[tuple[Steady, ...]]:
         if b not in swept:
-            subject = ModelSubject(replace(model, b=b))
+            subject = ModelSubject(model.at(b))
             plan = SweepPlan(subject, "omega", omegas, tracks=(DOWN, UP), course=COURSE)
             found = sweep.run(plan, jobs)
             swept[b] = [found.steps[DOWN], found.steps[UP]]
@@ -144,7 +144,7 @@ def stretches(
     return tuple(out)
 
 
-def clearances(model: Dimensionless, response: Response) -> list[float]:
+def clearances(model: MechanicalModel, response: Response) -> list[float]:
     """The clearances at which a response is looked for, ascending."""
     if not isinstance(response.b, tuple):
         return [model.b if response.b is None else response.b]
@@ -186,7 +186,7 @@ def _runs(
     return out
 
 
-def _single(model: Dimensionless, response: Response, omega: float, b: float) -> list[Stretch]:
+def _single(model: MechanicalModel, response: Response, omega: float, b: float) -> list[Stretch]:
     found = find_responses.find(model, [replace(response, omega=omega, b=b)])[0]
     return [Stretch((OperatingPoint(omega, b, found.orbit.start),))] if found.found else []
 

@@ -16,9 +16,9 @@ from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import (
     Trace,
     circuit_flow,
-    model_flow,
     nominal_reduction,
     reached,
+    response_flow,
     trace_of,
 )
 from designer.dynamics.flow import Flow
@@ -52,7 +52,7 @@ class CheckedResponse:
         """Of the model's answer. Measured when somebody asks: it takes as long as the check."""
         if self.design is None:
             return Trust()
-        return trust.of_orbit(model_flow(self.design, self.model), self.model.orbit)
+        return trust.of_orbit(response_flow(self.design, self.model), self.model.orbit)
 
     @cached_property
     def circuit_trust(self) -> Trust:
@@ -110,7 +110,8 @@ def check(
     reduction = nominal_reduction(design)
     system = reduction.system()
     settings = [
-        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in found
+        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b, r.omega))
+        for r in found
     ]
     progress("exact circuit")
     flows = [circuit_flow(system, design, r) for r in found]
@@ -133,7 +134,9 @@ def traces(design: Design, checked: CheckedResponse) -> dict[str, Trace]:
     out: dict[str, Trace] = {}
     b = checked.model.b
     volts, seconds = design.volts(b), design.errors.scales.seconds
-    out["model"] = trace_of(model_flow(design, checked.model), checked.model.orbit, np.ones(4), 1.0)
+    out["model"] = trace_of(
+        response_flow(design, checked.model), checked.model.orbit, np.ones(len(volts)), 1.0
+    )
     circuit = circuit_flow(nominal_reduction(design).system(), design, checked.model)
     out["circuit"] = trace_of(circuit, checked.circuit, volts, seconds)
     for trace in () if checked.gate is None else spice_trace(checked.gate, volts, seconds):

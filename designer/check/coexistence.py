@@ -22,14 +22,13 @@ from designer.dynamics import step_budget
 from designer.dynamics.attractors import mirrored_strobes, same, settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
-from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.step_budget import Budget
+from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse, scale_of
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel, state_names
 from designer.spread import random_streams
 
 MOST_STARTS = 100_000
-STATES = ("x1", "x1'", "x2", "x2'")
 NEAR = 1e-6
 """Of the peak: strobes of one orbit, from different starts, lie nearer than this."""
 ALIKE = 1e-3
@@ -74,7 +73,7 @@ class Coexistence:
             "asked": self.asked,
             "seed": self.seed,
             "phase": 0.0,
-            "box": dict(zip(STATES, self.box.tolist(), strict=True)),
+            "box": dict(zip(state_names(len(self.box) // 2), self.box.tolist(), strict=True)),
             "attractors": [
                 {
                     "response": b.orbit.response,
@@ -102,27 +101,27 @@ def check(starts: int) -> None:
 
 def drawn(box: Array, count: int, seed: int) -> Array:
     """(count, states) initial states, even in the box ± ``box`` (states,)."""
-    names = [f"start {name}" for name in STATES]
+    names = [f"start {name}" for name in state_names(len(box) // 2)]
     return np.asarray(box * (2.0 * random_streams.cube(seed, names, range(count)) - 1.0))
 
 
 @lru_cache(maxsize=64)
 def of_model(
-    model: Dimensionless, omega: float, starts: int = DRAWN_STARTS, seed: int = SEED
+    model: MechanicalModel, omega: float, starts: int = DRAWN_STARTS, seed: int = SEED
 ) -> Coexistence:
     """Of the model under a drive of frequency ``omega``, by the exact flow; largest share first."""
-    flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
+    flow = model_flow(model, omega)
     met = of_flow(flow, scale_of(model, omega), starts, seed)
     return replace(met, basins=tuple(sorted(met.basins, key=lambda b: -b.count)))
 
 
-def beside(model: Dimensionless, response: ModelResponse) -> tuple[Basin, ...]:
+def beside(model: MechanicalModel, response: ModelResponse) -> tuple[Basin, ...]:
     """What coexists with a response of the model, by ``DRAWN_STARTS`` starts: the largest share
     first, then what was met on the way to it alone.
 
     model : with the clearance of the response.
     """
-    flow = Flow(model.second_order().piecewise_linear(), Drive(response.omega))
+    flow = model_flow(model, response.omega)
     met = of_model(model, response.omega).basins
     rest = [
         Basin(o, 0, None)

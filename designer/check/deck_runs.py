@@ -77,7 +77,7 @@ def _responses(made: Synthesis) -> tuple[ModelResponse, ...]:
 
 def _excitation(made: Synthesis, response: ModelResponse) -> Excitation:
     frequency = made.design.errors.scales.frequency(response.omega)
-    return Excitation(frequency, made.design.amplitude(response.b))
+    return Excitation(frequency, made.design.amplitude(response.b, response.omega))
 
 
 def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:

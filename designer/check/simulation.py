@@ -31,17 +31,16 @@ from designer.dynamics.attractors import coexisting, settle, starts as sobol_sta
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
-from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.step_budget import Budget
+from designer.model.driven import model_flow
 from designer.model.find_responses import (
     STARTS,
     ModelResponse,
-    check_omega,
     find,
     matches,
     scale_of,
 )
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel, check_omega
 from designer.model.model_file import ModelFile, naming, need_responses
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit
@@ -138,14 +137,14 @@ def simulate(
             None, "--rung", rung, "ideal, or --engine ngspice: other engines have none"
         )
     for omega in omegas:
-        check_omega("--omega", omega)
+        check_omega("--omega", omega, modelfile.model)
     if not omegas and not modelfile.responses:
         need_responses(modelfile, " (or --omega)")
     specs = [Response(float(w)) for w in omegas] or list(modelfile.responses)
     file = str(modelfile.source) if modelfile.source else None
     for number, spec in enumerate(specs, start=1):
         if spec.omega is not None:
-            check_omega(f"response[{number}].omega", spec.omega, file)
+            check_omega(f"response[{number}].omega", spec.omega, modelfile.model, file)
     if engine != "ngspice":
         one = partial(_on_model, modelfile, traces, drawn)
         if engine == "circuit":
@@ -212,8 +211,8 @@ def _on_model(
 ) -> Simulated:
     with naming(modelfile):
         (r,) = find(modelfile.model, [spec])
-    model = replace(modelfile.model, b=r.b)
-    flow = Flow(model.second_order().piecewise_linear(), Drive(r.omega))
+    model = modelfile.model.at(r.b)
+    flow = model_flow(model, r.omega)
     known = _attractors((r.orbit, *r.others))
     met = coexistence.of_flow(flow, scale_of(model, r.omega), *drawn, known)
     others = (*_attractors(r.others), *(b.orbit for b in met.basins[len(known) :]))
@@ -230,7 +229,7 @@ def _on_model(
         r.b,
         _sides(model),
         _exact_settings(flow, orbits[0], 1.0),
-        _traces(flow, (orbits[0], twins[0]), np.ones(4), 1.0) if traces else (),
+        _traces(flow, (orbits[0], twins[0]), np.ones(flow.system.size), 1.0) if traces else (),
         trust.of_orbit(flow, orbits[0]),
         met,
     )
@@ -241,11 +240,10 @@ def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
     return [o for o in orbits if o.status in ANSWERS]
 
 
-def _sides(model: Dimensionless) -> tuple[int, ...]:
-    """The stops that exist: 1 upper, -1 lower."""
-    if model.k0 == 0.0:
-        return ()
-    return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[model.sides]
+def _sides(model: MechanicalModel) -> tuple[int, ...]:
+    """The stops of the first clearance: 1 upper, -1 lower."""
+    stops = model.second_order().clearances
+    return stops[0].positions if stops else ()
 
 
 def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
@@ -296,7 +294,7 @@ def _circuit_orbits(
     flow = circuit_flow(nominal.nominal_reduction(made.design).system(), made.design, r)
     volts = made.design.volts(r.b)
     if scan:
-        model = replace(made.modelfile.model, b=r.b)
+        model = made.modelfile.model.at(r.b)
         return r, flow, coexisting(flow, sobol_starts(scale_of(model, r.omega) * volts, STARTS))
     orbits = [settle(flow, o.start * volts) for o in (r.orbit, *r.others) if len(o.start)]
     return r, flow, orbits or [settle(flow, np.zeros(flow.system.size))]
@@ -311,7 +309,7 @@ def _on_circuit(
     shown = [dimensionless(o, volts, seconds) for o in measured]
     kept = [i for i in _distinct(shown) if i == 0 or shown[i].status in ANSWERS]
     known = _attractors([measured[i] for i in kept])
-    box = scale_of(replace(made.modelfile.model, b=r.b), r.omega)
+    box = scale_of(made.modelfile.model.at(r.b), r.omega)
     met = coexistence.of_flow(flow, box, *drawn, known, volts)
     more = [_measured(flow, b.orbit) for b in met.basins[len(known) :]]
     kept += range(len(measured), len(measured) + len(more))
@@ -352,7 +350,7 @@ def _in_ngspice(
     for spec in specs:
         r, _, orbits = _circuit_orbits(made, spec, scan)
         frequency = made.design.errors.scales.frequency(r.omega)
-        excitation = Excitation(frequency, made.design.amplitude(r.b))
+        excitation = Excitation(frequency, made.design.amplitude(r.b, r.omega))
         started = [o for o in orbits if len(o.start)]
         subjects += [
             numerics_gate.GateSubject(reduction, excitation, o, rung=rung) for o in started

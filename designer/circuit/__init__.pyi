@@ -22,7 +22,6 @@ from .dead_zone_parts import (
     OUTPUT as OUTPUT,
     DeadZoneStage as DeadZoneStage,
     Kind as Kind,
-    Sides as Sides,
     dead_zone_stage as dead_zone_stage,
     idle_limits as idle_limits,
 )
@@ -65,10 +64,10 @@ from .noise_gains import (
 from .nominal import (
     Trace as Trace,
     circuit_flow as circuit_flow,
-    model_flow as model_flow,
     nominal_reduction as nominal_reduction,
     on_circuit as on_circuit,
     reached as reached,
+    response_flow as response_flow,
     trace_of as trace_of,
 )
 from .packing import (

@@ -16,7 +16,7 @@ from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part
 from designer.circuit.packing import packed
 from designer.circuit.resistors import Composite, Resistors
 from designer.circuit.terms import Term, inverted_states, terms as input_terms
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 
 GENERATOR = Generator("VM1", "vg")
 
@@ -34,7 +34,7 @@ SATURATING = DeadZoneStage()
 
 
 def circuit_of(
-    model: Dimensionless,
+    model: MechanicalModel,
     values: Mapping[str, float],
     opamp: OpAmp,
     *,
@@ -52,7 +52,7 @@ def circuit_of(
         opamp,
         supply=supply,
         saturation=saturation,
-        clearance="A" if model.k0 > 0.0 else None,
+        clearance=system.clearances[0].name if system.clearances else None,
         stage=stage,
         composites=composites,
     )

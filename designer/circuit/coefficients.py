@@ -98,7 +98,7 @@ def coefficient_errors(
     }
     if dead_zone is not None:
         stop = model.clearances[0]
-        stiffness = -stop.stiffness / model.mass[stop.mass]
+        stiffness = -stop.first.stiffness / model.mass[stop.mass]
         pairs |= {name: (1, 0, slope, stiffness) for name, slope in dead_zone.slopes.items()}
     # The error is ln realised + ln seconds + ln volts_j - ln volts_i - ln wanted.
     h, D = np.zeros(len(pairs)), np.zeros((len(pairs), 1 + n))
@@ -120,8 +120,8 @@ def coefficient_errors(
     thresholds: dict[int, float] = {}
     if dead_zone is not None:
         thresholds = dead_zone.thresholds
-        amplitude = next(iter(thresholds.values())) / model.clearances[0].gap
-        mu = model.clearances[0].stiffness / -wanted[1, 0] / model.mass[0]
+        amplitude = next(iter(thresholds.values())) / model.clearances[0].first.gap
+        mu = model.clearances[0].first.stiffness / -wanted[1, 0] / model.mass[0]
         errors["dead-zone null"] = float(mu * dead_zone.null)
         if len(thresholds) == 1:
             errors["dead-zone bias"] = dead_zone.bias

@@ -28,10 +28,9 @@ from designer.circuit.netlist import (
 )
 from designer.circuit.resistors import Resistors
 from designer.model.circuit_table import CircuitSpec
-from designer.model.model import Dimensionless
+from designer.model.mechanics import POSITIONS, MechanicalModel, Sides
 
 Kind = Literal["saturation", "rectifier"]
-Sides = Literal["both", "upper", "lower"]
 
 OUTPUT = "fv"
 """Net of the stage's output."""
@@ -55,7 +54,7 @@ class DeadZoneStage:
     @property
     def positions(self) -> tuple[int, ...]:
         """1 for the upper stop, -1 for the lower."""
-        return {"both": (1, -1), "upper": (1,), "lower": (-1,)}[self.sides]
+        return POSITIONS[self.sides]
 
     def parts(self, clearance: str, resistors: Resistors) -> tuple[list[Part], Stop]:
         """The stage's parts, and how the clearance of this name shows in them.
@@ -68,17 +67,19 @@ class DeadZoneStage:
         return make(self, clearance, resistors)
 
 
-def dead_zone_stage(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:
+def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:
     """The stage that a model file asks for.
 
     Raises
     ------
     InputError : the catalogue has no such diode or reference.
     """
+    stops = model.second_order().clearances
+    sides = stops[0].which if stops else "both"
     if spec.dead_zone == "saturation":
-        return DeadZoneStage(spec.dead_zone, model.sides)
+        return DeadZoneStage(spec.dead_zone, sides)
     diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
-    return DeadZoneStage(spec.dead_zone, model.sides, diode, reference)
+    return DeadZoneStage(spec.dead_zone, sides, diode, reference)
 
 
 def _saturation(

@@ -14,7 +14,7 @@ from designer.circuit.coefficients import CoefficientErrors
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite, composites_of
 from designer.model.find_responses import ModelResponse
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +73,7 @@ class ConditionCheck:
 class Design:
     """A finished choice of parts."""
 
-    model: Dimensionless
+    model: MechanicalModel
     """The wanted model."""
     circuit: Circuit
     """The circuit that was chosen."""
@@ -104,11 +104,14 @@ class Design:
         resistors, capacitors = self.circuit.resistors, self.circuit.capacitors
         return len({r.value for r in resistors}) + len({c.value for c in capacitors})
 
-    def amplitude(self, b: float | None = None) -> float:
-        """Generator amplitude [V peak] that makes the clearance ``b`` (default: the model's)."""
-        wanted = np.array([1.0 - self.model.f20, self.model.f20])
+    def amplitude(self, b: float | None = None, omega: float | None = None) -> float:
+        """Generator amplitude [V peak] that makes the clearance ``b`` (default: the model's) at the
+        drive frequency ``omega``, which only the force of a moving ground depends on (default: the
+        model's own frequency)."""
+        system = self.model.second_order()
+        wanted = system.drive_force(system.own_frequency if omega is None else omega)
         gain = self.errors.drive_gain
-        driven = gain > 0.0
+        driven = gain != 0.0
         volts = float(np.exp(np.mean(np.log(wanted[driven] / gain[driven]))))
         return volts * (1.0 if b is None else self.model.b / b)
 
@@ -129,7 +132,7 @@ class Design:
         return table_html("Parts", self._parts(), note)
 
     def volts(self, b: float | None = None) -> Array:
-        """(4,) volts per unit of each model state at clearance ``b``."""
+        """(states,) volts per unit of each model state at clearance ``b``."""
         return self.errors.scales.volts * (1.0 if b is None else self.model.b / b)
 
 
@@ -153,6 +156,8 @@ def settings(design: Design, responses: Sequence[ModelResponse]) -> tuple[Genera
     """The generator's settings, in the order of the responses."""
     scales = design.errors.scales
     return tuple(
-        GeneratorSetting(r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b))
+        GeneratorSetting(
+            r.omega, r.expected, scales.frequency(r.omega), design.amplitude(r.b, r.omega)
+        )
         for r in responses
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
+from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse
 
 
@@ -30,7 +31,9 @@ def reached(flow: Flow, design: Design, response: ModelResponse) -> Orbit:
 def circuit_flow(system: PiecewiseLinearSystem, design: Design, response: ModelResponse) -> Flow:
     """The flow of a reduced board under the generator's setting for this response."""
     frequency = design.errors.scales.frequency(response.omega)
-    return Flow(system, Drive(2.0 * np.pi * frequency, -design.amplitude(response.b)))
+    return Flow(
+        system, Drive(2.0 * np.pi * frequency, -design.amplitude(response.b, response.omega))
+    )
 
 
 TRACE_POINTS = 1024
@@ -48,7 +51,7 @@ class Trace:
     time: Array
     """(k,) times."""
     states: Array
-    """(k, 4) states."""
+    """(k, states) states."""
 
 
 def nominal_reduction(design: Design) -> Reduction:
@@ -56,10 +59,9 @@ def nominal_reduction(design: Design) -> Reduction:
     return Reduction(design.circuit, nominal_board(design.circuit))
 
 
-def model_flow(design: Design, response: ModelResponse) -> Flow:
+def response_flow(design: Design, response: ModelResponse) -> Flow:
     """The flow of the model at a response."""
-    model = replace(design.model, b=response.b)
-    return Flow(model.second_order().piecewise_linear(), Drive(response.omega))
+    return model_flow(design.model.at(response.b), response.omega)
 
 
 def trace_of(flow: Flow, orbit: Orbit, volts: Array, seconds: float) -> Trace:

@@ -26,6 +26,7 @@ from designer.catalog.entries import OpAmp
 from designer.circuit import build
 from designer.circuit.netlist import Circuit
 from designer.model.circuit_table import CircuitSpec
+from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless
 
 MODEL = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
@@ -81,15 +82,17 @@ class ComparedCircuit:
     """Generator's amplitude at the model's b [V peak]."""
 
 
-def is_the_papers(model: Dimensionless) -> bool:
+def is_the_papers(model: MechanicalModel) -> bool:
     """Whether the model is the paper's case, up to the rounding of a conversion from SI."""
+    if not isinstance(model, Dimensionless):
+        return False
     numbers = ("m", "k", "k0", "c", "zeta", "f20", "b")
     own, paper = ([getattr(one, name) for name in numbers] for one in (model, MODEL))
     return model.sides == MODEL.sides and np.allclose(own, paper, rtol=1e-9, atol=1e-12)
 
 
 def candidates(
-    model: Dimensionless, spec: CircuitSpec, catalog: Catalog
+    model: MechanicalModel, spec: CircuitSpec, catalog: Catalog
 ) -> tuple[ComparedCircuit, ...]:
     """What stands beside a design of this model: empty where the paper's circuit cannot follow it.
 
@@ -97,8 +100,8 @@ def candidates(
     the model file's series. Another model: the paper's way, exact and rounded. All with the paper's
     op-amp, rails and limit.
     """
-    if model.k0 > 0.0 and model.sides != "both":
-        return ()  # the paper's dead zone is two-sided
+    if not isinstance(model, Dimensionless) or (model.k0 > 0.0 and model.sides != "both"):
+        return ()  # the paper's way is for its two masses, its dead zone two-sided
     opamp = catalog.opamp(OPAMP)
     if is_the_papers(model):
         exact, name = corrected(), "paper, corrected"

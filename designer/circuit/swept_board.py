@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,9 +19,10 @@ from designer.circuit.nominal import nominal_reduction
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.dynamics.steady_state import DrivenSystem
-from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
+from designer.model.find_responses import scale_of
+from designer.model.mechanics import check_omega, frequency_range
+from designer.model.model import GREATEST, SMALLEST
 from designer.model.si_units import NO_UNITS
-from designer.model.swept_model import GREATEST, SMALLEST
 
 SETTINGS = {
     "frequency": (SMALLEST, GREATEST),
@@ -58,7 +58,7 @@ class BoardSubject:
         self.amplitude = design.amplitude() if amplitude is None else amplitude
         self.offset = offset
         self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
-        self.states = ("v1", "v2", "v3", "v4")
+        self.states = design.circuit.state_nets
         self.units: Mapping[str, str] = UNITS
 
     def check(self, option: str, name: str, value: float) -> None:
@@ -68,10 +68,11 @@ class BoardSubject:
         if not np.isfinite(value):
             raise InputError(None, option, value, "a finite number")
         if name == "omega":
-            check_omega(option, value)
+            check_omega(option, value, self.design.model)
         elif name == "frequency":
+            slowest, fastest = frequency_range(self.design.model)
             scales = self.design.errors.scales
-            least, most = scales.frequency(SLOWEST), scales.frequency(FASTEST)
+            least, most = scales.frequency(slowest), scales.frequency(fastest)
             if not least <= value <= most:
                 raise InputError(
                     None, option, value, f"a frequency from {least:.4g} to {most:.4g} Hz"
@@ -86,12 +87,12 @@ class BoardSubject:
 
     def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
         """(states,) size of the states that starts are drawn from: one for all changes."""
-        out = np.zeros(4)
+        out = np.zeros(len(self.states))
         for change in changes:
             e = self.excitation(change)
-            b = self.design.model.b * self.design.amplitude() / e.amplitude
             omega = 2.0 * np.pi * e.frequency * self.design.errors.scales.seconds
-            model = replace(self.design.model, b=b)
+            b = self.design.model.b * self.design.amplitude(omega=omega) / e.amplitude
+            model = self.design.model.at(b)
             out = np.maximum(out, scale_of(model, omega) * self.design.volts(b))
         return out
 

@@ -105,7 +105,8 @@ def stiffness(s: RuleSubject) -> Iterator[Finding]:
 
     The resistors are spread evenly within the grades at which they are bought.
     """
-    circuit, mu, grades = s.circuit, s.design.model.mu, s.resistor_grades
+    circuit, grades, system = s.circuit, s.resistor_grades, s.design.model.second_order()
+    mu = system.relative_stiffness(system.clearances[0])
     if not circuit.stops:
         return
     nominal = mu * leftover(circuit)

@@ -98,7 +98,7 @@ class RuleSubject:
     @cached_property
     def drive(self) -> float:
         """Smallest amplitude of the wanted responses [V]."""
-        wanted = [self.design.amplitude(r.b) for r in self.found]
+        wanted = [self.design.amplitude(r.b, r.omega) for r in self.found]
         return min(wanted, default=self.design.amplitude())
 
     @cached_property

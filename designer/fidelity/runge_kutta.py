@@ -39,9 +39,9 @@ class Rates:
         A = system.state_matrix()
         drive = system.force / system.mass
         stops = system.clearances
-        mu = stops[0].stiffness / system.mass[0] if stops else 0.0
+        mu = stops[0].first.stiffness / system.mass[0] if stops else 0.0
         positions = stops[0].positions if stops else ()
-        gap = stops[0].gap if stops else math.inf
+        gap = stops[0].first.gap if stops else math.inf
         return cls(
             np.concatenate([A[1], A[3], drive, [mu]]),
             -gap if -1 in positions else -math.inf,

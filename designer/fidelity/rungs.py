@@ -28,10 +28,11 @@ from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.dynamics.piecewise_linear import Drive
 from designer.fidelity import runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
+from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse
+from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless
 from designer.spice import numerics_gate as gate
 from designer.spice.deck import SolverSettings
@@ -103,7 +104,7 @@ class _Asked:
     """A response with what ngspice and the exact flow need of it."""
 
     response: ModelResponse
-    model: Dimensionless
+    model: MechanicalModel
     volts: Array
     subject: GateSubject
 
@@ -112,7 +113,7 @@ def subject(made: Synthesis, r: ModelResponse) -> GateSubject:
     """The nominal circuit of a design, on the orbit that this response has there."""
     reduction = nominal.nominal_reduction(made.design)
     scales = made.design.errors.scales
-    excitation = Excitation(scales.frequency(r.omega), made.design.amplitude(r.b))
+    excitation = Excitation(scales.frequency(r.omega), made.design.amplitude(r.b, r.omega))
     return GateSubject(reduction, excitation, on_circuit(reduction.system(), made.design, r))
 
 
@@ -130,7 +131,7 @@ def measured(
     pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
     """
     one = subject(made, r)
-    asked = _Asked(r, replace(made.design.model, b=r.b), made.design.volts(r.b), one)
+    asked = _Asked(r, made.design.model.at(r.b), made.design.volts(r.b), one)
     entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
     entrants = [entrant for _, entrant in entries]
     settings = None
@@ -150,9 +151,11 @@ def measured(
 def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
     """Runge-Kutta at its steps, and both exact flows."""
     r, model, omega = asked.response, asked.model, asked.response.omega
-    flow = Flow(model.second_order().piecewise_linear(), Drive(omega))
+    flow = model_flow(model, omega)
     start = r.orbit.start
     for step in STEPS:
+        if not isinstance(model, Dimensionless):
+            break  # the paper's way is written for its two masses
         steps = max(1, round(flow.drive.period / step / POINTS)) * POINTS
         answer = RungAnswer(
             RK4,

@@ -11,7 +11,8 @@ from designer.check import checked_design
 from designer.circuit.design import Design, settings
 from designer.dynamics.orbit import OrbitStatus
 from designer.model.find_responses import ModelResponse
-from designer.model.model import STATES, Mechanical
+from designer.model.mechanics import state_names
+from designer.model.model import SiScales
 from designer.model.model_file import ModelFile
 from designer.yields.start_recipe import Recipe, hertz, volts
 from designer.yields.start_recipe_search import find_recipes
@@ -42,16 +43,16 @@ def setup_csv(
     design: Design,
     responses: Sequence[ModelResponse],
     recipes: Sequence[Recipe | None],
-    mechanical: Mechanical | None = None,
+    si: SiScales | None = None,
 ) -> str:
     """``setup.csv``, in digits that a generator takes; ``design.json`` has all of them.
 
     recipes : how to start each response; None where the nominal circuit does not show it.
-    mechanical : adds what each frequency is in the mechanism, Hz, in a last column.
+    si : adds what each frequency is in the mechanism, Hz, in a last column.
     """
     known = settings(design, responses)
     omegas = [repr(s.omega) for s in known]
-    if mechanical is not None:  # there ω follows from Hz or rad/s, and all its digits say nothing
+    if si is not None:  # there ω follows from Hz or rad/s, and all its digits say nothing
         omegas = told_apart([s.omega for s in known], OMEGA_DIGITS)
     rows = [
         {
@@ -63,11 +64,11 @@ def setup_csv(
             "offset_v": repr(s.offset_v),
             "load": LOAD,
             "start": (NO_RECIPE if recipe is None else recipe.text) + _coexisting(r),
-            **({} if mechanical is None else {MECHANISM: hertz(mechanical.hertz(s.omega))}),
+            **({} if si is None else {MECHANISM: hertz(si.hertz(s.omega))}),
         }
         for s, omega, r, recipe in zip(known, omegas, responses, recipes, strict=True)
     ]
-    return csv_text(COLUMNS if mechanical is None else (*COLUMNS, MECHANISM), rows)
+    return csv_text(COLUMNS if si is None else (*COLUMNS, MECHANISM), rows)
 
 
 def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
@@ -102,8 +103,8 @@ def scales_csv(modelfile: ModelFile, design: Design, responses: Sequence[ModelRe
         ("model time per circuit second", 1.0 / scales.seconds, "1/s", b0),
         ("circuit seconds per unit of model time", scales.seconds, "s", b0),
     ]
-    if modelfile.mechanical is not None:
-        slow = modelfile.mechanical.time_scale / scales.seconds
+    if modelfile.si is not None:
+        slow = modelfile.si.time_scale / scales.seconds
         rows.append(("mechanism seconds per circuit second", slow, "s/s", b0))
     if design.circuit.stops:
         rows.append(("threshold of contact", scales.threshold, "V", b0))
@@ -122,19 +123,20 @@ def _amplitudes(
 ) -> list[tuple[str, float, str, float]]:
     volts = [float(v) for v in design.volts(b)]
     gain = (b / design.model.b) * sum(float(g) for g in design.errors.drive_gain)
-    rows = [(f"volts per unit of {s}", v, "V", b) for s, v in zip(STATES, volts, strict=True)]
-    mechanical = modelfile.mechanical
-    if mechanical is None:
+    states = state_names(len(volts) // 2)
+    rows = [(f"volts per unit of {s}", v, "V", b) for s, v in zip(states, volts, strict=True)]
+    si = modelfile.si
+    if si is None:
         rows += [
             (f"model units of {s} per volt", 1.0 / v, "1/V", b)
-            for s, v in zip(STATES, volts, strict=True)
+            for s, v in zip(states, volts, strict=True)
         ]
         return [*rows, ("model force per generator volt", gain, "1/V", b)]
-    length, speed = mechanical.length_scale, mechanical.speed_scale
-    for i, (s, v) in enumerate(zip(STATES, volts, strict=True)):
+    length, speed = si.length_scale, si.speed_scale
+    for i, (s, v) in enumerate(zip(states, volts, strict=True)):
         name = f"metres per volt of {s}" if i % 2 == 0 else f"metres per second per volt of {s}"
         rows.append((name, (speed if i % 2 else length) / v, "m/s/V" if i % 2 else "m/V", b))
-    return [*rows, ("newtons per generator volt", gain * mechanical.force_scale, "N/V", b)]
+    return [*rows, ("newtons per generator volt", gain * si.force_scale, "N/V", b)]
 
 
 def _coexisting(response: ModelResponse) -> str:

@@ -190,7 +190,7 @@ def _subject(
         if request.circuit:
             expected = "a design folder (designer synthesise)"
             raise InputError(modelfile.source, "--circuit", "a model file", expected)
-    return modelfile, ModelSubject(modelfile.model, mechanical=modelfile.mechanical)
+    return modelfile, ModelSubject(modelfile.model, scales=modelfile.si)
 
 
 class _Work:

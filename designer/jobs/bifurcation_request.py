@@ -18,7 +18,7 @@ from designer.bifurcations.parameter_map import MapPlan
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan
 from designer.circuit.swept_board import BoardSubject
 from designer.dynamics.steady_state import Course
-from designer.model.find_responses import check_omega
+from designer.model.mechanics import check_omega
 from designer.model.model_file import ModelFile
 from designer.model.si_units import Reader
 from designer.model.swept_model import ModelSubject
@@ -124,7 +124,7 @@ def _reader(subject: Swept, modelfile: ModelFile) -> Reader:
     units: dict[str, str] = {}
     if isinstance(subject, BoardSubject):
         units = {**subject.units, **dict.fromkeys(subject.states, "V")}
-    return Reader(modelfile.model, modelfile.mechanical, units)
+    return Reader(modelfile.model, modelfile.si, units)
 
 
 def _checked(
@@ -271,7 +271,7 @@ def _at_frequency(
     read = _reader(subject, modelfile)
     if not isinstance(subject, BoardSubject):
         omega = _omega(option, asked, read, modelfile)
-        return ModelSubject(subject.model, omega, mechanical=subject.mechanical)
+        return ModelSubject(subject.model, omega, scales=subject.scales)
     if isinstance(asked, str):
         hertz = read.value(option, "frequency", asked)
         subject.check(option, "frequency", hertz)
@@ -293,5 +293,5 @@ def _omega(option: str, asked: float | str | None, read: Reader, modelfile: Mode
         omega = read.frequency(option, asked)
     else:
         omega = read.value(option, "omega", asked)
-    check_omega(option, omega)
+    check_omega(option, omega, modelfile.model)
     return omega

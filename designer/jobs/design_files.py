@@ -51,7 +51,7 @@ def texts(made: Synthesis) -> dict[str, str]:
     return {
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(made),
-        SETUP: setup_csv(design, made.found, start_recipes(made, cores()), modelfile.mechanical),
+        SETUP: setup_csv(design, made.found, start_recipes(made, cores()), modelfile.si),
         "scales.csv": scales_csv(modelfile, design, made.found),
         **board_files.texts(made),
     }

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from designer.base.plain_json import FORMAT
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
+    from designer.base.arrays import Array
     from designer.check.simulation import Simulated
     from designer.circuit.design import Design
     from designer.dynamics.orbit import Orbit
     from designer.model.find_responses import ModelResponse
-    from designer.model.model import Mechanical
+    from designer.model.model import SiScales
     from designer.model.model_file import ModelFile
     from designer.spread.part_grades import BetterGrade
 
@@ -37,7 +38,6 @@ def synthesis_json(
     out where there are none.
     """
     from designer.circuit.design import settings
-    from designer.model.model import STATES
 
     errors, circuit = design.errors, design.circuit
     return {
@@ -59,14 +59,14 @@ def synthesis_json(
         "certificate": dict(design.certificate.__dict__),
         "scales": {
             "seconds": errors.scales.seconds,
-            "volts": dict(zip(STATES, errors.scales.volts, strict=True)),
+            "volts": _by_state(errors.scales.volts),
             "threshold": errors.scales.threshold,
         },
         "knobs": [
             {
                 "omega": s.omega,
                 "frequency_hz": s.frequency_hz,
-                **_mechanism(s.omega, modelfile.mechanical),
+                **_mechanism(s.omega, modelfile.si),
                 "amplitude_v_peak": s.amplitude_v_peak,
                 "offset_v": s.offset_v,
                 "expected": r.expected,
@@ -87,9 +87,9 @@ def _plain_grades(better: Mapping[str, BetterGrade]) -> dict[str, dict[str, floa
     return {name: {"asked": g.asked, "bought": g.bought} for name, g in better.items()}
 
 
-def _mechanism(omega: float, mechanical: Mechanical | None) -> dict[str, float]:
+def _mechanism(omega: float, si: SiScales | None) -> dict[str, float]:
     """What a generator's frequency stands for in the mechanism, Hz."""
-    return {} if mechanical is None else {"mechanism_hz": mechanical.hertz(omega)}
+    return {} if si is None else {"mechanism_hz": si.hertz(omega)}
 
 
 def cost_of(file: Mapping[str, Any]) -> dict[str, Any]:
@@ -116,23 +116,23 @@ def simulate_json(
     engine: str,
     provenance: Mapping[str, Any],
     seconds: float,
-    mechanical: Mechanical | None = None,
+    si: SiScales | None = None,
 ) -> dict[str, Any]:
-    """What ``simulate`` prints; with ``mechanical`` also what that is in SI units."""
+    """What ``simulate`` prints; with ``si`` also what that is in SI units."""
     return {
         "format": FORMAT,
         "engine": engine,
         "responses": [
             {
                 "omega": s.omega,
-                **hertz_json(s.omega, mechanical),
+                **hertz_json(s.omega, si),
                 "expected": s.expected,
                 "found": s.found,
-                **orbit_json(s.orbit, mechanical),
+                **orbit_json(s.orbit, si),
                 "twin": _twin_json(s.twin),
                 "others": [
                     {
-                        **orbit_json(o, mechanical),
+                        **orbit_json(o, si),
                         "twin": _twin_json(s.twins[i] if s.twins else None),
                     }
                     for i, o in enumerate(s.others, start=1)
@@ -149,14 +149,20 @@ def simulate_json(
     }
 
 
-def hertz_json(omega: float, mechanical: Mechanical | None) -> dict[str, float]:
+def _by_state(values: Array) -> dict[str, Any]:
+    """Rows of a (states, …) array by the states' names."""
+    from designer.model.mechanics import state_names
+
+    return dict(zip(state_names(len(values) // 2), values, strict=True))
+
+
+def hertz_json(omega: float, si: SiScales | None) -> dict[str, float]:
     """The frequency of a mechanism's force in Hz; nothing of a dimensionless model."""
-    return {} if mechanical is None else {"frequency_hz": mechanical.hertz(omega)}
+    return {} if si is None else {"frequency_hz": si.hertz(omega)}
 
 
-def orbit_json(orbit: Orbit, mechanical: Mechanical | None = None) -> dict[str, Any]:
-    """An orbit in model units; with ``mechanical`` also its extremes and impacts in SI units."""
-    from designer.model.model import STATES
+def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
+    """An orbit in model units; with ``si`` also its extremes and impacts in SI units."""
 
     known = len(orbit.extremes) > 0
     times = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
@@ -172,7 +178,7 @@ def orbit_json(orbit: Orbit, mechanical: Mechanical | None = None) -> dict[str, 
         "asymmetry": orbit.asymmetry,
         "x1_max": orbit.extremes[0, 1] if known else None,
         "x1_min": orbit.extremes[0, 0] if known else None,
-        "extremes": dict(zip(STATES, orbit.extremes, strict=True)) if known else None,
+        "extremes": _by_state(orbit.extremes) if known else None,
         "impact_velocities": orbit.impact_velocities,
         "impacts": [
             {"time": t, "side": "upper" if side > 0 else "lower", "velocity": v}
@@ -183,19 +189,19 @@ def orbit_json(orbit: Orbit, mechanical: Mechanical | None = None) -> dict[str, 
         "penetration": orbit.penetration,
         "miss": orbit.miss,
         "reason": orbit.reason,
-        **_orbit_si(orbit, mechanical),
+        **_orbit_si(orbit, si),
     }
 
 
-def _orbit_si(orbit: Orbit, mechanical: Mechanical | None) -> dict[str, Any]:
-    if mechanical is None:
+def _orbit_si(orbit: Orbit, si: SiScales | None) -> dict[str, Any]:
+    if si is None:
         return {}
     known = len(orbit.extremes) > 0
-    low, high = orbit.extremes[0] * mechanical.length_scale if known else (None, None)
+    low, high = orbit.extremes[0] * si.length_scale if known else (None, None)
     return {
         "x1_max_m": high,
         "x1_min_m": low,
-        "impact_velocities_m_s": orbit.impact_velocities * mechanical.speed_scale,
+        "impact_velocities_m_s": orbit.impact_velocities * si.speed_scale,
     }
 
 

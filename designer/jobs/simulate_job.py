@@ -97,7 +97,7 @@ def simulate(
         made = None if engine == "model" else read_design(folder, catalog, progress)
     else:
         modelfile = model_file(Path(model))
-    read = Reader(modelfile.model, modelfile.mechanical)
+    read = Reader(modelfile.model, modelfile.si)
     omegas = tuple(read.omega("--omega", w) for w in omega)
     omegas += tuple(read.frequency("--frequency", f) for f in frequency)
     wanted: tuple[float | None, ...] = omegas or tuple(r.omega for r in modelfile.responses)
@@ -105,7 +105,7 @@ def simulate(
     if plots is not None:
         from designer.report import simulate_plots  # matplotlib is not needed but for them
 
-        digits = simulate_plots.DIGITS if modelfile.mechanical is None else DIGITS
+        digits = simulate_plots.DIGITS if modelfile.si is None else DIGITS
         names = simulate_plots.names([w for w in wanted if w is not None], digits)
         simulate_plots.check(Path(plots), names, overwrite)
     simulated = simulation.simulate(
@@ -123,9 +123,9 @@ def simulate(
     settings = {**simulation.engine_settings(engine, rung), "drawn_starts": starts}
     origin = provenance(modelfile, catalog.hash, seed=seed, settings=settings)
     seconds = time.perf_counter() - began
-    answer = simulate_json(simulated, engine, origin, seconds, modelfile.mechanical)
+    answer = simulate_json(simulated, engine, origin, seconds, modelfile.si)
     if plots is not None:
         progress.stage("pictures")
-        units = units_of(modelfile.mechanical)
+        units = units_of(modelfile.si)
         answer["files"] = simulate_plots.write(Path(plots), names, simulated, overwrite, units)
     return SimulationResult(plain(answer), simulated)

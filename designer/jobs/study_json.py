@@ -11,7 +11,7 @@ import numpy as np
 from designer.base.plain_json import FORMAT
 from designer.check.checked_design import CheckedResponse
 from designer.jobs.json_answers import hertz_json
-from designer.model.model import Mechanical
+from designer.model.model import SiScales
 from designer.report import measured_table
 from designer.spice.equation_check import EquationCheck
 from designer.verdicts.cross_check import CrossCheck, NgspiceVerdict
@@ -32,9 +32,9 @@ def study_json(
     provenance: Mapping[str, Any],
     cost: Mapping[str, float],
     equations: EquationCheck | None = None,
-    mechanical: Mechanical | None = None,
+    si: SiScales | None = None,
 ) -> dict[str, Any]:
-    """What ``tolerance`` prints and ``tolerance.json`` holds; with ``mechanical`` also the
+    """What ``tolerance`` prints and ``tolerance.json`` holds; with ``si`` also the
     frequencies in Hz."""
     return {
         "format": FORMAT,
@@ -51,7 +51,7 @@ def study_json(
         "blame": study.blame_status.as_dict(),
         "equation_check": None if equations is None else equations.as_dict(),
         "responses": [
-            {**_response(c, study, i), **hertz_json(c.model.omega, mechanical)}
+            {**_response(c, study, i), **hertz_json(c.model.omega, si)}
             for i, c in enumerate(study.checked)
         ],
         "maps": [_map(each) for each in study.maps],

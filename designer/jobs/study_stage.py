@@ -360,7 +360,7 @@ def result_json(result: RunResult) -> dict[str, Any]:
         result.provenance,
         result.cost,
         result.equations,
-        result.modelfile.mechanical,
+        result.modelfile.si,
     )
 
 

@@ -23,17 +23,21 @@ from .distributions import (
     Split as Split,
     Uniform as Uniform,
 )
+from .driven import (
+    model_flow as model_flow,
+)
 from .find_responses import (
-    FASTEST as FASTEST,
-    SLOWEST as SLOWEST,
     STARTS as STARTS,
     ModelResponse as ModelResponse,
     Peaks as Peaks,
-    check_omega as check_omega,
+    Reach as Reach,
     find as find,
     matches as matches,
     peaks as peaks,
     scale_of as scale_of,
+)
+from .lumped_system import (
+    LumpedSystem as LumpedSystem,
 )
 from .measured_values import (
     MEASURED as MEASURED,
@@ -41,12 +45,22 @@ from .measured_values import (
     read_measured as read_measured,
 )
 from .mechanics import (
+    POSITIONS as POSITIONS,
+    Clearance as Clearance,
+    MechanicalModel as MechanicalModel,
     SecondOrderSystem as SecondOrderSystem,
+    Side as Side,
+    Sides as Sides,
+    check_omega as check_omega,
+    frequency_range as frequency_range,
+    state_names as state_names,
 )
 from .model import (
-    STATES as STATES,
+    GREATEST as GREATEST,
+    SMALLEST as SMALLEST,
     Dimensionless as Dimensionless,
     Mechanical as Mechanical,
+    SiScales as SiScales,
 )
 from .model_file import (
     ModelFile as ModelFile,
@@ -73,8 +87,6 @@ from .spread_table import (
     check_binned as check_binned,
 )
 from .swept_model import (
-    GREATEST as GREATEST,
-    SMALLEST as SMALLEST,
     ModelSubject as ModelSubject,
 )
 from .template import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,17 +14,16 @@ from designer.dynamics import harmonics
 from designer.dynamics.attractors import coexisting, settle, starts, twin
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import ANSWERS, Orbit, OrbitStatus
-from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import POSITIONS
-from designer.model.model import Dimensionless
+from designer.model.driven import model_flow
+from designer.model.mechanics import Clearance, MechanicalModel, check_omega
 from designer.model.response_table import Response
 
-SLOWEST, FASTEST = 1e-3, 1e3
-"""Dimensionless drive frequencies: slower, one period has too many steps to wait for."""
 STARTS = 16
 """Initial states tried for each response: rest and a Sobol set."""
 SCOUT = tuple(float(w) for w in np.linspace(0.2, 1.8, 17))
-"""Frequencies that set the swing of a model file that names no response."""
+"""Frequencies over the model's own that set the swing of a model file that names no response."""
+DENSE = 1024
+"""Points a drive period at which a displacement between two masses is looked at."""
 
 
 _A_NUMBER = (
@@ -58,7 +57,7 @@ class ModelResponse:
         return None if self.spec.expect is None else str(self.spec.expect)
 
 
-def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelResponse, ...]:
+def find(model: MechanicalModel, wanted: Sequence[Response]) -> tuple[ModelResponse, ...]:
     """Find each wanted response on the model with the exact flow.
 
     Raises
@@ -75,18 +74,12 @@ def find(model: Dimensionless, wanted: Sequence[Response]) -> tuple[ModelRespons
                 raise InputError(None, f"response[{number}].{key}", found, _A_NUMBER)
         assert spec.omega is not None
         assert not isinstance(spec.b, tuple)
-        check_omega(f"response[{number}].omega", spec.omega)
+        check_omega(f"response[{number}].omega", spec.omega, model)
         b = model.b if spec.b is None else spec.b
         if len(wanted) > 1:
             doing(f"response {number} of {len(wanted)} on the model")
-        out.append(_find_one(replace(model, b=b), spec, b))
+        out.append(_find_one(model.at(b), spec, b))
     return tuple(out)
-
-
-def check_omega(name: str, omega: float, file: str | None = None) -> None:
-    """Raises InputError for a frequency outside ``SLOWEST`` to ``FASTEST``."""
-    if not SLOWEST <= omega <= FASTEST:
-        raise InputError(file, name, omega, f"a number from {SLOWEST:g} to {FASTEST:g}")
 
 
 def matches(orbit: Orbit, spec: Response) -> bool:
@@ -98,50 +91,79 @@ def matches(orbit: Orbit, spec: Response) -> bool:
     return not spec.difference(orbit)
 
 
-def peaks(model: Dimensionless, found: Sequence[ModelResponse]) -> Peaks:
-    """Largest states, deepest penetration over all responses and their starts from rest, and the
-    highest harmonic of the responses."""
-    runs: list[tuple[Dimensionless, float, Orbit]] = [
-        (replace(model, b=r.b), r.omega, r.orbit) for r in found
+def peaks(model: MechanicalModel, found: Sequence[ModelResponse]) -> Peaks:
+    """What the circuit has to hold, over all responses and their starts from rest."""
+    runs: list[tuple[MechanicalModel, float, Orbit]] = [
+        (model.at(r.b), r.omega, r.orbit) for r in found
     ]
     if not runs:
-        system = model.second_order().piecewise_linear()
-        rest = np.zeros(system.size)
-        runs = [(model, w, settle(Flow(system, Drive(w)), rest)) for w in SCOUT]
-    stopped = POSITIONS[model.sides]
-    states, depth, excursion, fastest = np.zeros(4), 0.0, 0.0, 0.0
+        unit = model.second_order().own_frequency
+        rest = np.zeros(2 * model.second_order().size)
+        runs = [(model, w * unit, settle(model_flow(model, w * unit), rest)) for w in SCOUT]
+    clearances = model.second_order().clearances
+    states, fastest = np.zeros(2 * model.second_order().size), 0.0
+    reaches = [Reach() for _ in clearances]
     for variant, omega, orbit in runs:
         doing(f"swing at ω = {omega:.4g}")
-        system = variant.second_order().piecewise_linear()
-        flow = Flow(system, Drive(omega))
-        spans = [flow.run(np.zeros(system.size), 20, measure=True).extremes]
+        flow = model_flow(variant, omega)
+        rest = np.zeros(flow.system.size)
+        spans = [_Span(flow, rest, flow.run(rest, 20, measure=True).extremes, 20)]
         if orbit.status is OrbitStatus.PERIODIC:
-            spans.append(orbit.extremes)
+            spans.append(_Span(flow, orbit.start, orbit.extremes, orbit.n))
         elif len(orbit.start):
-            spans.append(flow.run(orbit.start, 200, measure=True).extremes)
+            extremes = flow.run(orbit.start, 200, measure=True).extremes
+            spans.append(_Span(flow, orbit.start, extremes, 200))
         fastest = max(fastest, harmonics.fastest(flow, orbit))
         scale = model.b / variant.b  # the generator's amplitude follows b, the threshold stays
+        stops = variant.second_order().clearances
         for span in spans:
-            states = np.maximum(states, scale * np.abs(span).max(axis=1))
-            for side, reach in ((1, span[0, 1]), (-1, -span[0, 0])):
-                if side in stopped:
-                    depth = max(depth, scale * float(reach - variant.b))
-                else:
-                    excursion = max(excursion, scale * float(reach))
-    return Peaks(states, depth, excursion, fastest)
+            states = np.maximum(states, scale * np.abs(span.extremes).max(axis=1))
+            reaches = [
+                reach.widened(stop, scale, *span.within(j, stop))
+                for j, (reach, stop) in enumerate(zip(reaches, stops, strict=True))
+            ]
+    return Peaks(states, tuple(reaches), fastest)
 
 
-def scale_of(model: Dimensionless, omega: float) -> Array:
-    """(states,) size of the states that starts are drawn from: a few static deflections."""
+def scale_of(model: MechanicalModel, omega: float) -> Array:
+    """(states,) size of the states that starts are drawn from: a few static deflections and the
+    widest gap."""
     system = model.second_order()
-    stiffness = np.linalg.inv(system.stiffness)
-    x = np.abs(stiffness @ system.force) + model.b
-    return np.stack([x, x * max(omega, 1.0)], axis=1).ravel()
+    flexibility = np.linalg.inv(system.stiffness)
+    gaps = [abs(side.gap) for stop in system.clearances for _, side in stop.sides]
+    x = np.abs(flexibility @ system.drive_force(omega)) + max(gaps, default=model.b)
+    x = x + np.abs(flexibility @ system.constant)
+    return np.stack([x, x * max(omega, system.own_frequency)], axis=1).ravel()
 
 
-def _find_one(model: Dimensionless, spec: Response, b: float) -> ModelResponse:
+@dataclass(frozen=True)
+class _Span:
+    """A stretch of motion from a start at drive phase 0, with the (states, 2) extremes in it."""
+
+    flow: Flow
+    start: Array
+    extremes: Array
+    periods: int
+
+    def within(self, index: int, stop: Clearance) -> tuple[float, float]:
+        """Least and largest displacement in a clearance."""
+        system = self.flow.system
+        rows = system.contact_rows(index)
+        side, row = next(iter(rows.items()))
+        row = side * row[:-1]  # over the states and the drive, without the gap
+        used = np.flatnonzero(row)
+        if len(used) == 1 and used[0] < system.size and row[used[0]] == 1.0:
+            return float(self.extremes[used[0], 0]), float(self.extremes[used[0], 1])
+        states = self.flow.run(self.start, self.periods, points=DENSE).strobes
+        phase = 2.0 * np.pi * np.arange(len(states)) / DENSE
+        drive = self.flow.drive.amplitude * np.sin(phase) + self.flow.drive.offset
+        moves = states @ row[:-1] + row[-1] * drive
+        return float(moves.min()), float(moves.max())
+
+
+def _find_one(model: MechanicalModel, spec: Response, b: float) -> ModelResponse:
     assert spec.omega is not None
-    flow = Flow(model.second_order().piecewise_linear(), Drive(spec.omega))
+    flow = model_flow(model, spec.omega)
     met = coexisting(flow, starts(scale_of(model, spec.omega), STARTS))
     for orbit in met:
         for candidate in _with_twin(flow, orbit, spec):
@@ -162,15 +184,45 @@ def _with_twin(flow: Flow, orbit: Orbit, spec: Response) -> list[Orbit]:
 
 
 @dataclass(frozen=True)
+class Reach:
+    """How far a displacement goes in one clearance, in model units."""
+
+    penetration: float = 0.0
+    """The deepest penetration of a stop."""
+    excursion: float = 0.0
+    """Largest displacement towards a side that has no stop; 0 with stops on both."""
+    peak: float = 0.0
+    """Largest displacement, either way."""
+
+    def widened(self, stop: Clearance, scale: float, low: float, high: float) -> Reach:
+        """With a motion from ``low`` to ``high`` too, in units of which ``scale`` counts."""
+        depth, excursion, sides = self.penetration, self.excursion, dict(stop.sides)
+        for side, reach in ((1, high), (-1, -low)):
+            if side in sides:
+                depth = max(depth, scale * float(reach - sides[side].gap))
+            else:
+                excursion = max(excursion, scale * float(reach))
+        return Reach(depth, excursion, max(self.peak, scale * high, -scale * low))
+
+
+@dataclass(frozen=True)
 class Peaks:
     """What the circuit has to hold, in model units."""
 
     states: Array
-    """(4,) peaks of x1, x1', x2, x2' over all wanted responses and the starts from rest."""
-    penetration: float
-    """The deepest penetration of a stop."""
-    excursion: float = 0.0
-    """Largest |x1| on the side that has no stop; 0 with stops on both."""
+    """(states,) peaks of x1, x1', x2, … over all wanted responses and the starts from rest."""
+    reaches: tuple[Reach, ...] = ()
+    """How far the displacement in each clearance goes."""
     fastest: float = 0.0
     """Angular frequency of the highest harmonic that matters in the velocities
     (``harmonics.fastest``)."""
+
+    @property
+    def penetration(self) -> float:
+        """The deepest penetration of any stop."""
+        return max((reach.penetration for reach in self.reaches), default=0.0)
+
+    @property
+    def excursion(self) -> float:
+        """Largest displacement towards a side that has no stop."""
+        return max((reach.excursion for reach in self.reaches), default=0.0)

@@ -1,17 +1,23 @@
 """Masses, dampers, springs and stops as a piecewise-linear system.
 
-M x'' + C x' + K x + Σ stops = force · u(t), with any number of masses and clearances; Eq. (1)-(2)
-of the paper is the case of two masses and one two-sided clearance.
+    M z'' + C z' + K z + Σ stops = force(ω) · sin ωt + constant
+
+with any number of masses and clearances; Eq. (1)-(2) of the paper is the case of two masses and one
+two-sided clearance. Where the ground moves, by y = base · sin ωt, z = x - y is the displacement
+relative to it: the force is then that of the file and M base ω² (every spring and damper to ground
+stands on what moves). Stops that do not move with the ground watch z + y.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, Self
 
 import numpy as np
 
 from designer.base.arrays import Array
+from designer.base.errors import InputError
 from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
 
 Sides = Literal["both", "upper", "lower"]
@@ -20,27 +26,88 @@ POSITIONS: dict[Sides, tuple[int, ...]] = {"both": (1, -1), "upper": (1,), "lowe
 
 
 @dataclass(frozen=True)
-class Clearance:
-    """Stops that a mass meets at a distance from its rest position."""
+class Side:
+    """The stop on one side of a clearance: a spring that pushes back past a gap."""
 
+    gap: float
+    """Distance of the stop from the displacement zero; negative: in contact there."""
+    stiffness: float
+    """Stiffness of the stop."""
+    further: tuple[tuple[float, float], ...] = ()
+    """(depth, stiffness) of springs that join in deeper, by rising depth: a stop that stiffens in
+    steps."""
+
+    @property
+    def springs(self) -> tuple[tuple[float, float], ...]:
+        """(displacement, stiffness) of every spring of the stop, the first met first."""
+        deeper = ((self.gap + depth, stiffness) for depth, stiffness in self.further)
+        return ((self.gap, self.stiffness), *deeper)
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """A gap between a mass and ground, or between two masses, with stops on one side or both."""
+
+    name: str
+    """Its name, such as "A"."""
     mass: int
     """Index of the mass."""
-    stiffness: float
-    """Stiffness of a stop."""
-    gap: float
-    """Distance of a stop from the rest position."""
-    sides: Sides = "both"
-    """The stops that exist."""
+    other: int | None
+    """Index of the other mass; None for ground."""
+    upper: Side | None
+    """The stop that a positive displacement meets; None where there is none."""
+    lower: Side | None
+    """The stop that a negative displacement meets; None where there is none."""
+    damping: float = 0.0
+    """Of the stops, while they are in contact."""
+
+    @classmethod
+    def even(
+        cls, mass: int, stiffness: float, gap: float, sides: Sides = "both", name: str = "A"
+    ) -> Clearance:
+        """To ground, with the same stop on each side that has one."""
+        stop = Side(gap, stiffness)
+        ends = dict.fromkeys(POSITIONS[sides], stop)
+        return cls(name, mass, None, ends.get(1), ends.get(-1))
+
+    @property
+    def sides(self) -> tuple[tuple[int, Side], ...]:
+        """The sides that have a stop, 1 upper and -1 lower, each with its stop."""
+        pairs = ((1, self.upper), (-1, self.lower))
+        return tuple((position, stop) for position, stop in pairs if stop is not None)
 
     @property
     def positions(self) -> tuple[int, ...]:
-        """Contact positions that exist: 1 for the upper stop, -1 for the lower."""
-        return POSITIONS[self.sides]
+        """Sides that have a stop: 1 upper, -1 lower."""
+        return tuple(position for position, _ in self.sides)
+
+    @property
+    def which(self) -> Sides:
+        """The sides that have a stop, in a word."""
+        return next(word for word, ends in POSITIONS.items() if ends == self.positions)
+
+    @property
+    def first(self) -> Side:
+        """The upper stop, or the only one."""
+        return self.sides[0][1]
+
+    def scaled(self, factor: float) -> Clearance:
+        """The same with every length ``factor`` times as large."""
+
+        def longer(stop: Side | None) -> Side | None:
+            if stop is None:
+                return None
+            further = tuple((factor * depth, stiffness) for depth, stiffness in stop.further)
+            return Side(factor * stop.gap, stop.stiffness, further)
+
+        return Clearance(
+            self.name, self.mass, self.other, longer(self.upper), longer(self.lower), self.damping
+        )
 
 
 @dataclass(frozen=True)
 class SecondOrderSystem:
-    """Masses, dampers and springs with stops, driven by one force."""
+    """Masses, dampers and springs with stops, driven by forces and by the ground."""
 
     mass: Array
     """(n,) masses."""
@@ -51,20 +118,55 @@ class SecondOrderSystem:
     force: Array
     """(n,) amplitude of the force on each mass."""
     clearances: tuple[Clearance, ...]
-    """The clearances, on any of the masses."""
+    """The clearances, in the order in which n-p-q names them."""
+    constant: Array = field(default_factory=lambda: np.zeros(0))
+    """(n,) constant force on each mass; zero where it is not given."""
+    base: float = 0.0
+    """Amplitude of the ground's displacement."""
+    fixed_stops: bool = False
+    """Whether the stops between a mass and ground stay where they are while the ground moves."""
+
+    def __post_init__(self) -> None:
+        if not len(self.constant):
+            object.__setattr__(self, "constant", np.zeros(self.size))
 
     @property
     def size(self) -> int:
         """Number of masses."""
         return len(self.mass)
 
+    @property
+    def own_frequency(self) -> float:
+        """Of the first mass on its own springs, the others held, in rad per unit of time."""
+        return float(np.sqrt(self.stiffness[0, 0] / self.mass[0]))
+
+    def drive_force(self, omega: float) -> Array:
+        """(n,) amplitude of the force on each mass at a drive frequency, the ground's included."""
+        return np.asarray(self.force + self.mass * (self.base * omega * omega))
+
+    def displacement(self, clearance: Clearance) -> Array:
+        """(n,) row over the masses' displacements that gives the one in a clearance."""
+        row = np.zeros(self.size)
+        row[clearance.mass] = 1.0
+        if clearance.other is not None:
+            row[clearance.other] = -1.0
+        return row
+
+    def relative_stiffness(self, clearance: Clearance) -> float:
+        """Stiffness of a clearance's upper stop, or its only one, over that of the springs on its
+        mass; k0/(1 - k0) of the paper's Eq. (5)."""
+        own = self.stiffness[clearance.mass, clearance.mass]
+        return float(clearance.first.stiffness / own)
+
     def natural_frequencies(self, *, closed: bool = False) -> Array:
         """(n,) undamped ones, ascending, in rad per unit of time. closed : with every stop in
-        contact; else with none."""
+        contact, of each clearance the stiffest; else with none."""
         stiffness = self.stiffness.copy()
         if closed:
             for stop in self.clearances:
-                stiffness[stop.mass, stop.mass] += stop.stiffness
+                row = self.displacement(stop)
+                stiffest = max(sum(k for _, k in side.springs) for _, side in stop.sides)
+                stiffness += stiffest * np.outer(row, row)
         root = np.sqrt(self.mass)
         squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
@@ -79,42 +181,156 @@ class SecondOrderSystem:
             A[2 * i + 1, 1::2] = -self.damping[i] / self.mass[i]
         return A
 
-    def piecewise_linear(self) -> PiecewiseLinearSystem:
-        """States x1, x1', x2, x2', …; one key entry per clearance, in their order."""
+    def piecewise_linear(self, omega: float | None = None) -> PiecewiseLinearSystem:
+        """States x1, x1', x2, x2', …; one key entry per clearance, in their order: how many springs
+        of the upper stop are met, or minus how many of the lower.
+
+        omega : of the drive; only a moving ground asks for it.
+
+        Raises
+        ------
+        ValueError : a moving ground without ``omega``.
+        """
+        if self.base and omega is None:
+            raise ValueError("the force of a moving ground depends on omega")
         n = self.size
-        names = tuple(f"x{i // 2 + 1}" + ("'" if i % 2 else "") for i in range(2 * n))
+        contacts = [_Contact(self, stop) for stop in self.clearances]
         A0 = self.state_matrix()
-        B = np.zeros(2 * n)
-        B[1::2] = self.force / self.mass
-        clearances = self.clearances
+        B0, d0 = np.zeros(2 * n), np.zeros(2 * n)
+        B0[1::2] = self.drive_force(omega or 0.0) / self.mass
+        d0[1::2] = self.constant / self.mass
 
         def build(key: ModeKey) -> Mode:
-            A, d = A0.copy(), np.zeros(2 * n)
-            guards = []
-            for j, (stop, position) in enumerate(zip(clearances, key, strict=True)):
-                row, column = 2 * stop.mass + 1, 2 * stop.mass
-                C = np.zeros(2 * n)
-                if position:
-                    rate = stop.stiffness / self.mass[stop.mass]
-                    A[row, column] -= rate
-                    d[row] += rate * position * stop.gap
-                    C[column] = -position
-                    target = (*key[:j], 0, *key[j + 1 :])
-                    guards.append(Guard(C, 0.0, stop.gap, target, clearance=j))
-                    continue
-                for p in stop.positions:
-                    C = np.zeros(2 * n)
-                    C[column] = p
-                    target = (*key[:j], p, *key[j + 1 :])
-                    guards.append(Guard(C, 0.0, -stop.gap, target, clearance=j))
-            return Mode(A, B, d, tuple(guards), sides=key)
+            A, B, d = A0.copy(), B0.copy(), d0.copy()
+            guards: list[Guard] = []
+            for j, (contact, met) in enumerate(zip(contacts, key, strict=True)):
+                contact.push(met, A, B, d)
+                guards += contact.guards(j, key)
+            return Mode(A, B, d, tuple(guards), sides=tuple(int(np.sign(met)) for met in key))
 
-        symmetric = all(stop.sides == "both" for stop in clearances)
+        even = all(stop.upper == stop.lower for stop in self.clearances)
         return PiecewiseLinearSystem(
-            states=names,
+            states=state_names(n),
             build=build,
-            start=(0,) * len(clearances),
-            clearances=tuple(f"A{j + 1}" for j in range(len(clearances))),
-            displacement=tuple(2 * stop.mass for stop in clearances),
-            mirror=-np.eye(2 * n) if symmetric else None,
+            start=(0,) * len(contacts),
+            clearances=tuple(stop.name for stop in self.clearances),
+            displacement=tuple(2 * stop.mass for stop in self.clearances),
+            mirror=-np.eye(2 * n) if even and not self.constant.any() else None,
         )
+
+
+class _Contact:
+    """One clearance in the equations of first order."""
+
+    def __init__(self, system: SecondOrderSystem, clearance: Clearance) -> None:
+        row = system.displacement(clearance)
+        self.clearance = clearance
+        self.row = np.zeros(2 * system.size)
+        self.row[0::2] = row
+        self.rate = np.zeros(2 * system.size)
+        self.rate[1::2] = row
+        self.push_back = np.zeros(2 * system.size)
+        self.push_back[1::2] = row / system.mass
+        fixed = system.fixed_stops and clearance.other is None
+        self.on_drive = system.base if fixed else 0.0
+
+    def push(self, met: int, A: Array, B: Array, d: Array) -> None:
+        """Add the force of so many springs to the equations."""
+        if not met:
+            return
+        for place, stiffness in self._springs(met)[: abs(met)]:
+            A -= stiffness * np.outer(self.push_back, self.row)
+            B -= stiffness * self.on_drive * self.push_back
+            d += stiffness * np.sign(met) * place * self.push_back
+        A -= self.clearance.damping * np.outer(self.push_back, self.rate)
+
+    def guards(self, index: int, key: ModeKey) -> list[Guard]:
+        """Ways to one spring more or fewer."""
+        met = key[index]
+        out = []
+        if met:
+            side = int(np.sign(met))
+            place = self._springs(met)[abs(met) - 1][0]
+            out.append(self._guard(-side, place, met - side, index, key))
+            if abs(met) < len(self._springs(met)):
+                out.append(
+                    self._guard(side, -self._springs(met)[abs(met)][0], met + side, index, key)
+                )
+            return out
+        return [
+            self._guard(side, -stop.gap, side, index, key) for side, stop in self.clearance.sides
+        ]
+
+    def _springs(self, met: int) -> tuple[tuple[float, float], ...]:
+        stop = dict(self.clearance.sides)[1 if met > 0 else -1]
+        return stop.springs
+
+    def _guard(self, sign: int, constant: float, met: int, index: int, key: ModeKey) -> Guard:
+        target = (*key[:index], met, *key[index + 1 :])
+        touches = not (met and key[index])  # contact begins or ends; deeper springs only stiffen it
+        return Guard(
+            sign * self.row, sign * self.on_drive, constant, target, index if touches else -1
+        )
+
+
+class MechanicalModel(Hashable, Protocol):
+    """What the tool asks of a model, whichever file format it came from."""
+
+    @property
+    def b(self) -> float:
+        """The clearance that the generator's amplitude is given for: see ``at``."""
+        ...
+
+    @property
+    def parameters(self) -> Mapping[str, tuple[float, float]]:
+        """Names of the numbers that a sweep may change, ``b`` among them, with the closed interval
+        of each."""
+        ...
+
+    def parameter(self, name: str) -> float:
+        """The value of one of ``parameters``."""
+        ...
+
+    def changed(self, changes: Mapping[str, float]) -> Self:
+        """The model with other values of some ``parameters``.
+
+        Raises
+        ------
+        InputError : a value outside its domain.
+        """
+        ...
+
+    def at(self, b: float) -> Self:
+        """The model at another clearance: every gap and constant force by b/self.b as large, which
+        a generator's amplitude by self.b/b as large makes too."""
+        ...
+
+    def second_order(self) -> SecondOrderSystem:
+        """Its equations of motion."""
+        ...
+
+    def as_dict(self) -> dict[str, object]:
+        """All that decides it, for hashes and provenance."""
+        ...
+
+
+SLOWEST, FASTEST = 1e-3, 1e3
+"""Drive frequencies over the model's own: slower, one period has too many steps to wait for."""
+
+
+def frequency_range(model: MechanicalModel) -> tuple[float, float]:
+    """The lowest and the highest drive frequency that is computed."""
+    unit = model.second_order().own_frequency
+    return SLOWEST * unit, FASTEST * unit
+
+
+def check_omega(name: str, omega: float, model: MechanicalModel, file: str | None = None) -> None:
+    """Raises InputError for a frequency outside the model's ``frequency_range``."""
+    low, high = frequency_range(model)
+    if not low <= omega <= high:
+        raise InputError(file, name, omega, f"a number from {low:.6g} to {high:.6g}")
+
+
+def state_names(masses: int) -> tuple[str, ...]:
+    """x1, x1', x2, x2', … of so many masses."""
+    return tuple(f"x{i // 2 + 1}" + ("'" if i % 2 else "") for i in range(2 * masses))

@@ -8,9 +8,9 @@ M2 to ground; stops of stiffness K0 stand at distance B on one or both sides of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -27,6 +27,19 @@ TRIED = {
 """Closed intervals beyond which a parameter is refused, though it is a number in its domain: the
 slowest and the fastest motion are then so far apart that the linear algebra, or a single drive
 period, comes to no end (docs/stability.md)."""
+SMALLEST = math.nextafter(0.0, 1.0)
+BELOW_ONE = math.nextafter(1.0, 0.0)
+GREATEST = math.nextafter(math.inf, 0.0)
+DOMAINS = {
+    "b": (SMALLEST, GREATEST),
+    "k0": (0.0, BELOW_ONE),
+    "zeta": (SMALLEST, TRIED["zeta"][1]),
+    "m": TRIED["m"],
+    "k": TRIED["k"],
+    "c": TRIED["c"],
+    "f20": (0.0, 1.0),
+}
+"""Closed intervals in which a parameter can be followed."""
 
 
 _SIDES = choice("both", "upper", "lower")
@@ -86,12 +99,39 @@ class Dimensionless(FileTable):
         """Stop stiffness over K1: k0/(1 - k0), Eq. (5)."""
         return self.k0 / (1.0 - self.k0)
 
+    @property
+    def parameters(self) -> Mapping[str, tuple[float, float]]:
+        """``DOMAINS``."""
+        return DOMAINS
+
+    def parameter(self, name: str) -> float:
+        """The value of one of ``parameters``."""
+        return float(getattr(self, name))
+
+    def changed(self, changes: Mapping[str, float]) -> Dimensionless:
+        """The model with other values of some ``parameters``.
+
+        Raises
+        ------
+        InputError : a value outside its domain.
+        """
+        values: dict[str, Any] = dict(changes)
+        return replace(self, **values) if values else self
+
+    def as_dict(self) -> dict[str, object]:
+        """The parameters by name."""
+        return dict(self.__dict__)
+
+    def at(self, b: float) -> Dimensionless:
+        """The model at another clearance."""
+        return replace(self, b=b)
+
     def second_order(self) -> SecondOrderSystem:
         """Eq. (4) as corrected, in dimensionless time and displacement."""
         z2 = 2.0 * self.zeta
         clearances: tuple[Clearance, ...] = ()
         if self.k0 > 0.0:
-            clearances = (Clearance(0, self.mu, self.b, self.sides),)
+            clearances = (Clearance.even(0, self.mu, self.b, self.sides),)
         return SecondOrderSystem(
             mass=np.array([1.0, self.m / (1.0 - self.m)]),
             damping=np.array([[z2, -z2], [-z2, z2 / (1.0 - self.c)]]),
@@ -99,6 +139,31 @@ class Dimensionless(FileTable):
             force=np.array([1.0 - self.f20, self.f20]),
             clearances=clearances,
         )
+
+
+@dataclass(frozen=True)
+class SiScales:
+    """SI values of a model's units; 1 each for a model whose numbers are SI."""
+
+    time_scale: float = 1.0
+    """Seconds per unit of the model's time."""
+    length_scale: float = 1.0
+    """Metres per unit of its displacements."""
+    force_scale: float = 1.0
+    """Newtons per unit of its forces."""
+
+    @property
+    def speed_scale(self) -> float:
+        """Metres per second per unit of its velocities."""
+        return self.length_scale / self.time_scale
+
+    def omega(self, Omega: float) -> float:
+        """The model's frequency of an excitation at ``Omega`` rad/s."""
+        return Omega * self.time_scale
+
+    def hertz(self, omega: float) -> float:
+        """Frequency in Hz of an excitation at the model's frequency ``omega``."""
+        return omega / (2.0 * math.pi * self.time_scale)
 
 
 def _close(value: float) -> str:
@@ -141,32 +206,10 @@ class Mechanical(FileTable):
             )
 
     @property
-    def time_scale(self) -> float:
-        """Seconds per unit of dimensionless time, sqrt(M1/K1), Eq. (3)."""
-        return math.sqrt(self.M1 / self.K1)
-
-    @property
-    def length_scale(self) -> float:
-        """Metres per unit of dimensionless displacement, (P1 + P2)/K1, Eq. (3)."""
-        return (self.P1 + self.P2) / self.K1
-
-    @property
-    def speed_scale(self) -> float:
-        """Metres per second per unit of dimensionless velocity."""
-        return self.length_scale / self.time_scale
-
-    @property
-    def force_scale(self) -> float:
-        """Newtons per unit of dimensionless force, P1 + P2."""
-        return self.P1 + self.P2
-
-    def omega(self, Omega: float) -> float:
-        """Dimensionless frequency of an excitation at ``Omega`` rad/s."""
-        return Omega * self.time_scale
-
-    def hertz(self, omega: float) -> float:
-        """Frequency in Hz of an excitation at the dimensionless frequency ``omega``."""
-        return omega / (2.0 * math.pi * self.time_scale)
+    def scales(self) -> SiScales:
+        """Those of Eq. (3): sqrt(M1/K1), (P1 + P2)/K1 and P1 + P2."""
+        force = self.P1 + self.P2
+        return SiScales(math.sqrt(self.M1 / self.K1), force / self.K1, force)
 
     def dimensionless(self) -> Dimensionless:
         """Eq. (3)."""
@@ -213,7 +256,7 @@ class Mechanical(FileTable):
         """Eq. (1)-(2) in SI units."""
         clearances: tuple[Clearance, ...] = ()
         if self.K0 > 0.0:
-            clearances = (Clearance(0, self.K0, self.B, self.sides),)
+            clearances = (Clearance.even(0, self.K0, self.B, self.sides),)
         return SecondOrderSystem(
             mass=np.array([self.M1, self.M2]),
             damping=np.array([[self.C1, -self.C1], [-self.C1, self.C1 + self.C2]]),
@@ -221,6 +264,3 @@ class Mechanical(FileTable):
             force=np.array([self.P1, self.P2]),
             clearances=clearances,
         )
-
-
-STATES = ("x1", "x1'", "x2", "x2'")

@@ -1,4 +1,4 @@
-"""Model files: TOML, ``format = 1`` (docs/contract.md).
+"""Model files: TOML (docs/contract.md).
 
     format = 1
     [model]                  # or [mechanical], in SI units
@@ -9,6 +9,9 @@
     expect = "1-2-2"
     [circuit]
     opamp = "TL074C"
+
+``format = 1`` is two masses in a chain, of ``format = 2`` any system: [[mass]], [[spring]],
+[[damper]], [[clearance]], [[force]] and [base] in place of [model] (``model.lumped_elements``).
 
 Whatever is wrong with a file ends in one ``InputError`` that names the file, the field, what was
 found and what was expected; nothing is read by half.
@@ -21,19 +24,22 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from designer.base.errors import MISSING, InputError
 from designer.base.guarded_reading import inside, read_text
-from designer.base.schema import FIRST_FORMAT, FileTable, checked, line, parse_toml, such
+from designer.base.schema import FileTable, checked, line, parse_toml, such, whole
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
 from designer.model import model_limits
 from designer.model.board_table import BoardSpec
 from designer.model.circuit_table import CircuitSpec
+from designer.model.lumped_elements import Damper, Force, Gap, Mass, MovingBase, Spring
+from designer.model.lumped_system import LumpedSystem
 from designer.model.measured_values import MeasuredBoards, read_measured
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.mechanics import MechanicalModel
+from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.response_table import Response, ResponseTable
 from designer.model.rules_table import overrides
 from designer.model.search_table import SearchSpec
@@ -50,10 +56,13 @@ class ModelFile:
 
     title: str
     """The title that it gives."""
-    model: Dimensionless
-    """Dimensionless parameters, made from ``mechanical`` where that is what the file gives."""
+    model: MechanicalModel
+    """What is computed with: dimensionless, made from ``mechanical`` where that is what the file
+    gives, or the system of a file of format 2 in the file's own units."""
     mechanical: Mechanical | None
-    """Parameters in SI units, where the file gives these."""
+    """Parameters in SI units, where a file of format 1 gives these."""
+    si: SiScales | None
+    """SI values of the model's units; None where they are not known."""
     responses: tuple[Response, ...]
     """The wanted responses."""
     circuit: CircuitSpec
@@ -128,13 +137,16 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     file = None if source is None else str(source)
     data = parse_toml(text, file)
     model_limits.check(data, file)
+    second = data.get("format") == 2
+    table: type[_ModelFile | _SystemFile] = _SystemFile if second else _ModelFile
     try:
-        tables = checked(_File, data, file)
+        tables = checked(table, data, file)
+        model = tables.system
     except InputError as error:  # a model outside its domain does not know the file
         raise InputError(file, error.field, error.found, error.expected) from None
-    model, mechanical = _models(tables, file)
+    si = tables.scales(data)
     responses = tuple(
-        each.response(keys, index, mechanical, file)
+        each.response(keys, index, si, file)
         for index, (each, keys) in enumerate(
             zip(tables.response, data.get("response", ()), strict=True), start=1
         )
@@ -151,7 +163,8 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     return ModelFile(
         title=tables.title or (source.stem if source is not None else "untitled"),
         model=model,
-        mechanical=mechanical,
+        mechanical=tables.mechanical,
+        si=si,
         responses=responses,
         circuit=circuit,
         text=text,
@@ -164,17 +177,16 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     )
 
 
+_FORMAT = whole("1 or 2, the formats that this version reads", 1, 2)
 _RULES = such("tables [rules.<id>]", lambda value: isinstance(value, dict))
 
 
-@dataclass(frozen=True)
-class _File(FileTable):
-    """The tables of a file."""
+@dataclass(frozen=True, kw_only=True)
+class _Tables(FileTable):
+    """What files of both formats have."""
 
-    format: Annotated[int, FIRST_FORMAT]
+    format: Annotated[int, _FORMAT]
     title: Annotated[str | None, line("text of one line")] = None
-    model: Dimensionless | None = None
-    mechanical: Mechanical | None = None
     response: tuple[ResponseTable, ...] = ()
     circuit: CircuitSpec = field(default_factory=CircuitSpec)
     tuning: Bands = field(default_factory=Bands)
@@ -184,14 +196,61 @@ class _File(FileTable):
     spread: SpreadSpec = BENCH_1
 
 
-def _models(tables: _File, file: str | None) -> tuple[Dimensionless, Mechanical | None]:
-    if tables.model is not None and tables.mechanical is not None:
-        raise InputError(file, "mechanical", "[model] and [mechanical]", "one of the two")
-    if tables.mechanical is not None:
-        return _dimensionless(tables.mechanical, file), tables.mechanical
-    if tables.model is None:
-        raise InputError(file, "model", MISSING, "a table [model] or a table [mechanical]")
-    return tables.model, None
+@dataclass(frozen=True, kw_only=True)
+class _ModelFile(_Tables):
+    """A file of format 1."""
+
+    model: Dimensionless | None = None
+    mechanical: Mechanical | None = None
+
+    @property
+    def system(self) -> Dimensionless:
+        """What is computed with."""
+        if self.model is not None and self.mechanical is not None:
+            raise InputError(None, "mechanical", "[model] and [mechanical]", "one of the two")
+        if self.mechanical is not None:
+            return _dimensionless(self.mechanical)
+        if self.model is None:
+            raise InputError(None, "model", MISSING, "a table [model] or a table [mechanical]")
+        return self.model
+
+    def scales(self, _data: Mapping[str, Any]) -> SiScales | None:
+        """Those of Eq. (3)."""
+        return None if self.mechanical is None else self.mechanical.scales
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SystemFile(_Tables):
+    """A file of format 2."""
+
+    mass: tuple[Mass, ...] = ()
+    spring: tuple[Spring, ...] = ()
+    damper: tuple[Damper, ...] = ()
+    clearance: tuple[Gap, ...] = ()
+    force: tuple[Force, ...] = ()
+    base: MovingBase | None = None
+    mechanical: ClassVar[None] = None
+
+    @property
+    def system(self) -> LumpedSystem:
+        """What is computed with."""
+        return LumpedSystem(
+            self.mass, self.spring, self.damper, self.clearance, self.force, self.base
+        )
+
+    def scales(self, data: Mapping[str, Any]) -> SiScales | None:
+        """The file is in SI where a value of its elements is a text with a unit."""
+        keys = ("mass", "spring", "damper", "clearance", "force")
+        elements = [element for key in keys for element in data.get(key, ())]
+        elements += [data["base"]] if "base" in data else []
+        words = ("name", "between", "on", "law", "stops")
+        texts = (
+            value
+            for element in elements
+            for key, value in element.items()
+            if key not in words and isinstance(value, str)
+        )
+        return SiScales() if any(texts) else None
 
 
 # Which quantity of Eq. (1)-(2) to look at when a dimensionless one leaves its domain.
@@ -206,20 +265,20 @@ _CAUSES = {
 }
 
 
-def _dimensionless(mechanical: Mechanical, file: str | None) -> Dimensionless:
+def _dimensionless(mechanical: Mechanical) -> Dimensionless:
     try:
         return mechanical.dimensionless()
     except (ZeroDivisionError, OverflowError):
         raise InputError(
-            file, "mechanical", "values too far apart", "SI values of one mechanism"
+            None, "mechanical", "values too far apart", "SI values of one mechanism"
         ) from None
     except InputError as error:
         name = error.field.removeprefix("model.")
         if name not in _CAUSES:
-            raise InputError(file, error.field, error.found, error.expected) from None
+            raise
         cause, formula = _CAUSES[name]
         raise InputError(
-            file,
+            None,
             f"mechanical.{cause}",
             getattr(mechanical, cause),
             f"a value that makes {name} = {formula} {error.expected}",

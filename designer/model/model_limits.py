@@ -1,7 +1,7 @@
-"""What a model file cannot say: systems beyond two masses in a chain with stops on the first.
+"""What a model file of format 1 cannot say: more than two masses in a chain, stops on the first.
 
 Keys of such systems are named before anything else is checked, so that nobody looks for a misspelt
-key where the tool knows no such thing. The limits stand in docs/model-file.md.
+key where only another format has one. The limits stand in docs/model-file.md.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from designer.base.errors import InputError
 from designer.model.model import Dimensionless, Mechanical
 
 KNOWN = (
-    "this version knows two masses in a chain with stops on the first, at one distance, and forces "
-    "of one frequency on the masses"
+    "format 1 knows two masses in a chain with stops on the first, at one distance, and forces "
+    "of one frequency on the masses; format = 2 knows any masses, springs, dampers, clearances, "
+    "forces and a moving base"
 )
 WHERE = "docs/model-file.md, Limits"
 TABLES = {
@@ -51,16 +52,14 @@ MODELS = {"model": Dimensionless, "mechanical": Mechanical}
 
 
 def check(data: Mapping[str, object], file: str | None) -> None:
-    """Refuse a model file that describes a system that this version does not know.
+    """Refuse a model file of format 1 that describes a system which that does not know.
 
     Raises
     ------
     InputError : it has such a key; says what is known, and where the limits stand.
     """
-    number = data.get("format")
-    if type(number) is int and number > 1:
-        expected = f"1, the format that this version reads: {KNOWN} ({WHERE})"
-        raise InputError(file, "format", number, expected)
+    if data.get("format") == 2:
+        return
     for key, what in TABLES.items():
         if key in data:
             raise InputError(file, key, f"a table {key!r}", _unknown(key, what))

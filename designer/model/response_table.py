@@ -11,7 +11,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, shown, span
 from designer.dynamics.counts import MAX_PERIOD, Counts, read_counts
 from designer.dynamics.orbit import Orbit
-from designer.model.model import Mechanical
+from designer.model.model import SiScales
 from designer.model.si_units import FREQUENCIES, angular_frequency
 
 Twin = Literal["either", "exact"]
@@ -120,7 +120,7 @@ class ResponseTable(Response):
     """The same of a key in Hz [rad/s]."""
 
     def response(
-        self, keys: Iterable[str], index: int, mechanical: Mechanical | None, file: str | None
+        self, keys: Iterable[str], index: int, si: SiScales | None, file: str | None
     ) -> Response:
         """The response at its dimensionless frequency.
 
@@ -138,19 +138,19 @@ class ResponseTable(Response):
         given = [key for key in _FREQUENCY if key in keys]
         if not given:
             more = ", or Omega in rad/s, or frequency in Hz"
-            refuse("omega", MISSING, _OMEGA + ("" if mechanical is None else more))
+            refuse("omega", MISSING, _OMEGA + ("" if si is None else more))
         if len(given) > 1:
             many = {2: "two", 3: "three"}[len(given)]
             refuse(given[-1], " and ".join(given), f"one of the {many}")
         key, omega = given[0], self.omega
         angular = self.frequency if self.Omega is None else self.Omega
         if angular is not None:
-            if mechanical is None:
+            if si is None:
                 value, unit = (
                     (angular, "rad/s") if key == "Omega" else (angular / (2.0 * math.pi), "Hz")
                 )
                 refuse(key, value, f"omega: {key} in {unit} needs a table [mechanical]")
-            omega = mechanical.omega(angular)
+            omega = si.omega(angular)
             if not 0.0 < omega < math.inf:
                 refuse(key, angular, "a frequency within the range of numbers")
         if self.twin == "exact" and self.expect is None:

@@ -1,7 +1,7 @@
 """Units of the user: SI values under ``[mechanical]``, the model's dimensionless ones, both ways.
 
 The tool computes with dimensionless quantities. Here a text such as "10 Hz" or "0.5 mm" becomes
-one of them, and they become Hz, m and m/s again. The scales are those of `Mechanical`.
+one of them, and they become Hz, m and m/s again. The scales are a `SiScales`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from designer.base.errors import InputError
 from designer.base.si_unit import Unit, value_text
 from designer.base.units import parse_quantity
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.mechanics import MechanicalModel
+from designer.model.model import SiScales
 
 ANGULAR = "rad/s"
 FREQUENCIES = '"10 Hz" or "62.8 rad/s"'
@@ -25,12 +26,11 @@ NAMES = {"omega": "Hz", "b": "m", "x1": "m", "x1'": "m/s", "x2": "m", "x2'": "m/
 """SI units of the model's quantities; the others have none."""
 
 
-def units_of(mechanical: Mechanical | None) -> dict[str, Unit]:
+def units_of(si: SiScales | None) -> dict[str, Unit]:
     """The SI units of a model's quantities, by name; none of a model without SI values."""
-    if mechanical is None:
+    if si is None:
         return {}
-    scales = {"Hz": mechanical.hertz(1.0), "m": mechanical.length_scale}
-    scales["m/s"] = mechanical.speed_scale
+    scales = {"Hz": si.hertz(1.0), "m": si.length_scale, "m/s": si.speed_scale}
     return {quantity: Unit(name, scales[name]) for quantity, name in NAMES.items()}
 
 
@@ -54,9 +54,9 @@ def angular_frequency(value: str | float) -> float:
 class Reader:
     """Reads the values that options give, for one model or one of its boards."""
 
-    model: Dimensionless
+    model: MechanicalModel
     """What plain numbers are of."""
-    mechanical: Mechanical | None = None
+    si: SiScales | None = None
     """What texts with SI units are of; None: they are refused."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Units that plain numbers of a board have, by parameter."""
@@ -84,12 +84,12 @@ class Reader:
         InputError : far out of the range of a model with SI values, whose user may have meant
             rad/s. Both readings are named, and how to give each.
         """
-        if self.mechanical is None or not 0.0 < omega < math.inf:
+        if self.si is None or self.si == SiScales() or not 0.0 < omega < math.inf:
             return omega
         low, high = natural_frequencies(self.model)
         if low / FAR_BELOW <= omega <= FAR_ABOVE * high:
             return omega
-        hertz, meant = value_text(self.mechanical.hertz(omega), "Hz"), self.mechanical.omega(omega)
+        hertz, meant = value_text(self.si.hertz(omega), "Hz"), self.si.omega(omega)
         text = "--frequency" if option == "--omega" else option
         raise InputError(
             None,
@@ -126,19 +126,19 @@ class Reader:
         length = _quantity(option, text, unit)
         return length / units_of(self._scales(option, text))[name].scale
 
-    def _scales(self, option: str, text: str) -> Mechanical:
-        if self.mechanical is None:
+    def _scales(self, option: str, text: str) -> SiScales:
+        if self.si is None:
             raise InputError(
                 None,
                 option,
                 text,
                 "a dimensionless number: a value with a unit needs a model file with a table "
-                "[mechanical]",
+                "[mechanical], or one of format 2 with units",
             )
-        return self.mechanical
+        return self.si
 
 
-def natural_frequencies(model: Dimensionless) -> tuple[float, float]:
+def natural_frequencies(model: MechanicalModel) -> tuple[float, float]:
     """The lowest undamped one with the stops open, and the highest with them closed."""
     system = model.second_order()
     closed = system.natural_frequencies(closed=True)

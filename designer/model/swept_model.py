@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,27 +15,13 @@ from designer.base.schema import one_of
 from designer.base.si_unit import Unit
 from designer.bifurcations.flow_family import Family
 from designer.dynamics.flow import Flow
-from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.steady_state import DrivenSystem
-from designer.model.find_responses import FASTEST, SLOWEST, check_omega, scale_of
-from designer.model.model import TRIED, Dimensionless, Mechanical
+from designer.model.driven import model_flow
+from designer.model.find_responses import scale_of
+from designer.model.mechanics import MechanicalModel, check_omega, frequency_range, state_names
+from designer.model.model import SiScales
 from designer.model.si_units import units_of
 from designer.model.swept_tables import ModalBatch
-
-SMALLEST = math.nextafter(0.0, 1.0)
-BELOW_ONE = math.nextafter(1.0, 0.0)
-GREATEST = math.nextafter(math.inf, 0.0)
-DOMAINS = {
-    "omega": (SLOWEST, FASTEST),
-    "b": (SMALLEST, GREATEST),
-    "k0": (0.0, BELOW_ONE),
-    "zeta": (SMALLEST, TRIED["zeta"][1]),
-    "m": TRIED["m"],
-    "k": TRIED["k"],
-    "c": TRIED["c"],
-    "f20": (0.0, 1.0),
-}
-"""Closed intervals in which a model's parameter can be followed (``model.Dimensionless``)."""
 
 
 @dataclass
@@ -43,35 +29,41 @@ class ModelSubject:
     """A model at one drive frequency, whose parameters can be swept."""
 
     whose: ClassVar[str] = "model"
-    model: Dimensionless
-    """The model in dimensionless parameters."""
+    model: MechanicalModel
+    """The model."""
     omega: float | None = None
-    """Dimensionless drive frequency; None: it has to be among the changes."""
-    parameters: tuple[str, ...] = tuple(DOMAINS)
-    """Names of what can be swept."""
-    states: tuple[str, ...] = ("x1", "x1'", "x2", "x2'")
-    """Names of the states."""
+    """Drive frequency in the model's units; None: it has to be among the changes."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Unit by parameter, and by "x", "v" and "λ" for the axes of a diagram; none where
     dimensionless."""
     _batch: ModalBatch = field(default_factory=ModalBatch, repr=False)
-    mechanical: Mechanical | None = None
-    """The SI values that the model was made from, if it was."""
+    scales: SiScales | None = None
+    """SI values of the model's units; None where they are not known."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of what can be swept."""
+        return ("omega", *self.model.parameters)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return state_names(self.model.second_order().size)
 
     @property
     def si(self) -> dict[str, Unit]:
         """SI units of the quantities that have one, by name."""
-        return units_of(self.mechanical)
+        return units_of(self.scales)
 
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""
         if name not in self.parameters:
             raise InputError(None, option, name, one_of(name, self.parameters))
         if name == "omega":
-            check_omega(option, value)
+            check_omega(option, value, self.model)
             return
         try:
-            _changed(self.model, {name: value})
+            self.model.changed({name: value})
         except InputError as error:
             expected = error.expected if math.isfinite(value) else "a finite number"
             raise InputError(None, option, value, f"{name}: {expected}") from None
@@ -86,13 +78,13 @@ class ModelSubject:
             omegas.append(float(omega))
         tables = self._batch.tables(models, omegas)
         return [
-            DrivenSystem(lambda m=m, w=w: _flow(m, w), 2.0 * np.pi / w, t)  # type: ignore[misc]
+            DrivenSystem(lambda m=m, w=w: model_flow(m, w), 2.0 * np.pi / w, t)  # type: ignore[misc]
             for m, w, t in zip(models, omegas, tables, strict=True)
         ]
 
     def scale(self, changes: Sequence[Mapping[str, float]]) -> Array:
         """(states,) size of the states that starts are drawn from: one for all changes."""
-        out = np.zeros(4)
+        out = np.zeros(len(self.states))
         for change in changes:
             omega = change.get("omega", self.omega)
             assert omega is not None
@@ -105,42 +97,38 @@ class ModelSubject:
 
     def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
         """ω and the model's parameters."""
-        numbers = {f.name: getattr(self.model, f.name) for f in fields(self.model)}
-        return {"omega": self.omega, **{k: v for k, v in numbers.items() if k != "sides"}}
+        return {"omega": self.omega, **{k: self.model.parameter(k) for k in self.model.parameters}}
 
     def remarks(self) -> tuple[str, ...]:
         """Which stop there is, where there is one only."""
-        return () if self.model.sides == "both" else (f"{self.model.sides} stop only",)
+        stops = self.model.second_order().clearances
+        if len(stops) != 1 or len(stops[0].sides) != 1:
+            return ()
+        return ("upper stop only" if stops[0].upper is not None else "lower stop only",)
 
     def as_dict(self) -> dict[str, object]:
         """What decides the flow, for hashes and provenance."""
-        return {"model": dict(self.model.__dict__), "omega": self.omega}
+        return {"model": self.model.as_dict(), "omega": self.omega}
 
 
-def _flow(model: Dimensionless, omega: float) -> Flow:
-    return Flow(model.second_order().piecewise_linear(), Drive(omega))
+def _changed(model: MechanicalModel, change: Mapping[str, float]) -> MechanicalModel:
+    return model.changed({name: value for name, value in change.items() if name != "omega"})
 
 
-def _changed(model: Dimensionless, change: Mapping[str, float]) -> Dimensionless:
-    others: dict[str, Any] = {k: v for k, v in change.items() if k != "omega"}
-    return replace(model, **others) if others else model
-
-
-def of_model(model: Dimensionless, omega: float, parameter: str) -> Family:
-    """The model at drive frequency omega, with one parameter of ``DOMAINS`` free.
+def of_model(model: MechanicalModel, omega: float, parameter: str) -> Family:
+    """The model at drive frequency omega, with one of its parameters, or omega, free.
 
     Raises
     ------
     InputError : the parameter is not one of them.
     """
-    if parameter not in DOMAINS:
-        raise InputError(None, "over", parameter, f"one of {', '.join(DOMAINS)}")
+    known = {"omega": frequency_range(model), **model.parameters}
+    if parameter not in known:
+        raise InputError(None, "over", parameter, f"one of {', '.join(known)}")
 
     def build(value: float) -> Flow:
         if parameter == "omega":
-            return Flow(model.second_order().piecewise_linear(), Drive(value), fast=False)
-        names: dict[str, Any] = {parameter: value}
-        variant = replace(model, **names)
-        return Flow(variant.second_order().piecewise_linear(), Drive(omega), fast=False)
+            return model_flow(model, value, fast=False)
+        return model_flow(model.changed({parameter: value}), omega, fast=False)
 
-    return Family(parameter, *DOMAINS[parameter], build)
+    return Family(parameter, *known[parameter], build)

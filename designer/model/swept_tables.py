@@ -15,7 +15,7 @@ from designer.dynamics import kernel_modal as kernel, modal_tables
 from designer.dynamics.kernel_crossing import BLOCK_STEP, LAST, NODES, PARTS, TERMS
 from designer.dynamics.kernel_modal import ModalTables
 from designer.dynamics.modal_tables import WORST_RESONANCE, Oscillators
-from designer.model.mechanics import POSITIONS
+from designer.model.mechanics import POSITIONS, MechanicalModel
 from designer.model.model import Dimensionless
 
 
@@ -26,10 +26,13 @@ class ModalBatch:
         self._known: dict[bytes, Oscillators | None] = {}
 
     def tables(
-        self, models: Sequence[Dimensionless], omegas: Sequence[float]
+        self, given: Sequence[MechanicalModel], omegas: Sequence[float]
     ) -> list[ModalTables | None]:
         """For each model under its drive frequency; None where the fast path does not fit."""
-        out: list[ModalTables | None] = [None] * len(models)
+        out: list[ModalTables | None] = [None] * len(given)
+        models = [model for model in given if isinstance(model, Dimensionless)]
+        if len(models) < len(given):
+            return out
         systems = [m.second_order() for m in models]
         open_ = [s.state_matrix() for s in systems]
         touched = [A.copy() for A in open_]

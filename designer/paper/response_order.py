@@ -24,7 +24,7 @@ STEPS = 61
 
 
 @dataclass(frozen=True)
-class Gap:
+class WindowGap:
     """From the main window of 1-p-p (``high`` is its lower end) down to the next one's upper
     end."""
 
@@ -51,7 +51,7 @@ def gaps(
     steps: int = STEPS,
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
-) -> list[Gap]:
+) -> list[WindowGap]:
     """What rest leads to between neighbouring main windows that do not overlap.
 
     mains : p and main window, p rising. progress : called once a gap.
@@ -64,12 +64,12 @@ def gaps(
             plan = sweep.SweepPlan(ModelSubject(model), "omega", values, ("start 0",))
             (track,) = sweep.run(plan, jobs).steps.values()
             seen = [(float(w), s.response) for w, s in zip(values, track, strict=True)]
-            out.append(Gap(p, after, low, high, tuple(seen[::-1])))
+            out.append(WindowGap(p, after, low, high, tuple(seen[::-1])))
         progress()
     return out
 
 
-def out_of_turn(windows: Sequence[BranchWindow], gap: Gap) -> list[tuple[float, int]]:
+def out_of_turn(windows: Sequence[BranchWindow], gap: WindowGap) -> list[tuple[float, int]]:
     """(ω, q) of each 1-q-q in a gap that is not in turn, falling.
 
     In turn are 1-p-p, twins too, and below it 1-(p+1)-(p+1); once that was seen, 1-p-p no more.
@@ -92,7 +92,7 @@ def out_of_turn(windows: Sequence[BranchWindow], gap: Gap) -> list[tuple[float, 
     return out
 
 
-def faults(windows: Sequence[BranchWindow], gap: Gap) -> str:
+def faults(windows: Sequence[BranchWindow], gap: WindowGap) -> str:
     """What in a gap is not as the paper has it; empty where all is."""
     parts = []
     if not gap.chaotic:

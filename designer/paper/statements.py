@@ -19,7 +19,7 @@ from designer.bifurcations.points import Bifurcation, PointKind
 from designer.bifurcations.windows import BranchWindow
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit
-from designer.paper.response_order import Gap, equal, faults, strays
+from designer.paper.response_order import WindowGap, equal, faults, strays
 
 AGREES, IN_PART, DISAGREES = "agrees", "in part", "disagrees"
 PITCHFORK = 1.47
@@ -62,7 +62,7 @@ def symmetric_mains(windows: Sequence[BranchWindow]) -> list[tuple[int, BranchWi
 def statements(
     survey: Survey,
     windows: Sequence[BranchWindow],
-    gaps: Sequence[Gap],
+    gaps: Sequence[WindowGap],
     chatter: Sequence[tuple[float, Orbit]],
 ) -> list[Statement]:
     """Every statement, in the paper's order.
@@ -181,7 +181,7 @@ def _twins(windows: Sequence[BranchWindow]) -> Statement:
     )
 
 
-def _order(windows: Sequence[BranchWindow], gaps: Sequence[Gap]) -> Statement:
+def _order(windows: Sequence[BranchWindow], gaps: Sequence[WindowGap]) -> Statement:
     there = symmetric_mains(windows)
     falling = all(a[1].high.value > b[1].high.value for a, b in itertools.pairwise(there))
     apart = all(a[1].low.value > b[1].high.value for a, b in itertools.pairwise(there))

@@ -128,7 +128,8 @@ def _circuits(
         yield name, one.circuit, *_questions(one.circuit, one.volts, settings, wanted)
     design = synthesise(modelfile, catalog).design
     settings = [
-        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b)) for r in wanted
+        Excitation(design.errors.scales.frequency(r.omega), design.amplitude(r.b, r.omega))
+        for r in wanted
     ]
     yield RECTIFIER, design.circuit, *_questions(design.circuit, design.volts(), settings, wanted)
 

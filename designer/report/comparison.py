@@ -133,6 +133,8 @@ def compare(
 ) -> tuple[DesignColumn, ...]:
     """The paper's circuits for this model, as far as they can follow it, and the design."""
     model, spec = result.design.model, result.modelfile.circuit
+    if not isinstance(model, Dimensionless):
+        return ()  # the paper's circuit is for its two masses
     ours = ComparedCircuit(
         OURS,
         f"chosen for the model file: {spec.opamp}, resistors {' and '.join(spec.resistors)}, "

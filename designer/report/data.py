@@ -13,7 +13,8 @@ from designer.check.checked_design import CheckedResponse
 from designer.circuit.design import Design
 from designer.circuit.netlist import Circuit
 from designer.dynamics.orbit import OrbitStatus
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.mechanics import MechanicalModel
+from designer.model.model import Mechanical, SiScales
 from designer.spread.part_grades import BetterGrade, better_grades
 from designer.verdicts.verdict import StudyPlan
 from designer.yields.blame_analysis import ResponseBlame
@@ -55,7 +56,12 @@ class ReportData:
         return self.result.modelfile.mechanical
 
     @property
-    def given(self) -> Dimensionless | Mechanical:
+    def si(self) -> SiScales | None:
+        """SI values of the model's units; None where they are not known."""
+        return self.result.modelfile.si
+
+    @property
+    def given(self) -> MechanicalModel | Mechanical:
         """The parameters as the model file gives them."""
         return self.mechanical or self.design.model
 

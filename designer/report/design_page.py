@@ -23,6 +23,7 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.model import equations as forms
 from designer.model.ascii_sketch import sketch
+from designer.model.model import Dimensionless
 from designer.report import design_tables, response_tables, summary, tolerance_tables, words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
@@ -108,6 +109,8 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
 def _model(data: ReportData, drawing: Picture | Gallery | None) -> PageSection:
     model, mechanical = data.design.model, data.mechanical
     assert not isinstance(drawing, Gallery)
+    if not isinstance(model, Dimensionless):
+        return PageSection("The model", [design_tables.elements_table(model)], "model")
     picture = replace(
         drawing or Picture(), sketch=tuple(sketch(model).splitlines()), caption=_drawing_note(data)
     )
@@ -139,7 +142,8 @@ def _drawing_note(data: ReportData) -> str:
             "Values in units of M₁ and K₁, lengths in units of (P₁ + P₂)/K₁, dampers in units of "
             "√(K₁ M₁), forces in units of P₁ + P₂. "
         )
-    if data.design.model.k0 and data.design.model.sides == "both":
+    stops = data.design.model.second_order().clearances
+    if stops and stops[0].which == "both":
         text += "clip(x, −b, b) is x, but no less than −b and no more than b. "
     return text + "t = T √(K₁/M₁), x = X K₁/(P₁ + P₂), ω = Ω √(M₁/K₁)."
 
@@ -324,7 +328,7 @@ def _scales(data: ReportData) -> PageSection:
             " A response wanted at another b is driven with the amplitude times b(model)/b, and "
             "its volts stand for other lengths by the same factor; the threshold stays."
         )
-    scales = design_tables.scale_table(data.design, data.mechanical)
+    scales = design_tables.scale_table(data.design, data.si)
     columns = Columns(
         (
             PageSection("What a volt and a second stand for", [scales]),

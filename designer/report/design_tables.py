@@ -12,7 +12,8 @@ from designer.base.page import Table, table
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.mechanics import MechanicalModel
+from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.report import words
 
 _PARAMETERS = {
@@ -82,6 +83,12 @@ def mechanical_table(given: Mechanical) -> Table | None:
     return table(("parameter", "value", "what it is"), rows, (1,))
 
 
+def elements_table(model: MechanicalModel) -> Table | None:
+    """The numbers of a system's elements by their names."""
+    rows = [(name, words.number(model.parameter(name))) for name in model.parameters]
+    return table(("parameter", "value"), rows, (1,))
+
+
 def bom_table(bom: Sequence[Mapping[str, str]]) -> Table | None:
     keys = [k for k in _BOM if any(k in row for row in bom)]
     rows = [[_bom_cell(k, row.get(k, "")) for k in keys] for row in bom]
@@ -116,7 +123,8 @@ def opamp_table(circuit: Circuit) -> Table | None:
 
 
 def error_table(design: Design) -> Table | None:
-    wanted = design.model.second_order().state_matrix()
+    system = design.model.second_order()
+    wanted = system.state_matrix()
     rows = []
     for name, error in design.errors.errors.items():
         term = words.TERM.fullmatch(name)
@@ -125,27 +133,28 @@ def error_table(design: Design) -> Table | None:
             row, column = (2 * (int(term[i]) - 1) + len(term[i + 1]) for i in (1, 3))
             want = words.number(float(wanted[row - 1, column]))
         elif name.endswith("stop slope"):
-            want = words.number(design.model.mu)
+            want = words.number(system.relative_stiffness(system.clearances[0]))
         rows.append((words.coefficient(name), want, words.error(error)))
     return table(("coefficient", "wanted", "ln(realised/wanted)"), rows, (1, 2))
 
 
-def scale_table(design: Design, mechanical: Mechanical | None) -> Table | None:
+def scale_table(design: Design, si: SiScales | None) -> Table | None:
     scales = design.errors.scales
     rows = [
         ("one unit of model time", words.quantity(scales.seconds, "s")),
         ("generator frequency at ω = 1", words.quantity(scales.frequency(1.0), "Hz")),
     ]
-    if mechanical is not None:
-        slow = mechanical.time_scale / scales.seconds
+    if si is not None:
+        slow = si.time_scale / scales.seconds
         rows.append(("mechanism's time per circuit time", f"{words.number(slow)} s/s"))
     if design.circuit.stops:
         rows.append(("contact begins at (v1)", _thresholds(design)))
-    for state, volts in zip(("x₁", "x₁′", "x₂", "x₂′"), scales.volts, strict=False):
+    names = words.state_symbols(len(scales.volts) // 2)
+    for state, volts in zip(names, scales.volts, strict=True):
         rows.append((f"one unit of {state}", words.quantity(float(volts), "V")))
-        if mechanical is not None:
+        if si is not None:
             speed = state.endswith("′")
-            scale = mechanical.speed_scale if speed else mechanical.length_scale
+            scale = si.speed_scale if speed else si.length_scale
             unit = "m/s" if speed else "m"
             rows.append((f"one volt of {state}", words.quantity(scale / float(volts), unit)))
     gain = float(np.sum(design.errors.drive_gain))
@@ -153,8 +162,8 @@ def scale_table(design: Design, mechanical: Mechanical | None) -> Table | None:
         rows.append(
             ("generator for the model's force of 1", f"{words.quantity(1.0 / gain, 'V')} peak")
         )
-        if mechanical is not None:
-            rows.append(("one generator volt", words.quantity(gain * mechanical.force_scale, "N")))
+        if si is not None:
+            rows.append(("one generator volt", words.quantity(gain * si.force_scale, "N")))
     return table(("scale", "value"), rows, (1,))
 
 

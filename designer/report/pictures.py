@@ -12,6 +12,7 @@ from designer.base.page import Gallery, Picture
 from designer.board import schematic_drawing
 from designer.check.checked_design import CheckedResponse, traces
 from designer.circuit.coefficients import EXACT
+from designer.model.model import Dimensionless, Mechanical
 from designer.report import blame_plots, map_plots, orbit_plots, study_plots, words
 from designer.report.data import ReportData
 from designer.report.design_page import Pictures
@@ -47,8 +48,11 @@ def pictures(data: ReportData) -> Pictures:
     def element(figure: Figure, shows: str) -> Markup:
         return page.element(to_svg(figure), shows)
 
-    drawing = element(model_drawing(data.given), _drawing_label(data))
-    out: dict[str, Picture | Gallery] = {"model": Picture(svg=drawing)}
+    given = data.given
+    out: dict[str, Picture | Gallery] = {}
+    if isinstance(given, Dimensionless | Mechanical):
+        drawing = element(model_drawing(given), _drawing_label(data))
+        out["model"] = Picture(svg=drawing)
     if data.checked:
         out["portraits"] = _portraits(data, element)
         out |= _study_pictures(data, element)
@@ -74,6 +78,8 @@ def pictures(data: ReportData) -> Pictures:
 def _drawing_label(data: ReportData) -> str:
     """The drawing of the model in words."""
     model = data.design.model
+    if not isinstance(model, Dimensionless):
+        return "The model."
     stops = f"the {model.sides} side" if model.sides != "both" else "both sides"
     end = f" between stops on springs K0 at {stops}" if model.k0 else ", without stops"
     damper = " and damper C2" if model.c else ""
@@ -84,7 +90,7 @@ def _portraits(data: ReportData, element: Element) -> Gallery:
     ngspice = any(c.gate is not None for c in data.checked)
     sides: tuple[int, ...] = ()
     if data.design.circuit.stops:
-        sides = {"both": (1, -1), "upper": (1,), "lower": (-1,)}[data.design.model.sides]
+        sides = data.design.model.second_order().clearances[0].positions
     key = Picture(svg=element(orbit_plots.legend(ngspice=ngspice, sides=sides), KEY))
     cards = []
     for i, c in enumerate(data.checked):

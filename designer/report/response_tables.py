@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -50,7 +49,7 @@ def response_table(data: ReportData) -> Table | None:
 
 def _coexisting(data: ReportData, checked: CheckedResponse) -> str:
     """The other attractors of the model with their shares of the starts."""
-    model = replace(data.design.model, b=checked.model.b)
+    model = data.design.model.at(checked.model.b)
     others = [
         f"{b.orbit.response} ({100 * b.count / DRAWN_STARTS:.3g} %)"
         for b in beside(model, checked.model)
@@ -107,10 +106,10 @@ def _omega(c: CheckedResponse) -> str:
 
 def _mechanism(data: ReportData) -> Columns:
     """The frequency that the mechanism has, where it has SI values."""
-    mechanical = data.mechanical
-    if mechanical is None:
+    si = data.si
+    if si is None:
         return {}
-    return {"mechanism": lambda c: words.quantity(mechanical.hertz(c.model.omega), "Hz")}
+    return {"mechanism": lambda c: words.quantity(si.hertz(c.model.omega), "Hz")}
 
 
 def _expected(c: CheckedResponse) -> str:

@@ -11,6 +11,7 @@ from designer.check.checked_design import CheckedResponse
 from designer.check.trust import WORDS
 from designer.circuit.coefficients import EXACT
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.mechanics import state_names
 from designer.yields.yield_count import Yield
 
 NONE = "–"
@@ -69,6 +70,11 @@ def coefficient(name: str) -> str:
 
 def _pretty(state: str) -> str:
     return state.replace("''", "″").replace("'", "′").translate(_SUBSCRIPTS)
+
+
+def state_symbols(masses: int) -> list[str]:
+    """x₁, x₁′, x₂, … of so many masses."""
+    return [_pretty(name) for name in state_names(masses)]
 
 
 def limits(counted: Yield, figures: str) -> str:

@@ -232,7 +232,7 @@ def _impedance(
     if contact:
         stop = model.clearances[0]
         spring = np.zeros_like(terms[0])
-        spring[stop.mass, stop.mass] = stop.stiffness
+        spring[stop.mass, stop.mass] = stop.first.stiffness
         terms.append(spring)
     return terms, np.linalg.solve(sum(terms), model.force.astype(complex))
 
@@ -249,17 +249,17 @@ def _rests(
     """The dead zone and each contact, with constant forces that hold the mass there."""
     if not design.circuit.stops:
         return (_Rest(0, 0.0, 0.0),)
-    stop = model.clearances[0]
+    stop, side = model.clearances[0], model.clearances[0].first
     volts, limit = design.errors.scales.volts, ROOM * design.circuit.saturation
     closed = model.stiffness.copy()
-    closed[stop.mass, stop.mass] += stop.stiffness
+    closed[stop.mass, stop.mass] += side.stiffness
     by_force = np.linalg.solve(closed, model.force)
-    by_stop = np.linalg.solve(closed, stop.stiffness * stop.gap * np.eye(model.size)[stop.mass])
+    by_stop = np.linalg.solve(closed, side.stiffness * side.gap * np.eye(model.size)[stop.mass])
     reach = peaks(design.model, found).penetration
-    depth = min(DEPTH * stop.gap, reach) if reach > 0.0 else NEAR * stop.gap
+    depth = min(DEPTH * side.gap, reach) if reach > 0.0 else NEAR * side.gap
 
     def force(depth: float) -> float:
-        return float((stop.gap + depth - by_stop[stop.mass]) / by_force[stop.mass])
+        return float((side.gap + depth - by_stop[stop.mass]) / by_force[stop.mass])
 
     def pushed(depth: float) -> float:
         return float((np.abs(force(depth) * by_force + by_stop) * volts[0::2]).max())
@@ -415,12 +415,12 @@ def _curve(
         threshold = contact * (level - offset) / (slope - leftover)
         # Both stops need not lie at the same distance: an offset of the generator centres them.
         stated = design.errors.scales.threshold_lower if contact < 0 else float("nan")
-        gap = model.clearances[0].gap * design.errors.scales.volts[0]
+        gap = model.clearances[0].first.gap * design.errors.scales.volts[0]
         gap = stated if np.isfinite(stated) else gap
         findings.append(
             EquationFinding(f"threshold, {place}", float(abs(threshold / gap - 1.0)), bound)
         )
-    share = float(abs(leftover / wanted) * design.model.mu)
+    share = float(abs(leftover / wanted) * model.relative_stiffness(model.clearances[0]))
     return [*findings, EquationFinding("leftover slope", share, bound)]
 
 
@@ -429,7 +429,7 @@ def _wanted_slope(design: Design, model: SecondOrderSystem) -> float:
     circuit, scales, stop = design.circuit, design.errors.scales, model.clearances[0]
     velocity = 2 * stop.mass + 1
     capacitor = next(c for c in circuit.capacitors if c.name == circuit.states[velocity])
-    rate = stop.stiffness / model.mass[stop.mass] / scales.seconds
+    rate = stop.first.stiffness / model.mass[stop.mass] / scales.seconds
     per_volt = scales.volts[velocity] / scales.volts[velocity - 1]
     return float(rate * per_volt * capacitor.value / conductance(circuit, STAGE, capacitor.minus))
 

@@ -20,7 +20,7 @@ from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 from designer.synthesis import linear_search, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZone, target_of
 from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLimits
@@ -45,7 +45,7 @@ LEAST_SHARE = 0.2
 class Order:
     """What is to be built, and from what."""
 
-    model: Dimensionless
+    model: MechanicalModel
     """The wanted model."""
     spec: CircuitSpec
     """What the circuit is to be made of."""
@@ -75,7 +75,7 @@ class Order:
     @classmethod
     def of(
         cls,
-        model: Dimensionless,
+        model: MechanicalModel,
         spec: CircuitSpec,
         catalog: Catalog,
         peaks: Peaks,
@@ -176,10 +176,11 @@ def linear_block(
     most_values : its share of the limit on distinct values. between : range of R4 [ohm]. level :
     the one level of error to search, if not all.
     """
-    mu = order.model.mu if order.model.k0 > 0.0 else 0.0
+    system = order.model.second_order()
+    mu = max((system.relative_stiffness(stop) for stop in system.clearances), default=0.0)
     bounds = limits.bounds(mu, order.peaks, order.resistors)
     return linear_search.best(
-        Targets.from_state_matrix(order.model.second_order().state_matrix()),
+        Targets.from_state_matrix(system.state_matrix()),
         order.resistors,
         order.capacitors,
         order.prices,
@@ -205,7 +206,7 @@ def attempt(
         return inverters
     values |= inverters
     dead_zone: DeadZone | None = None
-    if order.model.k0 > 0.0:
+    if order.model.second_order().clearances:
         sized = _dead_zone(order, limits, values)
         if isinstance(sized, str):
             return Shortfall(sized, True)
@@ -309,7 +310,8 @@ def _volts_per_ohm(order: Order, limits: ConditionLimits, values: Mapping[str, f
     placeholder = float(order.resistors[-1])
     trial = order.build({**values, **dict.fromkeys(DRIVE, placeholder)})
     errors = order.errors(trial, limits.swing)
-    wanted = np.array([1.0 - order.model.f20, order.model.f20])
+    system = order.model.second_order()
+    wanted = system.drive_force(system.own_frequency)
     gain = np.where(wanted > 0.0, errors.drive_gain * placeholder, 1.0)
     return np.asarray(np.where(wanted > 0.0, wanted / gain, 0.0))
 

@@ -14,10 +14,10 @@ from scipy.optimize import linprog
 
 from designer.base.arrays import Array
 from designer.catalog.diode_curve import diode_model
-from designer.circuit.dead_zone_parts import DeadZoneStage, Kind, Sides
+from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
 from designer.circuit.scale_fit import minimax
 from designer.model.find_responses import Peaks
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel, Sides
 from designer.synthesis.limits import ConditionLimits, depth
 from designer.synthesis.linear_block import PARTS, Targets, residuals_of
 
@@ -132,7 +132,7 @@ def parts_of(kind: str, sides: str) -> tuple[str, ...]:
 
 
 def target_of(
-    model: Dimensionless,
+    model: MechanicalModel,
     values: Mapping[str, float],
     stage: DeadZoneStage,
     limits: ConditionLimits,
@@ -145,7 +145,9 @@ def target_of(
 
     values : of the linear block by part name. saturation, supply : ± [V].
     """
-    targets = Targets.from_state_matrix(model.second_order().state_matrix())
+    system = model.second_order()
+    stop = system.clearances[0]
+    targets, mu = Targets.from_state_matrix(system.state_matrix()), system.relative_stiffness(stop)
     _, p, q1, q3 = minimax(*_residuals(values, targets))
     relative = np.exp([0.0, -q1, -q1 + p + q3, -q1 + p])  # volts of each state over those of x1
     top = limits.swing / float((peaks.states * relative).max())  # volts per unit of x1
@@ -158,18 +160,18 @@ def target_of(
     # Where the swing is no condition an output may go as far as it can.
     more = 1.0 if "swing" in limits.conditions else saturation / limits.swing
     return DeadZoneTarget(
-        mu=model.mu,
-        slope=slope_interval(values, targets, model.mu),
+        mu=mu,
+        slope=slope_interval(values, targets, mu),
         saturation=saturation,
-        threshold=min(model.b * top, saturation / LEAST_GAIN),
+        threshold=min(stop.first.gap * top, saturation / LEAST_GAIN),
         linear_gain=more * (limits.swing / (top * peak)),
         output_gain=more * ((limits.swing - drop) / (top * depth(peaks))),
         load=limits.load,
         noise_gain=limits.noise_gain,
         strict=bool(limits.conditions),
         kind=stage.kind,
-        sides=model.sides,
-        excursion=(peaks.excursion or peak) / model.b,
+        sides=stop.which,
+        excursion=(peaks.excursion or peak) / stop.first.gap,
         supply=supply,
         reference=reference,
         reference_current=current,

@@ -139,13 +139,15 @@ def limits(
     saturation: float,
     fastest: float,
     aims: Aims = NO_AIMS,
+    unit: float = 1.0,
 ) -> ConditionLimits:
     """The limits of these conditions for an op-amp with this output limit [V].
 
-    fastest : angular frequency, in model units, of the highest harmonic that matters.
+    fastest : angular frequency, in model units, of the highest harmonic that matters. unit : the
+    angular frequency, in model units, that shall lie in the file's band.
     """
     low, high = spec.frequency
-    seconds = 1.0 / (2.0 * np.pi * high), 1.0 / (2.0 * np.pi * low)
+    seconds = unit / (2.0 * np.pi * high), unit / (2.0 * np.pi * low)
     if "bandwidth" in conditions:
         least = INVERTER_GAIN * fastest / (2.0 * np.pi * bandwidth_limit(opamp))
         seconds = max(seconds[0], least), seconds[1]

@@ -21,7 +21,7 @@ from designer.circuit import build
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.model.circuit_table import CircuitSpec
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 
 DRIVE = ("R6", "R12")
 """Resistors from the generator to the driven masses."""
@@ -30,7 +30,7 @@ _SECTION = re.compile("[A-OQ-Z]")
 Refusal = InputError | None
 
 
-def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> None:
+def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> None:
     """Refuse what cannot be built before anything is computed.
 
     Raises
@@ -43,7 +43,7 @@ def check_choices(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> 
     if spec.saturation is not None and not 0.0 < spec.saturation <= spec.supply:
         expected = f"above 0 and up to {spec.supply:g} V"
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
-    if spec.dead_zone == "rectifier" and model.k0 > 0.0:
+    if spec.dead_zone == "rectifier" and model.second_order().clearances:
         diode_of(spec.diode, catalog)
         _reference_of(spec, catalog)
     if spec.objective != "match":
@@ -85,7 +85,7 @@ def nearest(values: Array, wanted: float) -> float:
     return float(values[int(np.argmin(np.abs(np.log(values / wanted))))])
 
 
-def unit_circuit(model: Dimensionless, spec: CircuitSpec, catalog: Catalog) -> Circuit:
+def unit_circuit(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> Circuit:
     """The circuit of this model with every value 1: the names of its parts are what counts."""
     opamp = catalog.opamp(spec.opamp)
     return build.circuit_of(

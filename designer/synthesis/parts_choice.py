@@ -23,7 +23,7 @@ from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.find_responses import ModelResponse, Peaks
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 from designer.synthesis import composites, output_loads, side_conditions
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
@@ -87,7 +87,7 @@ class _Missed:
 
 
 def synthesise(
-    model: Dimensionless,
+    model: MechanicalModel,
     spec: CircuitSpec,
     catalog: Catalog,
     peaks: Peaks,
@@ -209,7 +209,8 @@ class _Search:
 
     def _limits(self, conditions: frozenset[str]) -> ConditionLimits:
         o = self.order
-        return limits(o.spec, conditions, o.opamp, o.saturation, o.peaks.fastest, o.aims)
+        unit = o.model.second_order().own_frequency
+        return limits(o.spec, conditions, o.opamp, o.saturation, o.peaks.fastest, o.aims, unit)
 
     def _rounds(self, conditions: frozenset[str], *, slower: bool) -> _Verified | _Missed:
         """Search, verify, tighten what is not kept, and again."""
@@ -286,7 +287,9 @@ class _Search:
             doing("voltages and currents of the finished circuit")
             board = Reduction(made.circuit, nominal_board(made.circuit))
             loads = output_loads.design_loads(design, board, self.responses)
-        amplitudes = [design.amplitude(r.b) for r in self.responses] or [design.amplitude()]
+        amplitudes = [design.amplitude(r.b, r.omega) for r in self.responses] or [
+            design.amplitude()
+        ]
         checks = side_conditions.verify(
             design, conditions, order.opamp, order.peaks, amplitudes, loads
         )
@@ -322,7 +325,11 @@ def best_beside(
     best = first
     left = deque(_beside(linear, (0.0, float("inf"))))
     for number in range(BESIDE):
-        if not left or order.model.k0 == 0.0 or _error(best) <= max(linear.least, EXACT):
+        if (
+            not left
+            or not order.model.second_order().clearances
+            or _error(best) <= max(linear.least, EXACT)
+        ):
             break
         between = left.popleft()
         level = max(linear.least, FIRST_LEVEL)

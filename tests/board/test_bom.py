@@ -8,10 +8,10 @@ import pytest
 
 from designer.board.bom import Line, bill, bill_csv
 from designer.board.component import components
-from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Circuit
 from designer.model.board_table import BoardChoice
 from designer.model.circuit_table import CircuitSpec
+from designer.model.mechanics import Sides
 from tests.shared.stages import CATALOG, rectifier, stage
 
 VALUES = {**rectifier(5.0), "R50": 4.7e3, "R202": 24.9e3, "R205": 24.9e3}

@@ -12,12 +12,12 @@ from designer.board.kicad_project import files
 from designer.catalog.entries import Mounting
 from designer.check.deck_runs import FirstRun
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Sides
 from designer.spice import numerics_gate
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read

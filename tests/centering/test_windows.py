@@ -40,7 +40,7 @@ def test_every_place_shows_the_response() -> None:
     assert {s.b for s in found} == set(clearances(MODEL, replace(WANTED, b=(0.25, 0.27))))
     for place in found[0].at((0.0, 0.5, 1.0)):
         shown = find_responses.find(
-            replace(MODEL, b=place.b), [Response(place.omega, WANTED.expect, b=place.b)]
+            MODEL.at(place.b), [Response(place.omega, WANTED.expect, b=place.b)]
         )[0]
         assert shown.found
 

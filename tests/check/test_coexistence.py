@@ -19,6 +19,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.find_responses import scale_of
 from designer.model.model import Dimensionless
+from tests.shared.model_text import dimensionless
 
 SI = """format = 1
 [mechanical]
@@ -34,7 +35,7 @@ P1 = 4
 P2 = 0
 """
 OMEGA = 0.76
-MODEL = parse_model_file(SI).model
+MODEL = dimensionless(parse_model_file(SI).model)
 
 
 def brute(model: Dimensionless, omega: float, x: Array, periods: int = 600) -> tuple[str, Array]:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Sides
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared.oracles import dead_zone_gains
 from tests.shared.stages import SATURATION, model, one_sided, stage

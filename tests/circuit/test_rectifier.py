@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings, strategies as st
 
 from designer.base.errors import InputError
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Sides, dead_zone_stage
+from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.circuit.resistors import composites_of
@@ -21,6 +21,7 @@ from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import CircuitSpec
+from designer.model.mechanics import Sides
 from tests.shared.stages import CATALOG, PAPER, SATURATION, VREF, model, rectifier, stage
 
 NOMINAL = rectifier()

@@ -463,7 +463,7 @@ BAD = {
         "circuit",
     ),
     "unreachable grade": (SMALL + "[circuit]\nresistor_grade = 1e-5\n", "circuit.resistor_grade"),
-    "other format": (SMALL.replace("format = 1", "format = 2"), "format"),
+    "other format": (SMALL.replace("format = 1", "format = 3"), "format"),
     "not TOML": ("format = = 1", "line 1"),
     "two lines of title": (SMALL.replace(HOSTILE, "a\\nb"), "title"),
     "not of this version": (SMALL.replace("0.85", '"best"'), "response[1].omega"),

@@ -11,7 +11,7 @@ import pytest
 from designer.catalog.design_rule import FAIL, NOT_RUN, PASS, Finding, Override, judged
 from designer.catalog.design_rules import BY_ID
 from designer.catalog.fields import Figure
-from designer.circuit.dead_zone_parts import Kind, Sides
+from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
@@ -19,6 +19,7 @@ from designer.design_rules.force_at_clearance import Statics, leftover, thermal
 from designer.design_rules.operating_point import operating, stuck
 from designer.design_rules.subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Sides
 from designer.synthesis import output_loads
 from designer.synthesis.output_loads import Run
 from tests.circuit.test_reduction import EXACT, circuit_of

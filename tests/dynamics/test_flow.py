@@ -252,13 +252,14 @@ def random_chain(rng: np.random.Generator, masses: int, stops: int) -> Piecewise
         stiffness=stiffness,
         force=rng.uniform(-1.0, 1.0, masses),
         clearances=tuple(
-            Clearance(
+            Clearance.even(
                 int(rng.integers(masses)),
                 float(rng.uniform(0.5, 30.0)),
                 float(rng.uniform(0.05, 0.5)),
                 sides[int(rng.integers(3))],  # type: ignore[arg-type]
+                f"A{number}",
             )
-            for _ in range(stops)
+            for number in range(stops)
         ),
     ).piecewise_linear()
 

@@ -13,13 +13,14 @@ from designer.base.plain_json import dumps
 from designer.check import checked_design
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Kind, Sides
+from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit
 from designer.jobs import design_files
 from designer.jobs.json_answers import synthesis_json
 from designer.jobs.origin import provenance
 from designer.model.find_responses import find
+from designer.model.mechanics import Sides
 from designer.model.model_file import ModelFile, read_model_file
 from designer.report.data import ReportData
 from designer.report.write import render_html, render_markdown

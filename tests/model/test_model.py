@@ -71,7 +71,7 @@ def test_the_hammer_is_what_the_example_says() -> None:
         (0.6, 0.4, 0.9, 0.3, 0.2, 0.3)
     )
     assert got.zeta == pytest.approx(0.081, abs=5e-4)
-    assert HAMMER.omega(340.0) == pytest.approx(340.0 * math.sqrt(2.0 / 60e3))
+    assert HAMMER.scales.omega(340.0) == pytest.approx(340.0 * math.sqrt(2.0 / 60e3))
 
 
 def test_the_paper_case() -> None:
@@ -81,7 +81,7 @@ def test_the_paper_case() -> None:
     assert system.damping == pytest.approx(np.array([[0.2, -0.2], [-0.2, 0.4]]))
     assert system.stiffness == pytest.approx(np.array([[1.0, -1.0], [-1.0, 2.0]]))
     assert system.force == pytest.approx([1.0, 0.0])
-    assert system.clearances == (Clearance(0, PAPER.mu, 0.25, "both"),)
+    assert system.clearances == (Clearance.even(0, PAPER.mu, 0.25),)
 
 
 def test_corrected_eq_4_follows_from_eq_1() -> None:
@@ -113,10 +113,10 @@ def test_state_matrix_is_that_of_the_equations(model: Dimensionless) -> None:
 
 @pytest.mark.parametrize("sides", ["both", "upper", "lower"])
 def test_si_trajectory_is_the_dimensionless_one_scaled(sides: str) -> None:
-    si = replace(HAMMER, sides=sides)  # type: ignore[arg-type]
-    model, Omega = si.dimensionless(), 200.0
+    given = replace(HAMMER, sides=sides)  # type: ignore[arg-type]
+    si, model, Omega = given.scales, given.dimensionless(), 200.0
     slow = Flow(model.second_order().piecewise_linear(), Drive(si.omega(Omega)))
-    fast = Flow(si.second_order().piecewise_linear(), Drive(Omega))
+    fast = Flow(given.second_order().piecewise_linear(), Drive(Omega))
     start = np.array([0.1, 0.2, -0.1, 0.05])
     X, T = si.length_scale, si.time_scale
     units = np.array([X, X / T, X, X / T])
@@ -205,7 +205,7 @@ def test_clearances_on_any_mass() -> None:
         0.1 * np.eye(3),
         np.eye(3),
         np.array([0.0, 1.0, 0.0]),
-        (Clearance(1, 8.0, 0.5, "both"), Clearance(2, 9.0, 0.25, "lower")),
+        (Clearance.even(1, 8.0, 0.5), Clearance.even(2, 9.0, 0.25, "lower", "B")),
     ).piecewise_linear()
     assert system.states == ("x1", "x1'", "x2", "x2'", "x3", "x3'")
     assert system.displacement == (2, 4)

@@ -19,7 +19,7 @@ from designer.cli import entry, tables
 from designer.jobs import bifurcation_request
 from designer.jobs.bench_tables import COLUMNS, MECHANISM
 from designer.jobs.bifurcation_request import Request
-from designer.model.model import Dimensionless, Mechanical
+from designer.model.model import Dimensionless, SiScales
 from designer.model.model_file import parse_model_file
 from designer.model.si_units import (
     FAR_ABOVE,
@@ -58,8 +58,8 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def mechanical() -> Mechanical:
-    made = parse_model_file(DRILL).mechanical
+def mechanical() -> SiScales:
+    made = parse_model_file(DRILL).si
     assert made is not None
     return made
 
@@ -292,7 +292,7 @@ def test_a_sweep_in_hertz(drill: Path, tmp_path: Path, capfd: Captured) -> None:
 
 def plan_of(**more: Any) -> Any:
     file = parse_model_file(DRILL)
-    subject = ModelSubject(file.model, mechanical=file.mechanical)
+    subject = ModelSubject(file.model, scales=file.si)
     return bifurcation_request.plan_of(Request(steps=3, **more), subject, file)
 
 

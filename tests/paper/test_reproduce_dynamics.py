@@ -33,7 +33,7 @@ from designer.model.model_file import read_model_file
 from designer.paper import reproduce_dynamics
 from designer.paper.dynamics_page import Dynamics
 from designer.paper.reproduce_dynamics import DynamicsExtent, measure, reproduce
-from designer.paper.response_order import Gap, faults, gaps
+from designer.paper.response_order import WindowGap, faults, gaps
 from designer.paper.statements import (
     AGREES,
     DISAGREES,
@@ -71,11 +71,12 @@ def test_cascade_chains_what_begins_where_the_last_ended() -> None:
     assert cascade(everything, first).describe().startswith("1-1-1 (AS) → fold 3.00000 → 2-2-2")
 
 
-def ladder(seen: str = "aperiodic") -> tuple[list[BranchWindow], list[Gap]]:
+def ladder(seen: str = "aperiodic") -> tuple[list[BranchWindow], list[WindowGap]]:
     """Eight symmetric windows in turn, and between each two the same motion everywhere."""
     windows = [made(f"1-{p}-{p}", 10.0 - p, 10.5 - p, symmetric=True) for p in range(1, 9)]
     between = [
-        Gap(p, p + 1, 9.5 - p, 10.0 - p, ((9.8 - p, seen), (9.7 - p, seen))) for p in range(1, 8)
+        WindowGap(p, p + 1, 9.5 - p, 10.0 - p, ((9.8 - p, seen), (9.7 - p, seen)))
+        for p in range(1, 8)
     ]
     return windows, between
 

@@ -67,9 +67,9 @@ def _state(model: Dimensionless | Mechanical, x: Sequence[float]) -> dict[str, A
     system, v, wave = model.second_order(), np.array([0.7, -0.4]), 0.6
     force = system.force * wave - system.damping @ v - system.stiffness @ np.array(x)
     for stop in system.clearances:
-        for side in stop.positions:
-            depth = side * x[stop.mass] - stop.gap
-            force[stop.mass] -= side * stop.stiffness * max(depth, 0.0)
+        for side, spring in stop.sides:
+            depth = side * x[stop.mass] - spring.gap
+            force[stop.mass] -= side * spring.stiffness * max(depth, 0.0)
     a = force / system.mass
     return {
         **vars(model), "wave": wave, "x1": x[0], "x2": x[1], "v1": v[0], "v2": v[1],

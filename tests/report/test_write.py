@@ -32,6 +32,7 @@ from designer.verdicts.ngspice_runs import cross_checks
 from designer.verdicts.verdict import Verdict
 from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study, plan_study
+from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed
 
@@ -216,7 +217,7 @@ def test_what_is_wide_scrolls_in_a_box_of_its_own(html: str) -> None:
 
 @pytest.mark.parametrize("sides", ["both", "upper"])
 def test_the_model_is_drawn_with_its_equations(whole: ReportData, sides: Sides) -> None:
-    model = replace(whole.design.model, sides=sides)
+    model = replace(dimensionless(whole.design.model), sides=sides)
     data = changed(whole, design=replace(whole.design, model=model))
     page, markdown = Page(render_html(data)), render_markdown(data)
     (label,) = [text for text in page.pictures() if text.startswith("The model: ground")]

@@ -16,7 +16,7 @@ from designer.cli import command_line
 from designer.dynamics.steady_state import Course
 from designer.jobs import bifurcation_request, board_files, trade_job
 from designer.jobs.study_cache import CACHE
-from designer.model import find_responses, si_units
+from designer.model import mechanics, si_units
 from designer.model.board_table import BoardSpec
 from designer.spice import numerics_gate
 from designer.verdicts import cross_check, ngspice_runs
@@ -104,8 +104,8 @@ SAID: list[tuple[str, str, object]] = [
     ("contract.md", r"exact circuit, in blocks of (\d+)", BLOCK),
     ("contract.md", r"about samples, in blocks of (\d+)", layers.CHUNK),
     ("contract.md", r"their rows, in blocks of (\d+)\b", layers.SEARCH),
-    ("contract.md", r"`omega` is from ([\d.]+) to", find_responses.SLOWEST),
-    ("contract.md", r"`omega` is from [\d.]+ to (\d+)\.", find_responses.FASTEST),
+    ("contract.md", r"`omega` is from ([\d.]+) to", mechanics.SLOWEST),
+    ("contract.md", r"`omega` is from [\d.]+ to (\d+)\.", mechanics.FASTEST),
     ("contract.md", r"above (\d+) times the model's highest", si_units.FAR_ABOVE),
     ("contract.md", r"at least every (\w+) seconds", {10.0: "ten"}[SILENCE]),
     ("trade.md", r"spread \((\d+) of each response if", defaults.TRADE_BOARDS),

@@ -37,7 +37,7 @@ LAZY = {
     },
     STARTS: {
         ("jobs.json_answers", "circuit.design"),
-        ("jobs.json_answers", "model.model"),
+        ("jobs.json_answers", "model.mechanics"),
         ("jobs.origin", "spice.batch_backend"),
         ("jobs.study_stage", "jobs.dask_runner"),
     },

@@ -8,10 +8,11 @@ import numpy as np
 
 from designer.catalog.catalog import load_catalog
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import Kind, Sides, dead_zone_stage
+from designer.circuit.dead_zone_parts import Kind, dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.model.circuit_table import CircuitSpec
+from designer.model.mechanics import Sides
 from designer.model.model import Dimensionless
 from tests.circuit.test_reduction import EXACT
 

@@ -14,12 +14,11 @@ import pytest
 from designer.base.plain_json import dumps
 from designer.check.synthesis_result import Synthesis, synthesise
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
 from designer.cli import tables
 from designer.jobs.study_stage import satisfied
-from designer.model.mechanics import SecondOrderSystem
+from designer.model.mechanics import SecondOrderSystem, Sides
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
 from designer.spice.equation_check import (
@@ -126,7 +125,10 @@ def test_explained_is_the_sum_of_all_sensitivities() -> None:
                 matrix[i, j] *= 1.0 + step
                 for _ in range(2 if name == "damping" else 1):
                     add(replace(model, **{name: matrix}))
-    stop = replace(model.clearances[0], stiffness=model.clearances[0].stiffness * (1.0 + step))
+    side = replace(
+        model.clearances[0].first, stiffness=model.clearances[0].first.stiffness * (1.0 + step)
+    )
+    stop = replace(model.clearances[0], upper=side, lower=side)
     add(replace(model, clearances=(stop,)))
     leftover = model.stiffness.copy()
     leftover[0, 0] += step

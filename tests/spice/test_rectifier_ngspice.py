@@ -7,13 +7,13 @@ import pytest
 
 from designer.base.netlist_guard import check_netlist
 from designer.circuit.coefficients import coefficient_errors
-from designer.circuit.dead_zone_parts import Sides
 from designer.circuit.netlist import Board, Circuit, Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Sides
 from designer.spice import deck, numerics_gate
 from designer.spice.deck import SolverSettings
 from designer.spice.worker import open_simulator

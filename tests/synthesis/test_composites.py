@@ -25,11 +25,12 @@ from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
 from designer.model.board_table import BoardChoice
 from designer.model.circuit_table import CircuitSpec
-from designer.model.find_responses import Peaks
+from designer.model.find_responses import Peaks, Reach
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file
 from designer.synthesis import composites, parts_choice
 from designer.synthesis.composites import Pair, PairProgram, best, pairs_near
+from tests.shared.model_text import dimensionless
 from tests.shared.oracles import Plain, coefficient_error
 from tests.shared.quick_folders import without_starts
 
@@ -41,7 +42,7 @@ synthesise = partial(parts_choice.synthesise, binding=False)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CATALOG = load_catalog()
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
-PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), 0.202, 0.0, 36.0)
+PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), (Reach(0.202, 0.0),), 36.0)
 E12, E24 = CircuitSpec(resistors=("E12",)), CircuitSpec(resistors=("E24",))
 
 
@@ -126,7 +127,7 @@ def design(names: tuple[str, ...] | bool) -> Design:
 
 def truth(made: Design) -> float:
     values = effective(made.circuit.values, made.composites)
-    m = made.model
+    m = dimensionless(made.model)
     return coefficient_error(values, Plain(m.m, m.k, m.k0, m.c, m.zeta, m.f20, m.b))
 
 

@@ -12,7 +12,7 @@ import pytest
 from designer.catalog.catalog import load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.model.circuit_table import CircuitSpec
-from designer.model.find_responses import Peaks, find, peaks
+from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model import Dimensionless
 from designer.model.model_file import read_model_file
 from designer.synthesis import parts_choice
@@ -27,7 +27,7 @@ synthesise = partial(parts_choice.synthesise, binding=False)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CATALOG = load_catalog()
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
-PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), 0.4)
+PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), (Reach(0.4),))
 RECTIFIER = CircuitSpec(dead_zone="rectifier")
 
 

@@ -15,7 +15,7 @@ from designer.base.eseries import series_values
 from designer.catalog.catalog import load_catalog
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.model.circuit_table import CircuitSpec
-from designer.model.find_responses import Peaks
+from designer.model.find_responses import Peaks, Reach
 from designer.model.model import Dimensionless
 from designer.synthesis import linear_search, rectifier_stage, saturating_search, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZoneTarget, slope_interval, target_of
@@ -28,7 +28,7 @@ from tests.shared.oracles import Plain, coefficient_error
 MODEL = Dimensionless(m=0.45, k=0.55, k0=0.95, c=0.4, zeta=0.1, f20=0.0, b=0.25)
 TARGETS = Targets.from_state_matrix(MODEL.second_order().state_matrix())
 PLAIN = Plain(MODEL.m, MODEL.k, MODEL.k0, MODEL.c, MODEL.zeta, MODEL.f20, MODEL.b)
-PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), 0.4)
+PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), (Reach(0.4),))
 CATALOG = load_catalog()
 
 

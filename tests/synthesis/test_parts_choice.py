@@ -14,13 +14,14 @@ from designer.base.errors import InputError, Unreachable
 from designer.catalog.catalog import load_catalog
 from designer.circuit.design import Design
 from designer.model.circuit_table import CircuitSpec
-from designer.model.find_responses import Peaks, find, peaks
+from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model import Dimensionless
 from designer.model.model_file import read_model_file
 from designer.model.response_table import Response
 from designer.spread.spread import Spread, draw
 from designer.synthesis import parts_choice
 from designer.synthesis.limits import LOAD, SIGNAL
+from tests.shared.model_text import dimensionless
 from tests.shared.oracles import Plain, coefficient_error
 
 # What each side condition costs is asked where a test is about it: it doubles the time.
@@ -28,7 +29,7 @@ synthesise = partial(parts_choice.synthesise, binding=False)
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CATALOG = load_catalog()
-PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), 0.4)
+PEAKS = Peaks(np.array([0.65, 0.55, 0.65, 0.6]), (Reach(0.4),))
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
 
 
@@ -50,7 +51,7 @@ def paper_design(series: tuple[str, ...]) -> Design:
 
 def check(design: Design, spec: CircuitSpec, held: Peaks) -> None:
     """Everything that a finished design promises, from its values alone."""
-    model, values = design.model, design.circuit.values
+    model, values = dimensionless(design.model), design.circuit.values
     truth = coefficient_error(values, plain(model))
     # Both by HiGHS, whose own tolerance is 1e-7.
     assert design.errors.max_error == pytest.approx(truth, rel=1e-5, abs=2e-7)
@@ -258,7 +259,7 @@ def test_slack_buys_fewer_distinct_values() -> None:
 @pytest.mark.parametrize("sides", ["upper", "lower"])
 def test_one_sided_stops(sides: str) -> None:
     model = replace(PAPER, sides=sides)  # type: ignore[arg-type]
-    held = Peaks(np.array([3.44, 2.65, 1.82, 1.87]), 0.61, 3.44, 25.0)
+    held = Peaks(np.array([3.44, 2.65, 1.82, 1.87]), (Reach(0.61, 3.44),), 25.0)
     design = synthesise(model, CircuitSpec(), CATALOG, held)
     assert design.errors.max_error < 1e-6
     assert {"R211", "R212"} <= set(design.circuit.values)
@@ -277,7 +278,9 @@ FALSE_10 = Dimensionless(
     m=0.23763075354246097, k=0.6952926880361336, k0=0.6520343199473428, c=0.2987043598844608,
     zeta=0.055237892320365314, f20=1.0, b=0.3966616593668248,
 )  # fmt: skip
-PEAKS_10 = Peaks(np.array([0.57589752, 0.27006041, 0.49431716, 0.22307929]), 0.17923586117779283)
+PEAKS_10 = Peaks(
+    np.array([0.57589752, 0.27006041, 0.49431716, 0.22307929]), (Reach(0.17923586117779283),)
+)
 
 
 def test_parts_for_the_case_of_the_next_test_exist() -> None:
@@ -304,12 +307,16 @@ COARSE_SHARE = Dimensionless(
     m=0.5581926383142539, k=0.7506153543025478, k0=0.5370002280802586, c=0.6137780932682486,
     zeta=0.07753446959400091, f20=1.0, b=0.216001665650805,
 )  # fmt: skip
-PEAKS_16 = Peaks(np.array([1.49162242, 1.62113545, 1.00324573, 1.12018193]), 1.2756207522348961)
+PEAKS_16 = Peaks(
+    np.array([1.49162242, 1.62113545, 1.00324573, 1.12018193]), (Reach(1.2756207522348961),)
+)
 CASE_19 = Dimensionless(
     m=0.5751568906490641, k=0.6161737008217492, k0=0.6898670821051658, c=0.5129150732794505,
     zeta=0.0461747756412776, f20=1.0, b=0.8378255618223341,
 )  # fmt: skip
-PEAKS_19 = Peaks(np.array([1.01150755, 1.4017911, 1.40236639, 2.1494458]), 0.17368199133642082)
+PEAKS_19 = Peaks(
+    np.array([1.01150755, 1.4017911, 1.40236639, 2.1494458]), (Reach(0.17368199133642082),)
+)
 
 
 @pytest.mark.parametrize(
@@ -357,4 +364,4 @@ def test_no_drawn_output_passes_its_rail() -> None:
 
 
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
-PAPER_PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), 0.202)
+PAPER_PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), (Reach(0.202),))

@@ -23,7 +23,7 @@ from designer.dynamics.harmonics import fastest
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
-from designer.model.find_responses import Peaks, find, peaks
+from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model import Dimensionless
 from designer.model.model_file import parse_model_file, read_model_file
 from designer.model.response_table import Response
@@ -36,7 +36,7 @@ synthesise = partial(parts_choice.synthesise, binding=False)
 
 CATALOG = load_catalog()
 PAPER = Dimensionless(m=0.5, k=0.5, k0=0.95, c=0.5, zeta=0.1, f20=0.0, b=0.25)
-PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), 0.202, 0.0, 36.0)
+PEAKS = Peaks(np.array([0.452, 0.787, 0.571, 0.877]), (Reach(0.202, 0.0),), 36.0)
 E12 = CircuitSpec(resistors=("E12",))
 TL074C = CATALOG.opamp("TL074C")
 
@@ -213,7 +213,7 @@ def test_bandwidth_binds_where_harmonics_are_fast() -> None:
 
 
 def test_bandwidth_slows_the_circuit_down() -> None:
-    quick = Peaks(PEAKS.states, PEAKS.penetration, 0.0, 300.0)
+    quick = Peaks(PEAKS.states, (Reach(PEAKS.penetration, 0.0),), 300.0)
     bare = synthesise(PAPER, replace(E12, side_conditions=without("bandwidth")), CATALOG, quick)
     limit = bandwidth_limit(TL074C)
     kept = frozenset({"bandwidth"})
@@ -269,7 +269,7 @@ def test_swing_is_kept_by_the_outputs_of_the_finished_circuit() -> None:
     found = find(file.model, file.responses)
     held = peaks(file.model, found)
     # Half of the true peaks, so that the first circuit is twice too loud.
-    low = replace(held, states=0.5 * held.states, penetration=0.5 * held.penetration)
+    low = replace(held, states=0.5 * held.states, reaches=(Reach(0.5 * held.penetration),))
     made = synthesise(file.model, replace(file.circuit, resistors=("E24",)), CATALOG, low, found)
     check = next(c for c in made.checks if c.name == "swing")
     assert check.holds

@@ -1,0 +1,192 @@
+"""The elements of a mechanical system, each a table of a model file of ``format = 2``.
+
+All numbers are in the file's own consistent units; texts with units become SI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.schema import Accepts, FileTable, choice, number, physical, several, text, whole
+from designer.model.hertz_law import HertzPieces, hertz_pieces
+from designer.model.mechanics import Side
+
+GROUND = "ground"
+"""What a spring, a damper or a clearance may stand on beside the masses."""
+_NAME = r"[A-Za-z][A-Za-z0-9_]{0,31}"
+
+
+def _name() -> Accepts:
+    return text(_NAME, "a name: a letter, then letters, digits and _, at most 32 characters")
+
+
+def _between() -> Accepts:
+    expected = 'two different names, of masses or "ground", such as ["hammer", "ground"]'
+    each = several(expected, text(_NAME, expected), least=2)
+
+    def check(value: object) -> tuple[str, str]:
+        names = each.check(value)
+        if len(names) != 2:
+            raise ValueError
+        return names[0], names[1]
+
+    return Accepts(expected, check)
+
+
+def _signed(unit: str, expected: str) -> Accepts:
+    return number(unit, f"{expected} in {unit}, or text with its unit", math.isfinite)
+
+
+@dataclass(frozen=True)
+class Mass(FileTable):
+    """A mass; it moves along one line."""
+
+    name: Annotated[str, _name()]
+    """Its name."""
+    mass: Annotated[float, physical("kg")]
+    """Its mass."""
+
+
+@dataclass(frozen=True)
+class Spring(FileTable):
+    """A linear spring."""
+
+    between: Annotated[tuple[str, str], _between()]
+    """What it joins."""
+    stiffness: Annotated[float, physical("N/m")]
+    """Its stiffness."""
+
+
+@dataclass(frozen=True)
+class Damper(FileTable):
+    """A linear damper."""
+
+    between: Annotated[tuple[str, str], _between()]
+    """What it joins."""
+    damping: Annotated[float, physical("N s/m")]
+    """Its damping."""
+
+
+@dataclass(frozen=True)
+class Gap(FileTable):
+    """A clearance: the gap that a mass has to a stop on one side or both."""
+
+    name: Annotated[str, _name()]
+    """Its name."""
+    between: Annotated[tuple[str, str], _between()]
+    """What moves in it, and what carries the stops."""
+    upper: Annotated[float | None, _signed("m", "a length, negative for a preloaded stop,")] = None
+    """Gap to the upper stop; None where there is none."""
+    lower: Annotated[float | None, _signed("m", "a length, negative for a preloaded stop,")] = None
+    """Gap to the lower stop; None where there is none."""
+    stiffness: Annotated[float | None, physical("N/m")] = None
+    """Stiffness of the stops; None where each side has its own, or a law."""
+    upper_stiffness: Annotated[float | None, physical("N/m")] = None
+    """Stiffness of the upper stop, where it has its own."""
+    lower_stiffness: Annotated[float | None, physical("N/m")] = None
+    """Stiffness of the lower stop, where it has its own."""
+    damping: Annotated[float, physical("N s/m", zero=True)] = 0.0
+    """Of the stops, in contact only."""
+    law: Annotated[Literal["linear", "hertz"], choice("linear", "hertz")] = "linear"
+    """Force of a stop over its depth: straight, or constant · depth^1.5."""
+    constant: Annotated[float | None, number("", "a number > 0", lambda k: k > 0.0)] = None
+    """Of the Hertzian law: force over depth^1.5, in the file's units."""
+    depth: Annotated[float | None, physical("m")] = None
+    """Down to which the Hertzian law holds."""
+    pieces: Annotated[int, whole("a whole number from 1 to 12", 1, 12)] = 4
+    """Straight pieces that stand for the Hertzian law."""
+
+    @property
+    def hertz(self) -> HertzPieces | None:
+        """The pieces of a Hertzian stop; None of a straight one."""
+        if self.constant is None or self.depth is None:
+            return None
+        return hertz_pieces(self.constant, self.depth, self.pieces)
+
+    @property
+    def sides(self) -> tuple[Side | None, Side | None]:
+        """The upper and the lower stop; None where there is none."""
+        hertz = self.hertz
+
+        def side(gap: float | None, own: float | None) -> Side | None:
+            stiffness = self.stiffness if own is None else own
+            if gap is None:
+                return None
+            if hertz is not None:
+                return Side(gap, hertz.stiffness, hertz.further)
+            assert stiffness is not None
+            return Side(gap, stiffness)
+
+        return side(self.upper, self.upper_stiffness), side(self.lower, self.lower_stiffness)
+
+
+@dataclass(frozen=True)
+class Force(FileTable):
+    """A force on a mass: amplitude · sin ωt + constant."""
+
+    on: Annotated[str, _name()]
+    """The mass."""
+    amplitude: Annotated[float, _signed("N", "a force")] = 0.0
+    """Amplitude; negative: in antiphase."""
+    constant: Annotated[float, _signed("N", "a force")] = 0.0
+    """Constant part, such as a weight or a preload."""
+
+
+@dataclass(frozen=True)
+class MovingBase(FileTable):
+    """The ground moves as amplitude · sin ωt."""
+
+    amplitude: Annotated[float, physical("m")]
+    """Amplitude of the displacement."""
+    stops: Annotated[Literal["base", "fixed"], choice("base", "fixed")] = "base"
+    """Whether the stops between a mass and ground move with it or stay."""
+
+
+@dataclass(frozen=True)
+class Elements:
+    """What a system is made of."""
+
+    masses: tuple[Mass, ...]
+    """The masses."""
+    springs: tuple[Spring, ...] = ()
+    """The springs."""
+    dampers: tuple[Damper, ...] = ()
+    """The dampers."""
+    gaps: tuple[Gap, ...] = ()
+    """The clearances, in the order in which n-p-q names them."""
+    forces: tuple[Force, ...] = ()
+    """The forces."""
+    base: MovingBase | None = None
+    """How the ground moves; None where it rests."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the masses."""
+        return tuple(mass.name for mass in self.masses)
+
+    @property
+    def stiffness_matrix(self) -> Array:
+        """(n, n) of the springs."""
+        return self._matrix([(spring.between, spring.stiffness) for spring in self.springs])
+
+    @property
+    def damping_matrix(self) -> Array:
+        """(n, n) of the dampers."""
+        return self._matrix([(damper.between, damper.damping) for damper in self.dampers])
+
+    def _matrix(self, joints: Sequence[tuple[tuple[str, str], float]]) -> Array:
+        """Each joint pulls on the difference of the two displacements between which it stands."""
+        out = np.zeros((len(self.masses), len(self.masses)))
+        for between, value in joints:
+            row = np.zeros(len(self.masses))
+            for name, sign in zip(between, (1.0, -1.0), strict=True):
+                if name != GROUND:
+                    row[self.names.index(name)] = sign
+            out += value * np.outer(row, row)
+        return out

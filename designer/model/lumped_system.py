@@ -1,0 +1,153 @@
+"""Any system of masses, springs, dampers, clearances, forces and a moving ground: ``format = 2``.
+
+All numbers are in the file's own consistent units. The matrices of ``second_order`` are sums over
+the elements, each by what it joins, so the paper's two masses are one case of the rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from designer.base.errors import InputError
+from designer.model.lumped_checks import check
+from designer.model.lumped_elements import GROUND, Elements, Gap
+from designer.model.mechanics import Clearance, SecondOrderSystem
+from designer.model.model import GREATEST, SMALLEST
+
+LEAST: dict[str, dict[str, float]] = {
+    "masses": {"mass": SMALLEST},
+    "springs": {"stiffness": SMALLEST},
+    "dampers": {"damping": SMALLEST},
+    "gaps": {
+        "upper": -GREATEST,
+        "lower": -GREATEST,
+        "stiffness": SMALLEST,
+        "upper_stiffness": SMALLEST,
+        "lower_stiffness": SMALLEST,
+        "damping": 0.0,
+    },
+    "forces": {"amplitude": -GREATEST, "constant": -GREATEST},
+    "base": {"amplitude": SMALLEST},
+}
+"""The numbers of each list of elements that can be changed, and the least that each may be."""
+
+
+@dataclass(frozen=True)
+class LumpedSystem(Elements):
+    """A mechanical system of any elements.
+
+    Raises
+    ------
+    InputError : the elements do not make a system that can be computed (``lumped_checks``).
+    """
+
+    b: float = 1.0
+    """Factor on every gap and constant force; a generator's amplitude by 1/b as large has the same
+    effect."""
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def second_order(self) -> SecondOrderSystem:
+        """The equations of motion."""
+        return self._second_order
+
+    @cached_property
+    def _second_order(self) -> SecondOrderSystem:
+        n = len(self.masses)
+        force, constant = np.zeros(n), np.zeros(n)
+        for each in self.forces:
+            force[self.names.index(each.on)] += each.amplitude
+            constant[self.names.index(each.on)] += self.b * each.constant
+        return SecondOrderSystem(
+            mass=np.array([mass.mass for mass in self.masses]),
+            damping=self.damping_matrix,
+            stiffness=self.stiffness_matrix,
+            force=force,
+            clearances=tuple(self._clearance(gap) for gap in self.gaps),
+            constant=constant,
+            base=0.0 if self.base is None else self.base.amplitude,
+            fixed_stops=self.base is not None and self.base.stops == "fixed",
+        )
+
+    def _clearance(self, gap: Gap) -> Clearance:
+        """With ground first it is the same gap seen from the mass, its sides changed."""
+        (mass, other), (upper, lower) = gap.between, gap.sides
+        if mass == GROUND:
+            mass, other, upper, lower = other, mass, lower, upper
+        place = None if other == GROUND else self.names.index(other)
+        clearance = Clearance(gap.name, self.names.index(mass), place, upper, lower, gap.damping)
+        return clearance.scaled(self.b)
+
+    @cached_property
+    def parameters(self) -> Mapping[str, tuple[float, float]]:
+        """``b``, and each number of an element as NAME.key: hammer.mass, hammer-casing.stiffness,
+        A.upper, hammer.amplitude, base.amplitude."""
+        lows = {name: LEAST[group][key] for name, (group, _, key) in self._places.items()}
+        return {"b": (SMALLEST, GREATEST), **{name: (low, GREATEST) for name, low in lows.items()}}
+
+    @cached_property
+    def _places(self) -> dict[str, tuple[str, int, str]]:
+        """The list, the index in it and the field of each parameter but ``b``."""
+        named: dict[str, list[str]] = {
+            "masses": list(self.names),
+            "springs": ["-".join(spring.between) for spring in self.springs],
+            "dampers": ["-".join(damper.between) for damper in self.dampers],
+            "gaps": [gap.name for gap in self.gaps],
+            "forces": [force.on for force in self.forces],
+            "base": ["base"] if self.base is not None else [],
+        }
+        return {
+            f"{name}.{key}": (group, index, key)
+            for group, names in named.items()
+            for index, name in enumerate(names)
+            for key in LEAST[group]
+            if getattr(self._elements(group)[index], key) is not None
+        }
+
+    def _elements(self, group: str) -> Sequence[Any]:
+        return (self.base,) if group == "base" else tuple(getattr(self, group))
+
+    def parameter(self, name: str) -> float:
+        """The value of one of ``parameters``."""
+        if name == "b":
+            return self.b
+        group, index, key = self._places[name]
+        return float(getattr(self._elements(group)[index], key))
+
+    def changed(self, changes: Mapping[str, float]) -> LumpedSystem:
+        """The model with other values of some ``parameters``.
+
+        Raises
+        ------
+        InputError : a value outside its domain, or a system that cannot be.
+        """
+        new: dict[str, Any] = {}
+        for name, value in changes.items():
+            low, high = self.parameters[name]
+            if not low <= value <= high:
+                expected = "a number" + ("" if low < 0.0 else " >= 0" if low == 0.0 else " > 0")
+                raise InputError(None, name, value, expected)
+            if name == "b":
+                new["b"] = value
+                continue
+            group, index, key = self._places[name]
+            elements = list(new.get(group, self._elements(group)))
+            elements[index] = replace(elements[index], **{key: value})
+            new[group] = tuple(elements)
+        if "base" in new:
+            (new["base"],) = new["base"]
+        return replace(self, **new) if new else self
+
+    def as_dict(self) -> dict[str, object]:
+        """The elements by their lists."""
+        return asdict(self)
+
+    def at(self, b: float) -> LumpedSystem:
+        """The model with every gap and constant force b times as large as in the file."""
+        return replace(self, b=b)
