@@ -16,7 +16,6 @@ from designer.base.views import View
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import THERMAL, diode_model
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
-from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.design import Design
 from designer.circuit.netlist import (
     GROUND,
@@ -104,11 +103,6 @@ def board_circuit(made: Designed) -> tuple[Circuit, BoardChoice]:
     return fitted(made.design.circuit, choice, made.catalog), choice
 
 
-def outputs(circuit: Circuit) -> tuple[str, ...]:
-    """The nets that are shown: the states, and the dead zone's output where there is one."""
-    return (*circuit.state_nets, *([OUTPUT] if circuit.stops else []))
-
-
 def driven_nodes(circuit: Circuit) -> dict[str, tuple[Resistor, ...]]:
     """The summing nodes that the generator drives, each with the resistors of its path."""
     driven: dict[str, tuple[Resistor, ...]] = {}
@@ -189,7 +183,7 @@ def _supply(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
 def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
     """A resistor for each output, its pad behind it, and one connector for all."""
     behind = []
-    for i, net in enumerate(outputs(circuit), start=1):
+    for i, net in enumerate(circuit.outputs, start=1):
         out = f"{net}_out"
         behind.append(out)
         value, role = choice.spec.probe_resistor, f"probe of {net}"

@@ -15,7 +15,6 @@ from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.pins import SUPPLY_UNIT
 from designer.circuit.board_parts_only import Connector, SupplyCapacitor, TestPoint, Trimmer
-from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.netlist import (
     GROUND,
     NEGATIVE,
@@ -125,7 +124,8 @@ def chains(parts: Iterable[TwoPin], shown: frozenset[str]) -> list[Chain]:
 def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
     """Rows of cells: for each mass its velocity, displacement and inverses; then the dead zone."""
     pins = {net for s in circuit.sections for net in s.nets}
-    shown = frozenset(pins | {GROUND, POSITIVE, NEGATIVE, OUTPUT, circuit.generator.net})
+    rails = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
+    shown = frozenset(pins | rails | {*circuit.stage_outputs})
     two_pin = [p for p in circuit.parts if not isinstance(p, Section)]
     left = chains(two_pin, shown)
     stages = section_stages(circuit)
@@ -147,7 +147,7 @@ def _amplifier(circuit: Circuit, section: Section, stage: str, left: list[Chain]
     node, out = section.inverting, section.output
     nodes = {s.inverting for s in circuit.sections}
     # Behind its diode a rectifier's output is the stage's.
-    beyond = {OUTPUT for chain in left if chain.nets == {out, OUTPUT}}
+    beyond = {net for net in circuit.stage_outputs for c in left if c.nets == {out, net}}
     ends = {out, *beyond} - nodes
     inputs: list[Chain] = []
     feedback: list[Chain] = []

@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from designer.board.board_parts import outputs
 from designer.board.component import Component
 from designer.board.footprints import FootprintShape, footprint
 from designer.circuit.netlist import GROUND, Circuit, Section
@@ -269,7 +268,7 @@ def _sides(
         drives = {
             net for p in (*circuit.parts, *circuit.fittings) if own & set(p.nets) for net in p.nets
         }
-        out = bool(drives & set(outputs(circuit)))
+        out = bool(drives & set(circuit.outputs))
         (outgoing if out else incoming).append(spot)
     return incoming, outgoing
 

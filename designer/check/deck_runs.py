@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from designer.base.arrays import Array
 from designer.check.checked_design import CheckedResponse
 from designer.check.synthesis_result import Synthesis
-from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.netlist import Circuit, Excitation
 from designer.circuit.nominal import nominal_reduction, on_circuit
 from designer.model.find_responses import ModelResponse, find
@@ -150,8 +149,12 @@ def _nodes(circuit: Circuit) -> tuple[str, ...]:
         f"{net} {'dx' if i % 2 else 'x'}{i // 2 + 1}{'/dt' if i % 2 else ''}"
         for i, net in enumerate(circuit.state_nets)
     ]
-    stops = f", {OUTPUT} output of the nonlinear stage" if circuit.stops else ""
+    names = {
+        stop.output: f"dead zone {stop.clearance}" if len(circuit.stops) > 1 else "nonlinear stage"
+        for stop in circuit.stops
+    }
+    stages = [f"{net} output of the {name}" for net, name in names.items()]
     return (
-        f"Nodes: {', '.join(carried)}{stops}, {circuit.generator.net} generator",
+        f"Nodes: {', '.join([*carried, *stages])}, {circuit.generator.net} generator",
         "A further n turns the sign (v1n is -v1). Volts per unit of each state are in scales.csv",
     )

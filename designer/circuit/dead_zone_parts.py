@@ -114,7 +114,7 @@ def _saturation(
         parts += resistor("R211", here, "d1", "shift to one stop")
         parts += resistor("R212", back, "d4", "shift to one stop, taken out again")
     ends = {side: Contact("U3C", side) for side in stage.positions}
-    return parts, Stop(clearance, MOVING, ends.get(1), ends.get(-1))
+    return parts, Stop(clearance, MOVING, ends.get(1), ends.get(-1), OUTPUT)
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ def _rectifier(
             *resistor(half.feed, half.supply, half.rail, f"feed of the reference, {word} half"),
         ]
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
-    return parts, Stop(clearance, MOVING, contacts.get(1), contacts.get(-1))
+    return parts, Stop(clearance, MOVING, contacts.get(1), contacts.get(-1), OUTPUT)
 
 
 def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:

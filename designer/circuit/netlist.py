@@ -199,6 +199,8 @@ class Stop:
     """How the upper stop shows; None where there is none."""
     lower: Contact | None
     """How the lower stop shows; None where there is none."""
+    output: str
+    """Net of its dead-zone stage's output, zero inside the clearance."""
 
     @property
     def contacts(self) -> tuple[tuple[int, Contact], ...]:
@@ -298,6 +300,16 @@ class Circuit:
     def supplies(self) -> tuple[Supply, ...]:
         """The rails that a part other than an op-amp is connected to."""
         return tuple(r for r in self.rails if r.net in self.nets)
+
+    @property
+    def stage_outputs(self) -> tuple[str, ...]:
+        """Nets of the dead-zone stages' outputs, in the order of the stops."""
+        return tuple(stop.output for stop in self.stops)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The nets that are shown: the states, and the output of each dead-zone stage."""
+        return (*self.state_nets, *self.stage_outputs)
 
     @property
     def switches(self) -> tuple[str, ...]:

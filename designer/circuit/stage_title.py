@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Fitting, Section
 
 SUPPLY, INTERFACE, DEAD_ZONE = "supply", "interface", "dead zone"
@@ -50,7 +49,7 @@ def _stage(circuit: Circuit, section: Section) -> str:
 def _owners(circuit: Circuit) -> dict[str, str]:
     """The stage that each inner net belongs to, from the summing nodes outwards."""
     sections = section_stages(circuit)
-    shared = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net, OUTPUT}
+    shared = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net, *circuit.stage_outputs}
     shared |= {s.output for s in circuit.sections}
     owner = {s.inverting: sections[s.name] for s in circuit.sections}
     parts = [p for p in circuit.parts if not isinstance(p, Section)]

@@ -173,7 +173,5 @@ def circuit_deck(made: Synthesis, checked: CheckedResponse | None = None) -> str
         initial=run.initial,
         notes=circuit_notes(made, run),
     )
-    nets = [*design.circuit.state_nets, *(["fv"] if design.circuit.stops else [])]
-    shown = " ".join(f"v({net})" for net in [*nets, design.circuit.generator.net])
     # Without such a line the plain program runs nothing.
-    return text.replace("\n.end\n", f"\n.print tran {shown}\n.end\n")
+    return text.replace("\n.end\n", f"\n.print tran {deck.voltages(design.circuit)}\n.end\n")

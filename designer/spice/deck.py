@@ -14,7 +14,6 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.catalog.diode_curve import card
-from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.netlist import Board, Circuit, Excitation, Reference
 from designer.circuit.reduction import FloatingCircuit, Reduction
 from designer.spice import opamp_model
@@ -245,9 +244,9 @@ def options(settings: SolverSettings) -> str:
 
 
 def voltages(circuit: Circuit, *, stage: bool = True) -> str:
-    """What a run shows: the states, the nonlinear stage's output (``stage``), the generator."""
-    shown = [OUTPUT] if circuit.stops and stage else []
-    return " ".join(f"v({net})" for net in (*circuit.state_nets, *shown, circuit.generator.net))
+    """What a run shows: the states, each dead-zone stage's output (``stage``), the generator."""
+    shown = circuit.outputs if stage else circuit.state_nets
+    return " ".join(f"v({net})" for net in (*shown, circuit.generator.net))
 
 
 def title_line(text: str) -> str:

@@ -18,7 +18,6 @@ from designer.board.board_parts import (
     driven_nodes,
     fault_current,
     fitted,
-    outputs,
     protection_offset,
     trim_reach,
 )
@@ -137,8 +136,8 @@ def test_outputs_are_shown_through_a_resistor_and_summing_nodes_are_not(circuit:
     nodes = {s.inverting for s in circuit.sections}
     shown = {p.net for p in of(board, TestPoint)}  # type: ignore[union-attr]
     assert not shown & nodes
-    assert shown == {f"{net}_out" for net in outputs(circuit)} | {GROUND}
-    for net in outputs(circuit):
+    assert shown == {f"{net}_out" for net in circuit.outputs} | {GROUND}
+    for net in circuit.outputs:
         references = {reference for reference, _ in nets[f"{net}_out"]}
         assert len([r for r in references if r.startswith("R")]) == 1
         assert "J3" in references
