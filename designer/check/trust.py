@@ -121,7 +121,7 @@ def of_orbit(flow: Flow, orbit: Orbit) -> Trust:
         return Trust(rounding, magnification, error, doubts=doubts, answered=answered)
     open_by = MARGIN * float(np.ptp([_radius(lap) for lap in laps]))
     if orbit.status is OrbitStatus.PERIODIC:
-        doubts += _doubts_of_orbit(orbit, error, open_by, float(peak[_moving(flow)]))
+        doubts += _doubts_of_orbit(orbit, error, open_by, float(peak[flow.system.moving]))
     return Trust(rounding, magnification, error, open_by, doubts, orbit.status in ANSWERS)
 
 
@@ -133,10 +133,6 @@ def of_gate(gate: GateResult) -> Trust:
 
 
 # ---------------------------------------------------------------------------------------------
-
-
-def _moving(flow: Flow) -> int:
-    return flow.system.displacement[0] if flow.system.displacement else 0
 
 
 def _peak(flow: Flow, orbit: Orbit) -> Array:

@@ -284,6 +284,5 @@ def _reduced(boards: Boards, jobs: int) -> tuple[kernel_mode_tables.Modes | None
 
 def displacement(flow: Flow, orbit: Orbit) -> Array:
     """(n · POINTS,) the first moving state over the n periods of an orbit."""
-    j = flow.system.displacement[0] if flow.system.displacement else 0
     run = flow.run(orbit.start, orbit.n, mode=orbit.mode or None, points=kernel.POINTS)
-    return np.asarray(run.strobes[:-1, j])
+    return np.asarray(run.strobes[:-1, flow.system.moving])

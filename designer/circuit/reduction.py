@@ -18,7 +18,13 @@ from designer.base.arrays import Array
 from designer.circuit.netlist import Board, Circuit, Stop
 from designer.circuit.nodal import NodalEquations, Solution
 from designer.circuit.working_modes import working_keys
-from designer.dynamics.piecewise_linear import Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import (
+    Guard,
+    Mode,
+    ModeKey,
+    PiecewiseLinearSystem,
+    motion_of_states,
+)
 
 
 class FloatingCircuit(ArithmeticError):
@@ -58,12 +64,15 @@ class Reduction:
         A mode's key has one entry per op-amp section in the circuit's order, then one per diode.
         """
         c = self.circuit
+        moving = (c.states.index(s.state) for s in c.stops)
+        displacement, velocity = motion_of_states(len(c.states), moving)
         return PiecewiseLinearSystem(
             states=c.states,
             build=self._mode,
             start=c.rest,
             clearances=tuple(s.clearance for s in c.stops),
-            displacement=tuple(c.states.index(s.state) for s in c.stops),
+            displacement=displacement,
+            velocity=velocity,
             mirror=-np.eye(len(c.states)) if self._even() else None,
             working=working_keys(c),
         )

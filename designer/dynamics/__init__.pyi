@@ -80,6 +80,7 @@ from .piecewise_linear import (
     Mode as Mode,
     ModeKey as ModeKey,
     PiecewiseLinearSystem as PiecewiseLinearSystem,
+    motion_of_states as motion_of_states,
 )
 from .steady_state import (
     Course as Course,

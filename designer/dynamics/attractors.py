@@ -178,7 +178,6 @@ def describe(
     run = flow.run(x, laps * n, mode=mode, measure=True)
     if run.status is not FlowStatus.DONE:
         return Orbit(OrbitStatus.NOT_SETTLED, reason=f"while classifying period {n}: {run.status}")
-    j = flow.system.displacement[0] if flow.system.displacement else 0
     peak = np.abs(run.extremes).max(axis=1)
     drift = np.abs(run.strobes - np.tile(run.strobes[:n], (laps + 1, 1))[: laps * n + 1])
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
@@ -187,12 +186,12 @@ def describe(
     first, *more = [(round(upper), round(lower)) for lower, upper in met] or [(0, 0)]
     once = run.impacts.time < n * flow.drive.period
     status = OrbitStatus.PERIODIC
-    floor = ENGINE_ERROR * peak[j]
+    floors = ENGINE_ERROR * np.abs(run.spans).max(axis=1)
     if (drift > STROBE_TOLERANCE * peak).any():
         status = OrbitStatus.NOT_SETTLED
     elif run.clipped_time > 0.0:
         status = OrbitStatus.CLIPPED
-    elif min(run.penetration, run.miss) < floor or run.tangencies:
+    elif (run.graze.min(axis=1) < floors).any() or run.tangencies:
         status = OrbitStatus.GRAZING
     span = n * flow.drive.period
     radius = float(np.abs(multipliers).max())
@@ -206,7 +205,7 @@ def describe(
         mode=flow.system.mode_at(x, flow.drive.offset, mode),
         extremes=run.extremes,
         impact_times=run.impacts.time[once],
-        impact_velocities=run.impacts.state[once, j + 1] if len(peak) > j + 1 else np.zeros(0),
+        impact_velocities=run.impacts.velocity[once],
         impact_sides=run.impacts.side[once].astype(float),
         impact_clearances=run.impacts.clearance[once],
         asymmetry=asymmetry(flow, x, n, peak),
@@ -219,14 +218,16 @@ def describe(
 
 
 def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> float:
-    """max over t of |x(t + nT/2) + x(t)| relative to each state's peak; nan for even n, and where
-    the flow does not come to an end."""
+    """max over t of |x(t + nT/2) - mirror x(t)| relative to each state's peak, with the mirror -1
+    where the system has none; nan for even n, and where the flow does not come to an end."""
     run = flow.run(x, n, points=points) if n % 2 else None
     if run is None or run.status is not FlowStatus.DONE:
         return float("nan")
     trace = run.strobes[:-1]
     half = n * points // 2
-    return float((np.abs(np.roll(trace, -half, axis=0) + trace).max(axis=0) / peak).max())
+    mirror = flow.system.mirror
+    image = -trace if mirror is None else trace @ mirror.T
+    return float((np.abs(np.roll(trace, -half, axis=0) - image).max(axis=0) / peak).max())
 
 
 def lyapunov(

@@ -31,7 +31,7 @@ from designer.dynamics import (
     working_modes,
 )
 from designer.dynamics.kernel_four_state import RunTrail
-from designer.dynamics.kernel_general import Log
+from designer.dynamics.kernel_general import Log, ModeTables
 from designer.dynamics.kernel_modal import ModalTables
 from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
@@ -67,6 +67,8 @@ class Impacts:
     """(k,) ints, index of the clearance."""
     side: Index
     """(k,) ints, 1 at the upper and -1 at the lower stop."""
+    velocity: Array
+    """(k,) velocities in the clearance at the entries."""
     state: Array
     """(k, n) states at the entries."""
 
@@ -89,14 +91,25 @@ class FlowResult:
     """Entries into contact, where they were measured."""
     extremes: Array
     """(n, 2) least and greatest value of each state, where they were measured."""
-    penetration: float
-    """The smallest of all contacts' greatest penetrations."""
-    miss: float
-    """The nearest approach to a stop without contact; inf where there is none."""
+    spans: Array
+    """(clearances, 2) least and greatest displacement in each clearance, where measured."""
+    graze: Array
+    """(clearances, 2) the smallest of all contacts' greatest penetrations, and the nearest approach
+    to a stop without contact; inf where there is none."""
     tangencies: int
     """Undecided tangencies to a stop."""
     clipped_time: float
     """Time spent in modes where an element that ought to be linear is at its limit."""
+
+    @property
+    def penetration(self) -> float:
+        """The smallest of all contacts' greatest penetrations."""
+        return float(self.graze[:, 0].min(initial=np.inf))
+
+    @property
+    def miss(self) -> float:
+        """The nearest approach to a stop without contact; inf where there is none."""
+        return float(self.graze[:, 1].min(initial=np.inf))
 
 
 class Flow:
@@ -112,7 +125,9 @@ class Flow:
         self._working = working_modes.tables(system, drive) if fast else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
-        self._tables = mode_tables.empty_tables(4, 2, system.size + 3, len(system.clearances))
+        alone = zip(system.displacement, system.state_in, strict=True)
+        self._watched = [row for row, state in alone if state is None]
+        self._tables = self._room(4, 2)
         self._budget: Budget | None = None
 
     @contextmanager
@@ -168,7 +183,8 @@ class Flow:
         key = self.system.mode_at(x, self.drive.offset, mode)
         stretches = periods * points if stretches is None else stretches
         phi = np.zeros((0, 0)) if tangent is None else np.array(tangent, dtype=float, order="C")
-        if self._modal is not None and points == 1 and not measure and stretches == periods:
+        plain = points == 1 and not measure and stretches == periods
+        if self._modal is not None and plain and (self.system.continuous or not phi.size):
             return self._run_modal(self._modal, x, periods, key, phi, max_events)
         room = 8 + 16 * periods if measure else 0
         if self._working is not None and key in self.system.working:
@@ -222,6 +238,7 @@ class Flow:
                 max_events,
                 min(int(cursor[0]) + CHUNK * points, stretches),
                 measure,
+                not self.system.continuous,
                 log,
             )
             budget.take(given - float(clock[2]))
@@ -236,7 +253,7 @@ class Flow:
             return self._run_general(
                 x, stretches, points, key, before, max_events, met, measure=True
             )
-        return _result(code, log, int(cursor[0]), met, self._keys[int(cursor[1])], phi)
+        return self._result(code, log, int(cursor[0]), met, self._keys[int(cursor[1])], phi)
 
     def _run_modal(
         self,
@@ -259,7 +276,7 @@ class Flow:
             )
 
         code, done = self._in_chunks(advance, log, cursor, self._chunk(), 1)
-        return _result(code, log, done, 0, keys[int(cursor[0])], phi)
+        return self._result(code, log, done, 0, keys[int(cursor[0])], phi)
 
     def _run_working(
         self,
@@ -278,7 +295,8 @@ class Flow:
         keys = self.system.working
         cursor = np.array([keys.index(key), 0, measure], dtype=np.int64)
         log, met = self._log(x, stretches, room), np.zeros(1, dtype=np.int64)
-        trail = RunTrail(log.extremes, log.graze, log.when, log.at, log.stop[:, 1].copy(), met)
+        graze = np.array([np.inf, np.inf, 0.0])
+        trail = RunTrail(log.extremes, graze, log.when, log.at, log.stop[:, 1].copy(), met)
         anchor = working_modes.anchors(points)
         drive = np.array([self.drive.omega, self.drive.period, max_events])
 
@@ -298,9 +316,9 @@ class Flow:
                 tables, x, stretches, points, key, before, max_events, int(met[0]), measure=True
             )
         log.stop[:, 1] = trail.stop
-        if not measure:
-            log.graze[[0, 2]] = np.inf, 0.0
-        return _result(code, log, done, int(met[0]), keys[int(cursor[0])], phi)
+        if measure:
+            log.graze[0], log.tangencies[0] = graze[:2], graze[2]
+        return self._result(code, log, done, int(met[0]), keys[int(cursor[0])], phi)
 
     def _log(self, x: Array, stretches: int, room: int) -> Log:
         """Room for what a run writes; the fast paths write a part of it."""
@@ -311,8 +329,9 @@ class Flow:
             when=np.empty(room),
             at=np.empty((room, n)),
             stop=np.zeros((room, 2), dtype=np.int64),
-            extremes=np.tile([np.inf, -np.inf], (n, 1)),
-            graze=np.array([np.inf, np.inf, 0.0]),
+            extremes=np.tile([np.inf, -np.inf], (n + len(self._watched), 1)),
+            graze=np.full((c, 2), np.inf),
+            tangencies=np.zeros(1, dtype=np.int64),
             clipped=np.zeros(1),
         )
         log.strobes[0] = x
@@ -350,6 +369,38 @@ class Flow:
         a_period = FAST_PERIOD + FAST_STEP * self.steps_a_period
         budget.take(len(counts) / points * a_period + FAST_IMPACT * float(counts.sum()))
 
+    def _result(
+        self, code: int, log: Log, done: int, met: int, mode: ModeKey, phi: Array
+    ) -> FlowResult:
+        """done : stretches; met : impacts in the log; phi : tangent vectors, (0, 0) for none."""
+        return FlowResult(
+            status=_STATUS[code],
+            strobes=log.strobes[: done + 1],
+            counts=log.impacts[:done],
+            mode=mode,
+            tangent=phi if phi.size else None,
+            impacts=self._impacts(log, met),
+            extremes=log.extremes[: self.system.size],
+            spans=self._spans(log.extremes),
+            graze=log.graze,
+            tangencies=int(log.tangencies[0]),
+            clipped_time=float(log.clipped[0]),
+        )
+
+    def _impacts(self, log: Log, met: int) -> Impacts:
+        """The impacts in the log, with their velocities."""
+        when, at, stop = log.when[:met], log.at[:met], log.stop[:met]
+        swing = self.drive.amplitude * self.drive.omega
+        rates = np.column_stack([at, swing * np.cos(self.drive.omega * when)])
+        rows = np.array(self.system.velocity)[stop[:, 0]] if met else np.zeros(rates.shape)
+        return Impacts(when, stop[:, 0], stop[:, 1], (rates * rows).sum(axis=1), at)
+
+    def _spans(self, extremes: Array) -> Array:
+        """(clearances, 2) extremes of the displacements among what was watched."""
+        further = iter(range(self.system.size, len(extremes)))
+        rows = [next(further) if j is None else j for j in self.system.state_in]
+        return extremes[rows] if rows else np.zeros((0, 2))
+
     def _number(self, key: ModeKey) -> int:
         """Index of the mode in the tables, which are filled on its first use."""
         known = self._index.get(key)
@@ -357,24 +408,24 @@ class Flow:
             return known
         number = len(self._keys)
         mode = self.system.mode(key)
-        rows, width, guards = len(self._tables.step), self.system.size + 3, len(mode.guards)
+        rows, guards = len(self._tables.step), len(mode.guards)
         if number >= rows or guards > self._tables.guard.shape[1]:
-            room = mode_tables.empty_tables(
-                max(rows, 2 * (number + 1)),
-                max(guards, self._tables.guard.shape[1]),
-                width,
-                len(self.system.clearances),
-            )
+            room = self._room(max(rows, 2 * (number + 1)), max(guards, self._tables.guard.shape[1]))
             for new, old in zip(room, self._tables, strict=True):
                 new[tuple(slice(0, s) for s in old.shape)] = old
             self._tables = room
         touched = [
             self.system.contact_rows(j)[side] if side else None for j, side in enumerate(mode.sides)
         ]
-        mode_tables.fill(self._tables, number, mode, touched, self.drive)
+        mode_tables.fill(self._tables, number, mode, touched, self._watched, self.drive)
         self._index[key] = number
         self._keys.append(key)
         return number
+
+    def _room(self, modes: int, guards: int) -> ModeTables:
+        """Empty tables for so many modes with so many guards each."""
+        clearances, watched = len(self.system.clearances), len(self._watched)
+        return mode_tables.empty_tables(modes, guards, self.system.size + 3, clearances, watched)
 
     def _link(self, number: int, guard: int) -> None:
         """Give a guard its target, building the mode if it is new."""
@@ -396,21 +447,3 @@ _STATUS = {
     kernel_orbit.DIVERGED: FlowStatus.DIVERGED,
     kernel_orbit.PAUSED: FlowStatus.TOO_LONG,
 }
-
-
-def _result(code: int, log: Log, done: int, met: int, mode: ModeKey, phi: Array) -> FlowResult:
-    """done : stretches; met : impacts in the log; phi : tangent vectors, (0, 0) for none."""
-    impacts = Impacts(log.when[:met], log.stop[:met, 0], log.stop[:met, 1], log.at[:met])
-    return FlowResult(
-        status=_STATUS[code],
-        strobes=log.strobes[: done + 1],
-        counts=log.impacts[:done],
-        mode=mode,
-        tangent=phi if phi.size else None,
-        impacts=impacts,
-        extremes=log.extremes,
-        penetration=float(log.graze[0]),
-        miss=float(log.graze[1]),
-        tangencies=int(log.graze[2]),
-        clipped_time=float(log.clipped[0]),
-    )

@@ -32,7 +32,7 @@ CHANGE, TANGENT = 20.0, 4.0
 """What a change of mode, and a step that carries tangent vectors, cost, in plain steps."""
 FINEST = 1e-10
 TANGENCY = 1e-13
-"""Of a guard's unit: below it a value is not told from zero."""
+"""Of the sum of a guard's terms' magnitudes: below it a value is not told from zero."""
 
 
 class ModeTables(NamedTuple):
@@ -56,6 +56,8 @@ class ModeTables(NamedTuple):
     """(m, g) clearance whose contact begins or ends at a guard, or -1."""
     depth: Float
     """(m, c, ORDER + 1, N) Taylor rows of the displacement past the stop that is touched."""
+    watched: Float
+    """(m, r, ORDER + 1, N) Taylor rows of those displacements in a clearance that are no state."""
     side: Int
     """(m, c) side of each clearance: -1 lower stop, 0 open, 1 upper stop."""
     clipped: Int
@@ -76,9 +78,11 @@ class Log(NamedTuple):
     stop: Int
     """(capacity, 2) clearance and side of each impact."""
     extremes: Float
-    """(n, 2) least and greatest value of each state."""
+    """(n + r, 2) least and greatest value of each state, then of each watched displacement."""
     graze: Float
-    """(3,) smallest penetration, nearest miss, undecided tangencies."""
+    """(c, 2) smallest penetration and nearest miss in each clearance."""
+    tangencies: Int
+    """(1,) undecided tangencies."""
     clipped: Float
     """(1,) time spent clipped."""
 
@@ -132,8 +136,11 @@ def _root(c: Float, a: float, b: float) -> float:
 
 
 @callee
-def _first_rise(c: Float, end: float, graze: Float) -> float:
-    """First s in [0, end] where p goes from negative to positive; -1.0 if there is none."""
+def _first_rise(c: Float, end: float, rounding: float, tangencies: Int) -> float:
+    """First s in [0, end] where p goes from negative to positive; -1.0 if there is none.
+
+    rounding : what cannot be told from zero.
+    """
     bound = _curvature_bound(c, end)
     left = np.empty(80)
     right = np.empty(80)
@@ -153,9 +160,9 @@ def _first_rise(c: Float, end: float, graze: Float) -> float:
         if d + bound * r < 0.0:
             continue
         # A guard that is nothing but rounding over an interval is not cut to its last pieces.
-        if r < FINEST or abs(p) + abs(d) * r + 0.5 * bound * r * r < TANGENCY:
-            if abs(p) < TANGENCY:
-                graze[2] += 1.0
+        if r < FINEST or abs(p) + abs(d) * r + 0.5 * bound * r * r <= rounding:
+            if abs(p) <= rounding:
+                tangencies[0] += 1
             continue
         left[top], right[top] = m, b
         left[top + 1], right[top + 1] = a, m
@@ -236,6 +243,33 @@ def _tangent(taylor: Float, propagator: Float, n: int, s: float, phi: Float, wor
 
 
 @callee
+def _jump(
+    tables: ModeTables, mode: int, other: int, guard: int, z: Float, n: int, phi: Float
+) -> None:
+    """phi ← (I + (f₊ - f₋) Cᵀ/g') phi where the guard g = C x + … is crossed at z.
+
+    The saltation matrix: f₋ and f₊ are the vector fields before and after, g' = C f₋ + D u' is the
+    guard's rate (Aizerman and Gantmakher, Quart. J. Mech. Appl. Math. 11, 1958).
+    """
+    row, rate = tables.guard[mode, guard], 0.0
+    for j in range(z.shape[0]):
+        rate += row[1, j] * z[j] / tables.step[mode]
+    if rate == 0.0:
+        return
+    leap = np.zeros(n)
+    for i in range(n):
+        for j in range(z.shape[0]):
+            leap[i] += tables.taylor[other, 1, i, j] * z[j] / tables.step[other]
+            leap[i] -= tables.taylor[mode, 1, i, j] * z[j] / tables.step[mode]
+    for k in range(phi.shape[1]):
+        along = 0.0
+        for j in range(n):
+            along += row[0, j] * phi[j, k]
+        for i in range(n):
+            phi[i, k] += leap[i] * along / rate
+
+
+@callee
 def _series(rows: Float, z: Float, c: Float) -> None:
     """c ← Taylor coefficients of a guard or a depth from its rows (ORDER + 1, N)."""
     for k in range(c.shape[0]):
@@ -249,15 +283,12 @@ def _series(rows: Float, z: Float, c: Float) -> None:
 def _measure(
     tables: ModeTables, mode: int, z: Float, n: int, end: float, depth: Float, log: Log
 ) -> None:
-    """Extremes of the states and of the distances to the stops within one step."""
+    """Extremes of the states, of the displacements and of the distances to the stops in a step."""
     c = np.empty(tables.taylor.shape[1])
     found = np.empty(16)
-    for i in range(n):
-        for k in range(c.shape[0]):
-            total = 0.0
-            for j in range(z.shape[0]):
-                total += tables.taylor[mode, k, i, j] * z[j]
-            c[k] = total
+    for i in range(log.extremes.shape[0]):
+        rows = tables.taylor[mode, :, i] if i < n else tables.watched[mode, i - n]
+        _series(rows, z, c)
         count = _stationary(c, end, found)
         for q in range(count + 2):
             v = c[0] if q == count else _value(c, end if q > count else found[q])
@@ -281,7 +312,7 @@ def _measure(
             v = _value(c, found[q])
             falls = _slope(c, min(found[q] + 1e-6, end)) <= 0.0
             if v < 0.0 and falls and 0.0 < found[q] < end:
-                log.graze[1] = min(log.graze[1], -v)
+                log.graze[j, 1] = min(log.graze[j, 1], -v)
 
 
 @compiled
@@ -297,6 +328,7 @@ def advance(
     max_events: int,
     until: int,
     measure: bool,
+    jumps: bool,
     log: Log,
 ) -> int:
     """Carry z to strobe number ``until`` of ``log``; resumable.
@@ -306,7 +338,8 @@ def advance(
     cursor : (4,) stretch index, mode index, events in this stretch and, on UNKNOWN_MODE, the guard
     whose target is missing. anchor : (stretches a period, 2) the drive's exact sine and cosine at
     the start of each stretch, so that its phase does not drift. phi : (n, k) tangent vectors,
-    (0, 0) for none. depth : (c,) deepest penetration of the running contact.
+    (0, 0) for none. depth : (c,) deepest penetration of the running contact. jumps : whether the
+    vector field differs on the two sides of a boundary.
     """
     size = z.shape[0]
     n = size - 3
@@ -332,15 +365,17 @@ def advance(
             _partial(tables.taylor[mode], z, end, z1)
         first, through = end, -1
         for g in range(tables.guards[mode]):
-            g0, g1, swing = 0.0, 0.0, 0.0
+            g0, g1, swing, terms = 0.0, 0.0, 0.0, 0.0
             for j in range(size):
-                g0 += tables.guard[mode, g, 0, j] * z[j]
+                term = tables.guard[mode, g, 0, j] * z[j]
+                g0 += term
+                terms += abs(term)
                 g1 += tables.guard[mode, g, 0, j] * z1[j]
                 swing += tables.chord[mode, g, j] * abs(z[j])
             if max(g0, g1) + swing < 0.0:
                 continue
             _series(tables.guard[mode, g], z, c)
-            s = _first_rise(c, first, log.graze)
+            s = _first_rise(c, first, TANGENCY * terms, log.tangencies)
             if s >= 0.0 and (s < first or through < 0):
                 first, through = s, g
         if through >= 0:
@@ -368,12 +403,14 @@ def advance(
         if through >= 0:
             clock[0] += first * h
             other = tables.target[mode, through]
+            if jumps and phi.shape[0] > 0:
+                _jump(tables, mode, other, through, z, n, phi)
             for j in range(tables.side.shape[1]):
                 before, after = tables.side[mode, j], tables.side[other, j]
                 if after == before:
                     continue
                 if before != 0:
-                    log.graze[0] = min(log.graze[0], depth[j])
+                    log.graze[j, 0] = min(log.graze[j, 0], depth[j])
                 depth[j] = 0.0
                 if after == 0:
                     continue

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.linalg import matrix_balance
 
@@ -25,8 +27,9 @@ def augmented(mode: Mode, drive: Drive) -> Array:
     return M
 
 
-def _augmented_row(C: Array, D: float, e: float, drive: Drive) -> Array:
-    """C·x + D·u + e as a row over (x, sin, cos, 1)."""
+def _augmented_row(row: Array, drive: Drive) -> Array:
+    """A row over (x, u, 1) as one over (x, sin, cos, 1)."""
+    C, D, e = row[:-2], row[-2], row[-1]
     return np.concatenate([C, [D * drive.amplitude, 0.0, e + D * drive.offset]])
 
 
@@ -37,11 +40,17 @@ def step_length(A: Array, omega: float) -> float:
 
 
 def fill(
-    tables: kernel.ModeTables, i: int, mode: Mode, touched: list[Array | None], drive: Drive
+    tables: kernel.ModeTables,
+    i: int,
+    mode: Mode,
+    touched: Sequence[Array | None],
+    watched: Sequence[Array],
+    drive: Drive,
 ) -> None:
     """Write the tables of mode number i.
 
     touched : for each clearance the row of the displacement past the stop in contact.
+    watched : rows of displacements that are no state.
     """
     M = augmented(mode, drive)
     h = step_length(mode.A, drive.omega)
@@ -56,9 +65,11 @@ def fill(
     tables.clipped[i] = mode.clipped
     for j, past in enumerate(touched):
         if past is not None:
-            tables.depth[i, j] = _augmented_row(past[:-2], past[-2], past[-1], drive) @ powers
+            tables.depth[i, j] = _augmented_row(past, drive) @ powers
+    for r, row in enumerate(watched):
+        tables.watched[i, r] = _augmented_row(row, drive) @ powers
     for g, guard in enumerate(mode.guards):
-        taylor = _augmented_row(guard.C, guard.D, guard.e, drive) @ powers
+        taylor = _augmented_row(np.concatenate([guard.C, [guard.D, guard.e]]), drive) @ powers
         tables.guard[i, g] = taylor
         # Entrywise |C M² exp(M t)| h²/8 over the step: k (k - 1) |c_k|, plus the cut-off tail.
         weights = np.array([k * (k - 1) for k in range(kernel.ORDER + 1)]) / 8.0
@@ -67,7 +78,9 @@ def fill(
         tables.clearance[i, g] = guard.clearance
 
 
-def empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel.ModeTables:
+def empty_tables(
+    modes: int, guards: int, width: int, clearances: int, watched: int
+) -> kernel.ModeTables:
     """Room for so many modes with so many guards each."""
     order = kernel.ORDER + 1
     return kernel.ModeTables(
@@ -80,6 +93,7 @@ def empty_tables(modes: int, guards: int, width: int, clearances: int) -> kernel
         target=np.full((modes, guards), -1, dtype=np.int64),
         clearance=np.full((modes, guards), -1, dtype=np.int64),
         depth=np.zeros((modes, clearances, order, width)),
+        watched=np.zeros((modes, watched, order, width)),
         side=np.zeros((modes, clearances), dtype=np.int64),
         clipped=np.zeros(modes, dtype=np.int64),
     )

@@ -75,21 +75,22 @@ class Orbit(Motion):
     impact_times: Array = field(default_factory=lambda: np.zeros(0))
     """(k,) times of the impacts over n periods, in order."""
     impact_velocities: Array = field(default_factory=lambda: np.zeros(0))
-    """(k,) velocity of the moving state at entry into contact."""
+    """(k,) velocity in the clearance at entry into contact."""
     impact_sides: Array = field(default_factory=lambda: np.zeros(0))
     """(k,) side of each impact: 1 upper, -1 lower."""
     impact_clearances: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(k,) index of the clearance of each impact."""
     asymmetry: float = float("nan")
-    """Max |x(t + nT/2) + x(t)| over the peak of each state, worst state (n odd; else nan)."""
+    """Max |x(t + nT/2) - x*(t)| over the peak of each state, worst state (n odd; else nan), with x*
+    the mirror image of x: -x but for a system with another mirror."""
     multipliers: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
     """(states,) Floquet multipliers, complex; empty where the engine has none."""
     lyapunov: float = float("nan")
     """Largest exponent per unit of the system's time (nan where unknown)."""
     penetration: float = float("inf")
-    """Smallest penetration of all contacts, in units of the moving state."""
+    """Smallest penetration of all contacts, in units of displacement."""
     miss: float = float("inf")
-    """Nearest approach to a stop without contact, in units of the moving state."""
+    """Nearest approach to a stop without contact, in units of displacement."""
     reason: str = ""
     """Why, where the status is failed, not settled or diverged."""
     periods: int = 0
@@ -99,7 +100,7 @@ class Orbit(Motion):
 
     @property
     def symmetric(self) -> bool | None:
-        """Whether the orbit maps to itself under x → -x, half a period later; None if unknown."""
+        """Whether the orbit is its own mirror image, half a period later; None if unknown."""
         if self.status is not OrbitStatus.PERIODIC:
             return None
         if self.n % 2 == 0:

@@ -10,13 +10,14 @@ integers, one per switching element (a stop pair: -1 lower, 0 open, 1 upper; an 
 lower limit, 0 linear, 1 at its upper limit; a diode: 1 while it conducts, else 0). Modes are built
 when first entered and kept, never enumerated.
 
-The vector field is continuous across every boundary (springs and limiters are), so a crossing
-changes the mode and nothing else: the saltation matrix is the identity.
+The state is continuous across every boundary. So is the vector field of springs and limiters: a
+crossing then changes the mode and nothing else. Dampers that act in contact only make the vector
+field jump (``PiecewiseLinearSystem.continuous``), and tangent vectors with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -108,10 +109,14 @@ class PiecewiseLinearSystem:
     """Key of the mode that holds near x = 0."""
     clearances: tuple[str, ...]
     """Names of the clearances, in the order of ``Mode.sides``."""
-    displacement: tuple[int, ...]
-    """Index of the state that moves in each clearance."""
+    displacement: tuple[Array, ...]
+    """For each clearance the displacement in it: a row (n + 2,) over (states, drive, 1)."""
+    velocity: tuple[Array, ...]
+    """For each clearance the velocity in it: a row (n + 1,) over (states, the drive's rate)."""
     mirror: Array | None = None
     """(n, n) M with x → M x, u → -u a symmetry of the system, or None."""
+    continuous: bool = True
+    """Whether the vector field is the same on both sides of every boundary."""
     working: tuple[ModeKey, ...] = ()
     """Keys of the modes that a board as it should be moves between, ``start`` first; the fast path
     of circuits tabulates them."""
@@ -120,6 +125,21 @@ class PiecewiseLinearSystem:
     @property
     def size(self) -> int:
         return len(self.states)
+
+    @property
+    def state_in(self) -> tuple[int | None, ...]:
+        """For each clearance the index of the state that its displacement is; None for others."""
+        found = []
+        for row in self.displacement:
+            places = np.flatnonzero(row)
+            alone = len(places) == 1 and places[0] < self.size and row[places[0]] == 1.0
+            found.append(int(places[0]) if alone else None)
+        return tuple(found)
+
+    @property
+    def moving(self) -> int:
+        """Index of the state that moves most in the first clearance; 0 where there is none."""
+        return int(np.argmax(np.abs(self.displacement[0][:-2]))) if self.displacement else 0
 
     def mode(self, key: ModeKey) -> Mode:
         """The mode of this key, built on its first use."""
@@ -175,6 +195,18 @@ class PiecewiseLinearSystem:
     def built(self) -> int:
         """How many modes have been built so far."""
         return len(self._modes)
+
+
+def motion_of_states(
+    size: int, moving: Iterable[int]
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """``displacement`` and ``velocity`` where each displacement is a state, the next its velocity.
+
+    size : n. moving : index of the displacement in each clearance.
+    """
+    indices = tuple(moving)
+    displacement = tuple(np.eye(1, size + 2, j)[0] for j in indices)
+    return displacement, tuple(np.eye(1, size + 1, j + 1)[0] for j in indices)
 
 
 def _size(guard: Guard, x: Array, u: float) -> float:

@@ -80,9 +80,9 @@ class Steady(Motion):
     end: Array
     """(states,) strobe at the end of what is shown."""
     minima: Array
-    """(keep,) least first displacement in each period kept."""
+    """(keep,) least displacement in the first clearance in each period kept."""
     velocities: Array
-    """(k,) first velocity where contact with the upper stop begins, in those periods."""
+    """(k,) velocity where contact with its upper stop begins, in those periods."""
     periods: int
     """Drive periods that were run in all."""
     more: Pairs = ()
@@ -127,15 +127,14 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
     if course.tangents:
         exponent, state, _ = lyapunov(flow, state, None, course.tangents)
     strobes, minima, velocities = [state], [], []
-    j = flow.system.displacement[0] if flow.system.displacement else 0
     for _ in range(course.keep):
         run = flow.run(strobes[-1], 1, measure=True)
         if run.status is not FlowStatus.DONE:
             return _stopped(run.status, strobes[-1], spent)
         strobes.append(run.strobes[-1])
-        minima.append(float(run.extremes[j, 0]))
-        upper = run.impacts.side > 0
-        velocities += [float(v) for v in run.impacts.state[upper, j + 1]] if upper.any() else []
+        minima.append(float((run.spans if len(run.spans) else run.extremes)[0, 0]))
+        upper = (run.impacts.side > 0) & (run.impacts.clearance == 0)
+        velocities += run.impacts.velocity[upper].tolist()
     end = strobes[-1]
     n = p = q = 0
     more: Pairs = ()

@@ -214,8 +214,10 @@ class SecondOrderSystem:
             build=build,
             start=(0,) * len(contacts),
             clearances=tuple(stop.name for stop in self.clearances),
-            displacement=tuple(2 * stop.mass for stop in self.clearances),
+            displacement=tuple(np.append(c.row, [c.on_drive, 0.0]) for c in contacts),
+            velocity=tuple(np.append(c.rate, c.on_drive) for c in contacts),
             mirror=-np.eye(2 * n) if even and not self.constant.any() else None,
+            continuous=not any(stop.damping for stop in self.clearances),
         )
 
 

@@ -200,7 +200,7 @@ def job(
         upper=upper,
         lower=lower,
         generator=subject.circuit.generator.net,
-        moving=subject.system.displacement[0] if subject.system.displacement else 0,
+        moving=subject.system.moving,
         keep=keep,
         brief=subject.brief and not subject.orbit.n,
     )

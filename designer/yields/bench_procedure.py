@@ -92,7 +92,7 @@ class _Person:
         rng: np.random.Generator,
     ) -> None:
         self.system, self.question, self.bands, self.rng = system, question, bands, rng
-        self.moving = system.displacement[0] if system.displacement else 0
+        self.moving = system.moving
         peak = float(np.abs(question.start.extremes[self.moving]).max())
         self.step = SCREEN * peak / 2**BITS
         self.stops = _stops(system)
@@ -188,9 +188,8 @@ def _stops(system: PiecewiseLinearSystem) -> dict[int, float]:
     """The first displacement [V] at which fv leaves zero, by side: 1 upper, -1 lower."""
     if not system.clearances:
         return {}
-    moving = system.displacement[0]
     rows = system.contact_rows(0)
-    return {side: -float(row[-1] / row[moving]) for side, row in rows.items()}
+    return {side: -float(row[-1] / row[system.moving]) for side, row in rows.items()}
 
 
 def _snake(offset: float, bands: Bands) -> Iterator[Adjustment]:

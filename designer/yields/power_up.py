@@ -71,17 +71,15 @@ class PowerUpEnd(NamedTuple):
 
 def with_generator(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseLinearSystem:
     """The system with the generator's sine and cosine as its last two states."""
-    n = system.size
+    n, swing = system.size, drive.amplitude
 
     def build(key: ModeKey) -> Mode:
         mode = system.mode(key)
         A = np.zeros((n + 2, n + 2))
         A[:n, :n] = mode.A
-        A[:n, n] = drive.amplitude * mode.B
+        A[:n, n] = swing * mode.B
         A[n, n + 1], A[n + 1, n] = drive.omega, -drive.omega
-        guards = tuple(
-            replace(g, C=np.concatenate([g.C, [g.D * drive.amplitude, 0.0]])) for g in mode.guards
-        )
+        guards = tuple(replace(g, C=np.concatenate([g.C, [g.D * swing, 0.0]])) for g in mode.guards)
         B, d = (np.concatenate([vector, np.zeros(2)]) for vector in (mode.B, mode.d))
         return replace(mode, A=A, B=B, d=d, guards=guards)
 
@@ -90,7 +88,9 @@ def with_generator(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseLine
         build=build,
         start=system.start,
         clearances=system.clearances,
-        displacement=system.displacement,
+        displacement=tuple(np.insert(r, n, [swing * r[n], 0.0]) for r in system.displacement),
+        velocity=tuple(np.insert(r, n, [0.0, swing * drive.omega * r[n]]) for r in system.velocity),
+        continuous=system.continuous,
     )
 
 

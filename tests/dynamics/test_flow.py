@@ -301,7 +301,7 @@ def random_limiter(rng: np.random.Generator, n: int) -> PiecewiseLinearSystem:
         back = Guard(-position * c, -position * D, position * (limit - e), (0,))
         return Mode(A, B, d + w * limit, (back,), ())
 
-    return PiecewiseLinearSystem(tuple(f"x{i}" for i in range(n)), build, (0,), (), (), mirror=None)
+    return PiecewiseLinearSystem(tuple(f"x{i}" for i in range(n)), build, (0,), (), (), ())
 
 
 @settings(max_examples=15)

@@ -31,7 +31,7 @@ def complementarity(M: Array, q: Array, weight: float = 1.0) -> PiecewiseLinearS
         ]  # fmt: skip
         return Mode(np.zeros((1, 1)), np.zeros(1), np.zeros(1), tuple(guards), ())
 
-    return PiecewiseLinearSystem(("x",), build, (0,) * n, (), ())
+    return PiecewiseLinearSystem(("x",), build, (0,) * n, (), (), ())
 
 
 CYCLING = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 2.0], [2.0, 0.0, 1.0]])

@@ -208,7 +208,7 @@ def test_clearances_on_any_mass() -> None:
         (Clearance.even(1, 8.0, 0.5), Clearance.even(2, 9.0, 0.25, "lower", "B")),
     ).piecewise_linear()
     assert system.states == ("x1", "x1'", "x2", "x2'", "x3", "x3'")
-    assert system.displacement == (2, 4)
+    assert [int(np.argmax(row)) for row in system.displacement] == [2, 4]
     assert system.mirror is None
     assert system.mode_at(np.array([9.0, 0, 0.6, 0, -0.3, 0]), 0.0) == (1, -1)
     assert system.mode_at(np.array([9.0, 0, -0.6, 0, 0.3, 0]), 0.0) == (-1, 0)

@@ -24,6 +24,7 @@ from designer.dynamics.piecewise_linear import (
     Mode,
     ModeKey,
     PiecewiseLinearSystem,
+    motion_of_states,
 )
 
 ZETA, KAPPA, GAP, FORCE = 0.05, 8.0, 0.1, 1.0
@@ -46,7 +47,7 @@ def system() -> PiecewiseLinearSystem:
             sides=(int(touching),),
         )
 
-    return PiecewiseLinearSystem(("x", "x'"), build, (0,), ("stop",), (0,))
+    return PiecewiseLinearSystem(("x", "x'"), build, (0,), ("stop",), *motion_of_states(2, [0]))
 
 
 def lap(omega: float, start: Array, periods: int) -> tuple[Array, Array, int]:
