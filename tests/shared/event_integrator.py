@@ -1,8 +1,8 @@
-"""Masses, springs, dampers and stops, integrated from Newton's law: shares no code with the package.
+"""Masses, springs, dampers and stops, integrated from Newton's law.
 
-Everything is a plain list, in absolute coordinates: a spring or damper joins two masses, or a mass
-and the ground, which moves by base · sin ωt. Between two events the equations are smooth and SciPy's
-DOP853 solves them; at each event it is restarted.
+It shares no code with the package. Everything is a plain list, in absolute coordinates: a spring or
+damper joins two masses, or a mass and the ground, which moves by base · sin ωt. Between two events
+the equations are smooth and SciPy's DOP853 solves them; at each event it is restarted.
 """
 
 from __future__ import annotations
