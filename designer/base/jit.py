@@ -63,6 +63,14 @@ if CACHE is not None:
     numba.config.CACHE_DIR = str(CACHE)
 
 
+def nothing_compiled() -> bool:
+    """Whether there is a folder for compiled code and none in it yet.
+
+    numba makes folders inside as soon as a kernel's module is imported: files decide.
+    """
+    return CACHE is not None and not any(path.is_file() for path in CACHE.rglob("*"))
+
+
 OPTIONS: dict[str, Any] = {
     "nogil": True,
     "fastmath": {"contract", "nsz", "arcp"},

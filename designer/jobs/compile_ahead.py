@@ -32,7 +32,7 @@ CALL = "from designer.jobs.compile_ahead import compile_circuits; compile_circui
 def compiling_ahead(jobs: int) -> Iterator[None]:
     """The other process works, where nothing is compiled yet and there is a core for it; it ends
     with the block at the latest."""
-    if jobs < 2 or jit.CACHE is None or any(jit.CACHE.iterdir()):
+    if jobs < 2 or not jit.nothing_compiled():
         yield
         return
     process = subprocess.Popen(

@@ -45,8 +45,10 @@ def test_a_process_works_beside_a_first_run(
         said.append("start")
         return Process(said)
 
+    folder = tmp_path / "dynamics_0123"  # numba makes it when a kernel's module is imported
+    folder.mkdir()
     for name in files:
-        (tmp_path / name).touch()
+        (folder / name).touch()
     monkeypatch.setattr(jit, "CACHE", tmp_path)
     monkeypatch.setattr(subprocess, "Popen", start)
     with compiling_ahead(jobs):

@@ -3,10 +3,9 @@ Shares no code with the package."""
 
 from __future__ import annotations
 
-import itertools
 import math
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,32 +35,37 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Choices:
-    """index (k, 14) into the sorted resistors, capacitors; error of each; wanted in the order of
-    LINEAR_NAMES."""
+    """index (14, k) into the sorted resistors, capacitors; masks (2, k), a bit for each resistor
+    and each capacitor that a choice uses; error of each; wanted in the order of LINEAR_NAMES."""
 
     resistors: tuple[float, ...]
     capacitors: tuple[float, ...]
     wanted: tuple[float, ...]
     index: NDArray[np.int8]
+    masks: NDArray[np.uint8]
     errors: Array
 
     def values(self, name: str) -> Array:
         where = NAMES.index(name)
         kind = self.resistors if where < 10 else self.capacitors
-        return np.array(kind)[self.index[:, where]]
+        values: Array = np.array(kind)
+        return np.asarray(values[self.index[where]])
 
     def kinds(self, preferred: frozenset[float] = frozenset()) -> NDArray[np.int64]:
         """(k,) distinct values that are not preferred."""
-        total = np.zeros(len(self.index), dtype=np.int64)
-        for kind, places in ((self.resistors, slice(0, 10)), (self.capacitors, slice(10, 14))):
+        total = np.zeros(self.index.shape[1], dtype=np.int64)
+        for kind, mask in zip((self.resistors, self.capacitors), self.masks, strict=True):
             for i, value in enumerate(kind):
                 if value not in preferred:
-                    total += (self.index[:, places] == i).any(axis=1)
+                    total += mask >> i & 1
         return total
 
     def take(self, which: NDArray[np.bool_]) -> Choices:
-        return Choices(
-            self.resistors, self.capacitors, self.wanted, self.index[which], self.errors[which]
+        return replace(
+            self,
+            index=self.index[:, which],
+            masks=self.masks[:, which],
+            errors=self.errors[which],
         )
 
     def keeping(self, kept: Conditions) -> Choices:
@@ -89,6 +93,15 @@ class Choices:
         return self.take(good)
 
 
+@cache
+def places(resistors: int, capacitors: int) -> tuple[NDArray[np.int8], NDArray[np.uint8]]:
+    """The index and the masks of every choice, of so many resistors and capacitors."""
+    counts = (resistors,) * 10 + (capacitors,) * 4
+    index = np.indices(counts, dtype=np.int8).reshape(14, -1)
+    bits = np.left_shift(np.uint8(1), index.view(np.uint8))
+    return index, np.array([np.bitwise_or.reduce(b) for b in (bits[:10], bits[10:])])
+
+
 @lru_cache(maxsize=8)
 def every_choice(
     resistors: tuple[float, ...], capacitors: tuple[float, ...], wanted: tuple[float, ...]
@@ -98,20 +111,17 @@ def every_choice(
     wanted : |coefficient| of each of LINEAR_NAMES, 1 for R1 and R7.
     """
     r, c = tuple(sorted(resistors)), tuple(sorted(capacitors))
-    some = np.array(list(itertools.product(range(len(r)), repeat=10)), dtype=np.int8)
-    index = np.concatenate(
-        [
-            np.column_stack([some, np.tile(np.array(caps, dtype=np.int8), (len(some), 1))])
-            for caps in itertools.product(range(len(c)), repeat=4)
-        ]
+    index, masks = places(len(r), len(c))
+    first = index[:, :: len(c) ** 4], index[:, : len(c) ** 4]  # every resistor; every capacitor
+    ohms, farads = (
+        np.stack([np.take(np.log(kind), some[NAMES.index(name)]) for name in names])
+        for kind, some, names in (
+            (r, first[0], LINEAR_NAMES),
+            (c, first[1], [CAPACITOR[name] for name in LINEAR_NAMES]),
+        )
     )
-    whole = Choices(r, c, wanted, index, np.zeros(len(index)))
-    h = np.stack(
-        [
-            -np.log(whole.values(n)) - np.log(whole.values(CAPACITOR[n])) - math.log(w)
-            for n, w in zip(LINEAR_NAMES, wanted, strict=True)
-        ]
-    )
+    ohms += np.log(wanted)[:, None]
+    errors = np.zeros((ohms.shape[1], farads.shape[1]))
     for y in _VECTORS:
-        np.maximum(whole.errors, np.abs(y @ h), out=whole.errors)
-    return whole
+        np.maximum(errors, np.abs((y @ ohms)[:, None] + y @ farads), out=errors)
+    return Choices(r, c, wanted, index, masks, errors.ravel())

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from designer.base.arrays import Array
 from designer.base.progress import Progress
 from designer.board.bom import bill
 from designer.board.component import components, designator
@@ -19,7 +18,6 @@ from designer.catalog.catalog import load_catalog
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.resistors import effective
-from designer.circuit.scale_fit import minimax
 from designer.jobs.design_source import read_design
 from designer.jobs.options import Options
 from designer.jobs.synthesise_job import synthesise_into
@@ -31,7 +29,7 @@ from designer.model.model_file import parse_model_file
 from designer.synthesis import composites, parts_choice
 from designer.synthesis.composites import Pair, PairProgram, best, pairs_near
 from tests.shared.model_text import dimensionless
-from tests.shared.oracles import Plain, coefficient_error
+from tests.shared.oracles import Plain, coefficient_error, elementary_vectors
 from tests.shared.quick_folders import without_starts
 
 pytestmark = pytest.mark.usefixtures("figures_are_blank")
@@ -72,11 +70,6 @@ def test_of_too_many_pairs_the_window_is_covered_evenly() -> None:
     assert np.diff(logs).max() < 0.01
 
 
-def error_of(program: PairProgram, change: Array) -> float:
-    h = program.h + change
-    return float(np.abs(h + program.D @ minimax(h, program.D)).max())
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_never_worse_than_enumeration(seed: int) -> None:
     """Four errors, one scale, three resistors with every pair of two values, all choices."""
@@ -91,19 +84,19 @@ def test_never_worse_than_enumeration(seed: int) -> None:
         changes[f"R{i}"] = np.outer(slope, np.log([p.value / values[i % 2] for p in table]))
     program = PairProgram(0.01 * rng.standard_normal(4), D, tables, changes, frozenset())
     chosen = best(program, frozenset())
-    options = [
-        [(0, np.zeros(4)), *((1, changes[n][:, k]) for k in range(len(tables[n])))] for n in tables
+    options = [np.column_stack([np.zeros(4), change]).T for change in changes.values()]
+    numbers = list(product(*(range(len(option)) for option in options)))
+    vectors = elementary_vectors(D)
+    # The least error over the scale is the largest of the elementary combinations (duality).
+    errors = [
+        np.abs(vectors @ sum((o[k] for o, k in zip(options, ks, strict=True)), program.h)).max()
+        for ks in numbers
     ]
-    every = [
-        (error_of(program, sum((c for _, c in choice), np.zeros(4))), sum(n for n, _ in choice))
-        for choice in product(*options)
-    ]
-    least = max(min(e for e, _ in every), EXACT)
-    got = sum(
-        (changes[n][:, tables[n].index(pair)] for n, pair in chosen.items()), start=np.zeros(4)
-    )
-    assert error_of(program, got) <= least + 2.0 * EXACT
-    assert len(chosen) == min(n for e, n in every if e <= least + EXACT)
+    pairs = [np.count_nonzero(ks) for ks in numbers]
+    least = max(min(errors), EXACT)
+    own = tuple(1 + tables[n].index(chosen[n]) if n in chosen else 0 for n in tables)
+    assert errors[numbers.index(own)] <= least + 2.0 * EXACT
+    assert len(chosen) == min(n for e, n in zip(errors, pairs, strict=True) if e <= least + EXACT)
 
 
 def test_of_curved_effects_at_most_one_is_used() -> None:

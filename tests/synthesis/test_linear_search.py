@@ -167,7 +167,7 @@ def test_the_cheapest_of_equals_is_taken(seed: int) -> None:
     assert isinstance(answer, LinearBlock)
     equals = truth.errors <= answer.least + 1e-10
     equals &= truth.kinds() == truth.kinds()[equals].min()
-    cost = prices[truth.index[:, 10:]].sum(axis=1)
+    cost = prices[truth.index[10:]].sum(axis=0)
     own = sum(prices[np.searchsorted(capacitors, answer.values[f"C{i}"])] for i in range(1, 5))
     assert own == cost[equals].min()
 
