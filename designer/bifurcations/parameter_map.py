@@ -71,10 +71,14 @@ class MapPlan:
     """Name of the parameter along the rows."""
     ys: Array
     """(rows,) values of the parameter y, ascending."""
-    start: Array = field(default_factory=lambda: np.zeros(4))
-    """(states,) start of every point."""
+    start: Array = field(default_factory=lambda: np.zeros(0))
+    """(states,) start of every point; rest where it is not given."""
     course: Course = COURSE
     """Periods of each run."""
+
+    def __post_init__(self) -> None:
+        if not len(self.start):
+            object.__setattr__(self, "start", np.zeros(len(self.subject.states)))
 
     def as_dict(self) -> dict[str, Any]:
         """What decides the result."""

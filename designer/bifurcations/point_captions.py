@@ -26,9 +26,9 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     parameter : how it is written; "" leaves out where the point lies. unit : of it.
     """
     place = f" at {parameter} = {point.value:.9g}{' ' + unit if unit else ''}" if parameter else ""
-    whose = (
-        "" if point.kind is PointKind.GRAZING else f" of {label(point.response, point.symmetric)}"
-    )
+    whose = f" of {label(point.response, point.symmetric)}"
+    if point.kind is PointKind.GRAZING:
+        whose = f" at the {point.stops}" if point.stops else ""
     return f"{NAMES[point.kind]}{whose}{place}: {_what(point)}"
 
 

@@ -11,7 +11,8 @@ it on a converged orbit.
   period doubling of one would need ±i, a pair: Swift and Wiesenfeld, Phys. Rev. Lett. 52, 1984.)
 - period doubling: a multiplier -1.
 - torus: a pair of complex multipliers crosses the unit circle.
-- grazing: a turning point of a displacement lies on a stop (``dynamics.turning_points``).
+- grazing: a turning point of a displacement lies on a stop (``dynamics.turning_points``): in a
+  clearance whose counts of impacts change.
 """
 
 from __future__ import annotations
@@ -105,6 +106,8 @@ class Bifurcation:
     """Whether the orbit is symmetric (without an exact mirror: to ``orbit.SYMMETRY_TOLERANCE``)."""
     born: Birth | None = None
     """What leaves the branch here, where that was looked for (``branch_switch.birth``)."""
+    stops: str = ""
+    """The stops that are grazed, "upper stop of A", where there are more clearances than one."""
 
     @property
     def response(self) -> str:
@@ -138,6 +141,7 @@ class Bifurcation:
             "stable_below": None if self.stable_sides is None else self.stable_sides[-1],
             "side": SIDES.get(self.side),
             "born": None if self.born is None else self.born.as_dict(),
+            **({"stops": self.stops} if self.stops else {}),
         }
 
 
@@ -209,7 +213,7 @@ def _tests(curve: Curve, a: BranchPoint, b: BranchPoint) -> list[tuple[PointKind
         # Where it leaves its parent λ turns: that is no fold, and rounding decides the sign.
         out = [(kind, test) for kind, test in out if kind is not PointKind.FOLD]
     if a.counts != b.counts:
-        out.append((PointKind.GRAZING, _gap(curve)))
+        out.append((PointKind.GRAZING, _gap(curve, {k for k, _ in _changed(a, b)})))
     return out
 
 
@@ -220,11 +224,30 @@ def _pair(p: BranchPoint) -> float:
     return float(np.log(np.abs(pairs).max())) if len(pairs) else 0.0
 
 
-def _gap(curve: Curve) -> Test:
+def _changed(a: BranchPoint, b: BranchPoint) -> list[tuple[int, int]]:
+    """(clearance, 0 upper or 1 lower) of each stop on which the counts of impacts differ."""
+    pairs = enumerate(zip(a.counts.impacts, b.counts.impacts, strict=True))
+    return [(k, i) for k, both in pairs for i in (0, 1) if both[0][i] != both[1][i]]
+
+
+def _stops(curve: Curve, a: BranchPoint, b: BranchPoint) -> str:
+    """The stops that are grazed between two points, "upper stop of A", where there are more
+    clearances than one."""
+    names = curve.family.flow(a.value).system.clearances
+    changed = _changed(a, b)
+    words = []
+    for k in sorted({k for k, _ in changed}):
+        sides = [("upper", "lower")[i] for j, i in changed if j == k]
+        stops = f"{sides[0]} stop" if len(sides) == 1 else "both stops"
+        words.append(f"{stops} of {names[k]}")
+    return " and ".join(words) if len(names) > 1 else ""
+
+
+def _gap(curve: Curve, clearances: set[int]) -> Test:
     """Signed distance to its stop of the turning point that lies nearest to one."""
 
     def gap(p: BranchPoint) -> float:
-        found = heights(curve.family.flow(p.value), p.orbit)
+        found = heights(curve.family.flow(p.value), p.orbit, sorted(clearances))
         return float(found[np.argmin(np.abs(found))])
 
     return gap
@@ -285,6 +308,7 @@ def _locate(
         branch=number,
         side=int(np.sign(a.value + b.value - 2.0 * middle.value)) if kind is PointKind.FOLD else 0,
         symmetric=_symmetric(curve, middle),
+        stops=_stops(curve, a, b) if kind is PointKind.GRAZING else "",
     )
 
 

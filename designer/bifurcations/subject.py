@@ -33,6 +33,11 @@ class Subject(Protocol):
         ...
 
     @property
+    def weights(self) -> Array:
+        """(states,) factors that make the states comparable in size."""
+        ...
+
+    @property
     def units(self) -> Mapping[str, str]:
         """By parameter, and by "x", "v" and "λ" for the axes of a diagram."""
         ...

@@ -23,9 +23,9 @@ from designer.dynamics.steady_state import Course, Steady
 BLOCK = 64
 """Steps of a block."""
 KICK = 1e-6
-"""Of the peak of the shown periods: how far a followed state is pushed before each step. A state
-that is symmetric to the last digit would stay on a symmetric orbit long after that lost its
-stability; which twin it leaves for is decided here."""
+"""Of the largest state at the end of the shown periods: how far a followed state is pushed before
+each step. A state that is symmetric to the last digit would stay on a symmetric orbit long after
+that lost its stability; which twin it leaves for is decided here."""
 DOWN, UP = "down", "up"
 
 
@@ -51,10 +51,14 @@ class SweepPlan:
     """(N,) values of the parameter, ascending."""
     tracks: tuple[str, ...] = (DOWN,)
     """"down", "up", or "start K" for row K of ``starts``."""
-    starts: Array = field(default_factory=lambda: np.zeros((1, 4)))
-    """(K, states) starts of the tracks that begin anew at each value."""
+    starts: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """(K, states) starts of the tracks that begin anew at each value; rest where none is given."""
     course: Course = field(default_factory=Course)
     """Periods of each step."""
+
+    def __post_init__(self) -> None:
+        if not len(self.starts):
+            object.__setattr__(self, "starts", np.zeros((1, len(self.subject.states))))
 
     @property
     def followed(self) -> bool:
@@ -179,7 +183,7 @@ def run(
                     steps = _fixed(plan, block, plan.starts[int(track.split()[1])])
                 if store is not None:
                     store.write(track, number, [float(v) for v in block], steps)
-            x = next_start(steps[-1])
+            x = next_start(steps[-1], plan.subject.weights)
             out.append((track, steps))
             progress()
         return out
@@ -194,20 +198,21 @@ def run(
     )
 
 
-def next_start(step: Steady) -> Array:
+def next_start(step: Steady, weights: Array) -> Array:
     """Where the next followed step starts: the end of this one, slightly pushed; rest where this
-    one had no end."""
+    one had no end. weights : as ``Subject`` has them."""
     if not len(step.minima):
         return np.zeros(len(step.end))
-    size = np.abs(step.end).max()
-    return np.asarray(step.end + KICK * size * (-1.0) ** np.arange(len(step.end)))
+    size = np.abs(weights * step.end).max()
+    push = KICK * size * (-1.0) ** np.arange(len(step.end))
+    return np.asarray(step.end + push / weights)
 
 
 def _followed(plan: SweepPlan, values: Iterable[float], x: Array) -> list[Steady]:
     out = []
     for setting in plan.subject.settings([{plan.parameter: float(v)} for v in values]):
         out.append(setting.steady(x, plan.course))
-        x = next_start(out[-1])
+        x = next_start(out[-1], plan.subject.weights)
     return out
 
 

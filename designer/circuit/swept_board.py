@@ -59,6 +59,7 @@ class BoardSubject:
         self.offset = offset
         self.system: PiecewiseLinearSystem = nominal_reduction(design).system()
         self.states = design.circuit.state_nets
+        self.weights = np.ones(len(self.states))
         self.units: Mapping[str, str] = UNITS
 
     def check(self, option: str, name: str, value: float) -> None:

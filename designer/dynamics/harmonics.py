@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from designer.base.arrays import Array
@@ -16,18 +18,19 @@ UNSETTLED = 30
 """Drive periods that stand for an orbit without a period."""
 
 
-def fastest(flow: Flow, orbit: Orbit, velocities: tuple[int, ...] = (1, 3)) -> float:
+def fastest(flow: Flow, orbit: Orbit, velocities: Sequence[int] = ()) -> float:
     """Angular frequency of the highest harmonic of the drive that matters.
 
     It is the highest line, sub- and superharmonics of the drive alike, whose amplitude in one of
-    the ``velocities`` (indices of states) is above ``SMALLEST`` of the largest line in that one; at
-    least the drive's own.
+    the ``velocities`` (indices of states; every second one by default) is above ``SMALLEST`` of the
+    largest line in that one; at least the drive's own.
     """
     settled = orbit.status is OrbitStatus.PERIODIC
     periods = orbit.n if settled else UNSETTLED
     start = orbit.start if len(orbit.start) else np.zeros(flow.system.size)
     run = flow.run(start, periods, mode=orbit.mode or None, points=POINTS)
-    return _highest(run.strobes[:-1, velocities], settled) * flow.drive.omega / periods
+    shown = run.strobes[:-1, velocities or slice(1, None, 2)]
+    return _highest(shown, settled) * flow.drive.omega / periods
 
 
 def _highest(samples: Array, periodic: bool) -> float:

@@ -9,12 +9,13 @@ interval errs by the square of its penetration, so the sign of the height and it
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from designer.base.arrays import Array, Mask
+from designer.base.arrays import Array
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit
-from designer.dynamics.piecewise_linear import ModeKey
 
 RESOLUTION = 0.05
 """Of the fastest rate that an orbit meets: interval of the grid, which leaves 1e-13 of the peak."""
@@ -22,11 +23,11 @@ FEWEST, MOST = 128, 20_000
 """Intervals in a drive period."""
 
 
-def heights(flow: Flow, orbit: Orbit) -> Array:
+def heights(flow: Flow, orbit: Orbit, clearances: Iterable[int] | None = None) -> Array:
     """(k,) how far past its stop each turning point of each displacement lies, least first.
 
     Positive in contact; in units of the displacement; tips and dips at both stops, unordered in
-    time. Empty for a system without clearances.
+    time. Empty for a system without clearances. clearances : those that are looked at; None: all.
     """
     system, drive = flow.system, flow.drive
     rate = max(_rate(flow, orbit), drive.omega)
@@ -36,11 +37,12 @@ def heights(flow: Flow, orbit: Orbit) -> Array:
     u = drive.amplitude * np.sin(angle) + drive.offset
     du = drive.amplitude * drive.omega * np.cos(angle)
     ddu = -(drive.omega**2) * drive.amplitude * np.sin(angle)
-    rows = [row for j in range(len(system.clearances)) for row in system.contact_rows(j).values()]
+    looked_at = range(len(system.clearances)) if clearances is None else clearances
+    rows = [row for j in looked_at for row in system.contact_rows(j).values()]
     if not rows:
         return np.zeros(0)
     past = np.stack([x @ row[:-2] + row[-2] * u + row[-1] for row in rows])
-    first, second = _derivatives(flow, x, u, du, past > 0.0)
+    first, second = _derivatives(flow, x, u, du)
     step = drive.period / points
     found = []
     for row, h in zip(rows, past, strict=True):
@@ -57,20 +59,18 @@ def _rate(flow: Flow, orbit: Orbit) -> float:
     return max(float(np.abs(np.linalg.eigvals(A)).max()) for A in matrices)
 
 
-def _derivatives(flow: Flow, x: Array, u: Array, du: Array, touching: Mask) -> tuple[Array, Array]:
-    """(nodes, states) x' and x'', each node in the mode that holds there.
-
-    Nodes that touch the same stops share a mode: an orbit on which anything else switches is
-    clipped, or switches within a contact, where the field is continuous all the same.
-    """
+def _derivatives(flow: Flow, x: Array, u: Array, du: Array) -> tuple[Array, Array]:
+    """(nodes, states) x' and x'', each node in the mode that holds there."""
     first, second = np.empty_like(x), np.empty_like(x)
-    patterns, which = np.unique(touching.T, axis=0, return_inverse=True)
-    near: ModeKey | None = None
-    for number in range(len(patterns)):
-        nodes = np.flatnonzero(which.ravel() == number)
-        middle = nodes[len(nodes) // 2]
-        near = flow.system.mode_at(x[middle], float(u[middle]), near)
+    left, near = np.arange(len(x)), None
+    while len(left):
+        near = flow.system.mode_at(x[left[0]], float(u[left[0]]), near)
         mode = flow.system.mode(near)
+        holds = np.ones(len(left), dtype=bool)
+        for guard in mode.guards:
+            holds &= x[left] @ guard.C + guard.D * u[left] + guard.e <= 0.0
+        holds[0] = True  # by rounding a guard may be above zero where its mode was found
+        nodes, left = left[holds], left[~holds]
         first[nodes] = x[nodes] @ mode.A.T + u[nodes, None] * mode.B + mode.d
         second[nodes] = first[nodes] @ mode.A.T + du[nodes, None] * mode.B
     return first, second

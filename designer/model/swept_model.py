@@ -51,6 +51,12 @@ class ModelSubject:
         return state_names(self.model.second_order().size)
 
     @property
+    def weights(self) -> Array:
+        """(states,) the first mass's own frequency for a displacement, 1 for a velocity."""
+        system = self.model.second_order()
+        return np.tile([system.own_frequency, 1.0], system.size)
+
+    @property
     def si(self) -> dict[str, Unit]:
         """SI units of the quantities that have one, by name."""
         return units_of(self.scales)
@@ -96,8 +102,10 @@ class ModelSubject:
         return of_model(self.model, 1.0 if self.omega is None else self.omega, parameter)
 
     def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
-        """ω and the model's parameters."""
-        return {"omega": self.omega, **{k: self.model.parameter(k) for k in self.model.parameters}}
+        """ω and the model's parameters, in the order in which a model file has them."""
+        known = dict.fromkeys([*self.model.as_dict(), *self.model.parameters])
+        names = [name for name in known if name in self.model.parameters]
+        return {"omega": self.omega, **{name: self.model.parameter(name) for name in names}}
 
     def remarks(self) -> tuple[str, ...]:
         """Which stop there is, where there is one only."""

@@ -136,6 +136,7 @@ def test_pictures_can_be_read_alone(both: Sweep) -> None:
 def test_a_board_is_told_in_hertz_and_volts() -> None:
     board: Any = BoardSubject.__new__(BoardSubject)
     board.frequency, board.amplitude, board.offset, board.units = None, 0.5, 0.0, UNITS
+    board.states = ("v1", "v2")
     said = titles.title("Small", SweepPlan(board, "frequency", np.array([200.0, 320.0])))
     assert said.splitlines() == [
         "Small",

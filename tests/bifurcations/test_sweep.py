@@ -92,7 +92,7 @@ def test_each_step_starts_where_the_one_before_ended(both: Sweep) -> None:
         slow = by_flow(_flow(float(value)), x, SHORT)
         np.testing.assert_allclose(step.minima, slow.minima, atol=1e-9)
         np.testing.assert_allclose(step.velocities, slow.velocities, atol=1e-9)
-        x = sweep.next_start(slow)
+        x = sweep.next_start(slow, np.ones(4))
 
 
 def test_any_parameter() -> None:

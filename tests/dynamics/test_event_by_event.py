@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
 
-from designer.dynamics.flow import Flow, FlowStatus
-from designer.dynamics.piecewise_linear import Drive
-from designer.model.mechanics import Clearance, SecondOrderSystem, Side
-from tests.shared.event_integrator import GROUND, Array, Gap, Mechanism, integrate
+from designer.dynamics.flow import FlowStatus
+from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate
+from tests.shared.mechanisms import absolute, flow_of
 
 PERIODS = 2
 CLEAR = 1e-3
@@ -80,45 +79,6 @@ def _apart(some: list[Gap]) -> bool:
         for side, _, place, _ in g.thresholds
     )
     return all(a[:2] != b[:2] or b[2] - a[2] > CLEAR for a, b in itertools.pairwise(places))
-
-
-def flow_of(system: Mechanism) -> Flow:
-    """The same mechanism in the package's own terms."""
-    n = len(system.masses)
-    matrices = []
-    for links in (system.dampers, system.springs):
-        matrix = np.zeros((n + 1, n + 1))
-        for a, b, value in links:
-            matrix[[a, b], [a, b]] += value
-            matrix[[a, b], [b, a]] -= value
-        matrices.append(matrix[:n, :n])
-    second = SecondOrderSystem(
-        mass=np.array(system.masses),
-        damping=matrices[0],
-        stiffness=matrices[1],
-        force=np.array(system.forces),
-        clearances=tuple(_clearance(k, gap) for k, gap in enumerate(system.gaps)),
-        constant=np.array(system.constants),
-        base=system.base,
-        fixed_stops=system.fixed_stops,
-    )
-    return Flow(second.piecewise_linear(system.omega), Drive(system.omega))
-
-
-def _clearance(number: int, gap: Gap) -> Clearance:
-    def side(springs: tuple[tuple[float, float], ...]) -> Side | None:
-        if not springs:
-            return None
-        (first, stiffness), *further = springs
-        return Side(first, stiffness, tuple((place - first, k) for place, k in further))
-
-    other = None if gap.other == GROUND else gap.other
-    return Clearance(str(number), gap.mass, other, side(gap.upper), side(gap.lower), gap.damping)
-
-
-def absolute(system: Mechanism, x: Array) -> Array:
-    """(2n,) displacements, then velocities, of a state of the flow at a strobe."""
-    return np.concatenate([x[0::2], x[1::2] + system.base * system.omega])
 
 
 def compare(system: Mechanism, seed: int) -> None:

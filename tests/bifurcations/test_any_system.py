@@ -1,0 +1,187 @@
+"""Branches, points, sweeps, maps and basins of systems that are not the paper's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from designer.bifurcations import basins, parameter_map, sweep
+from designer.bifurcations.basins import BasinPlan
+from designer.bifurcations.branch_survey import survey
+from designer.bifurcations.continuation import start, trace
+from designer.bifurcations.flow_family import Family
+from designer.bifurcations.parameter_map import MapPlan
+from designer.bifurcations.point_captions import caption
+from designer.bifurcations.points import PointKind, locate
+from designer.bifurcations.store import GridStore, SweepStore
+from designer.bifurcations.sweep import SweepPlan
+from designer.dynamics.attractors import settle
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.steady_state import Course
+from designer.model.model_file import parse_model_file
+from designer.model.swept_model import ModelSubject
+from tests.shared.event_integrator import GROUND, Gap, Mechanism, integrate
+from tests.shared.mechanisms import CHAIN, absolute, flow_of
+
+FREE = replace(
+    CHAIN,
+    gaps=[Gap(0, GROUND, upper=((0.9, 8.0),)), Gap(2, 1, upper=((0.45, 10.0),), damping=0.4)],
+)
+
+
+def between(system: Mechanism, omega: float, a: int, b: int) -> float:
+    """Amplitude of the displacement between two masses without stops, by the complex response."""
+    impedance = np.diag(-(omega**2) * np.array(system.masses)).astype(complex)
+    for links, factor in ((system.springs, 1.0), (system.dampers, 1j * omega)):
+        for i, j, value in links:
+            impedance[i, i] += factor * value
+            if j != GROUND:
+                impedance[j, j] += factor * value
+                impedance[[i, j], [j, i]] -= factor * value
+    x = np.append(np.linalg.solve(impedance, np.array(system.forces, dtype=complex)), 0.0)
+    return float(abs(x[a] - x[b]))
+
+
+@pytest.mark.parametrize(("name", "a", "b", "gap"), [("A", 0, GROUND, 0.9), ("B", 2, 1, 0.45)])
+def test_grazing_is_where_the_free_response_fills_a_clearance(
+    name: str, a: int, b: int, gap: float
+) -> None:
+    """Of each clearance at its own frequency; the caption names the stop."""
+    wanted = brentq(lambda w: between(FREE, w, a, b) - gap, 0.3, 0.62)
+    wide = replace(
+        FREE, gaps=[g if g.mass == a else replace(g, upper=((2.0, 8.0),)) for g in FREE.gaps]
+    )
+    over = Family("omega", 0.2, 3.0, lambda w: flow_of(wide, w))
+    orbit = settle(over.flow(0.99 * wanted), np.zeros(6))
+    assert orbit.response == "1-0-0;0-0"
+    branch = trace(start(over, orbit, 0.99 * wanted), 0.985 * wanted, 1.005 * wanted)
+    (point,) = [p for p in locate(branch) if p.kind is PointKind.GRAZING]
+    assert point.value == pytest.approx(wanted, rel=1e-9)
+    assert point.as_dict()["stops"] == f"upper stop of {name}"
+    assert f"grazing at the upper stop of {name} at ω = " in caption(point, "ω")
+
+
+@pytest.mark.parametrize(("omega", "survives"), [(0.8, False), (0.7, False), (0.5, True)])
+def test_grazing_on_a_moving_ground(omega: float, survives: bool) -> None:
+    """The soft-impact rig: a = e √((1 - ω²)² + (2ζω)²)/ω² (Ing and others, Phil. Trans. R. Soc. A
+    366, 2008), 0.709 at ω = 0.8. Past it period 1 stays stable where 2ω₀/ω is an integer (Kundu
+    and others, Physica D 241, 2012)."""
+    zeta, gap = 0.01, 1.26
+    rig = Mechanism(
+        masses=[1.0],
+        springs=[(0, GROUND, 1.0)],
+        dampers=[(0, GROUND, 2.0 * zeta)],
+        forces=[0.0],
+        omega=omega,
+        gaps=[Gap(0, upper=((gap, 29.0),))],
+    )
+    wanted = gap * np.hypot(1.0 - omega**2, 2.0 * zeta * omega) / omega**2
+    over = Family("base", 1e-3, 10.0, lambda a: flow_of(replace(rig, base=a)))
+    half = settle(over.flow(0.49 * wanted), np.zeros(2))
+    orbit = replace(half, start=2.0 * half.start)  # free of the stop, motion follows amplitude
+    branch = trace(start(over, orbit, 0.98 * wanted), 0.97 * wanted, 1.005 * wanted)
+    first = min(p.value for p in locate(branch) if p.kind is PointKind.GRAZING)
+    assert first == pytest.approx(wanted, rel=1e-9)
+    assert branch.points[-1].stable is survives
+
+
+def test_a_survey_of_three_masses_and_two_clearances() -> None:
+    """Every orbit of every branch closes in the independent integrator too, with its impacts; where
+    the branch says that stability is lost, the multipliers of its neighbours say so."""
+    over = Family("omega", 0.2, 3.0, lambda w: flow_of(CHAIN, w))
+    orbit = settle(over.flow(0.7), np.zeros(6))
+    made = survey(over, [(0.7, orbit)], 0.66, 0.76)
+    grazings = [p for p in made.points if p.kind is PointKind.GRAZING]
+    assert {p.stops[-1] for p in grazings} <= {"A", "B"}
+    assert all(p.before != p.after for p in grazings)
+    branch = made.branches[0]
+    for point in branch.points[:: max(len(branch.points) // 4, 1)]:
+        system = replace(CHAIN, omega=point.value)
+        periods = branch.curve.n * 2.0 * np.pi / point.value
+        end, entries = integrate(system, absolute(system, point.orbit.start), periods)
+        assert end == pytest.approx(absolute(system, point.orbit.start), abs=1e-8)
+        near = min(point.orbit.penetration, point.orbit.miss)
+        assert len(entries) == point.counts.total or near < 1e-4
+
+
+TEXT = """
+format = 2
+[[mass]]
+name = "hammer"
+mass = 1.0
+[[mass]]
+name = "arm"
+mass = 0.8
+[[mass]]
+name = "casing"
+mass = 1.2
+[[spring]]
+between = ["hammer", "ground"]
+stiffness = 1.0
+[[spring]]
+between = ["hammer", "arm"]
+stiffness = 1.5
+[[spring]]
+between = ["arm", "casing"]
+stiffness = 1.0
+[[damper]]
+between = ["hammer", "ground"]
+damping = 0.2
+[[damper]]
+between = ["hammer", "arm"]
+damping = 0.1
+[[damper]]
+between = ["arm", "casing"]
+damping = 0.1
+[[clearance]]
+name = "A"
+between = ["hammer", "ground"]
+upper = 0.5
+lower = 0.7
+stiffness = 8.0
+[[clearance]]
+name = "B"
+between = ["casing", "arm"]
+upper = 0.2
+stiffness = 10.0
+[[force]]
+on = "hammer"
+amplitude = 1.0
+"""
+BRIEF = Course(30, 4, 100)
+
+
+def subject() -> ModelSubject:
+    return ModelSubject(parse_model_file(TEXT).model, omega=0.7)
+
+
+def test_a_sweep_and_its_store(tmp_path: Path) -> None:
+    plan = SweepPlan(subject(), "omega", np.linspace(0.7, 0.72, 3), course=BRIEF)
+    store = SweepStore(tmp_path, "omega", "w", {})
+    made = sweep.run(plan, store=store)
+    for value, step in zip(plan.values, made.steps["down"], strict=True):
+        flow = plan.subject.settings([{"omega": float(value)}])[0].flow()
+        assert settle(flow, step.end).counts == step.counts
+    again = store.read("down", 0)
+    assert again is not None
+    assert [s.response for s in again[::-1]] == [s.response for s in made.steps["down"]]
+    assert len(made.steps["down"][0].counts.impacts) == 2
+
+
+def test_a_map_and_basins(tmp_path: Path) -> None:
+    axes = ("omega", np.linspace(0.7, 0.72, 2), "A.upper", np.linspace(0.5, 0.6, 2))
+    store = GridStore(tmp_path, "map", *axes, "w", {})
+    plan = MapPlan(subject(), *axes, course=BRIEF)
+    made = parameter_map.run(plan, store=store)
+    assert parameter_map.run(plan, store=store) == made
+    for cell in made.cells:
+        if cell.status is OrbitStatus.PERIODIC:
+            assert len(cell.counts.impacts) == 2
+    few = np.linspace(-0.5, 0.5, 2)
+    found = basins.run(BasinPlan(subject(), {}, "x1", few, "x3'", few, np.zeros(6), BRIEF))
+    assert sum(a.share for a in found.attractors) == pytest.approx(1.0)
+    assert {c.response for c in found.cells} == {a.response for a in found.attractors}
