@@ -192,9 +192,7 @@ def with_parts_kept(
     found = _found(base, modelfile)
     held = peaks(model, found)
     swing = float((base.design.errors.scales.volts * held.states).max()), held.states
-    errors = coefficient_errors(
-        circuit, model.second_order(), swing=None if circuit.stops else swing
-    )
+    errors = coefficient_errors(circuit, model.second_order(), swing=swing)
     design = replace(
         base.design,
         circuit=circuit,

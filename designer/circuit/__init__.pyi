@@ -15,15 +15,19 @@ from .board_parts_only import (
 from .coefficients import (
     EXACT as EXACT,
     CoefficientErrors as CoefficientErrors,
-    CutShort as CutShort,
     coefficient_errors as coefficient_errors,
 )
 from .dead_zone_parts import (
-    OUTPUT as OUTPUT,
     DeadZoneStage as DeadZoneStage,
     Kind as Kind,
     dead_zone_stage as dead_zone_stage,
     idle_limits as idle_limits,
+)
+from .dead_zone_place import (
+    OUTPUT as OUTPUT,
+)
+from .dead_zone_reading import (
+    CutShort as CutShort,
 )
 from .design import (
     Certificate as Certificate,
@@ -90,11 +94,8 @@ from .scale_fit import (
     minimax as minimax,
 )
 from .stage_title import (
-    DEAD_ZONE as DEAD_ZONE,
     INTERFACE as INTERFACE,
-    REFERENCES as REFERENCES,
     SUPPLY as SUPPLY,
-    dead_zone_titles as dead_zone_titles,
     section_stages as section_stages,
     stage_names as stage_names,
 )

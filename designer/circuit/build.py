@@ -2,7 +2,7 @@
 
 The nets of the paper's Fig. 4 and Fig. 5: v1 … v4 the states, v1n … v4n their inverses, s1 … s4
 the summing nodes, fv the nonlinear stage's output. Sections of quads carry the paper's names for
-two masses; for more, packages are filled in order. Other op-amps: ``circuit.packing``.
+its own circuit; ``circuit.packing`` fills packages with any other's.
 """
 
 from __future__ import annotations
@@ -11,14 +11,20 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from designer.catalog.entries import OpAmp
-from designer.circuit.dead_zone_parts import OUTPUT, DeadZoneStage
+from designer.circuit.dead_zone_parts import DeadZoneStage
+from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Generator, Part, Section, Stop
 from designer.circuit.packing import packed
+from designer.circuit.reference_rails import RAILS, ReferenceRails
 from designer.circuit.resistors import Composite, Resistors
 from designer.circuit.terms import Term, inverted_states, terms as input_terms
-from designer.model.mechanics import MechanicalModel
+from designer.model.mechanics import Clearance, MechanicalModel
 
 GENERATOR = Generator("VM1", "vg")
+INVERSE = f"{GENERATOR.net}n"
+"""Net of the generator's negative, for forces in antiphase."""
+CONSTANT = 160
+"""Number of the resistor of a constant force on the first mass."""
 
 _PAPER_SECTIONS = {
     ("integrator", 0): "U1A",
@@ -45,14 +51,16 @@ def circuit_of(
 ) -> Circuit:
     """The circuit of a model, as ``build`` makes it of the model's terms."""
     system = model.second_order()
-    matrices = system.damping.tolist(), system.stiffness.tolist(), system.force.tolist()
+    force = system.drive_force(system.own_frequency)
+    matrices = system.damping.tolist(), system.stiffness.tolist(), force.tolist()
     return build(
         input_terms(*matrices),
         values,
         opamp,
         supply=supply,
         saturation=saturation,
-        clearance=system.clearances[0].name if system.clearances else None,
+        clearances=system.clearances,
+        constants=system.constant.tolist(),
         stage=stage,
         composites=composites,
     )
@@ -65,45 +73,56 @@ def build(
     *,
     supply: float,
     saturation: float,
-    clearance: str | None,
+    clearances: tuple[Clearance, ...] = (),
+    constants: Sequence[float] = (),
     stage: DeadZoneStage = SATURATING,
     composites: Mapping[str, Composite] = MappingProxyType({}),
 ) -> Circuit:
     """The circuit of these terms.
 
-    values : ohm and farad by part name; holds R100 … for the inverters and, where there is a
-    clearance, R50 and the resistors of the dead-zone stage.
-    clearance : its name, or None for a model without stops: then there is no nonlinear stage.
-    stage : of the dead zone. composites : resistors NAME made of two, whose values are those of
-    NAMEA and NAMEB.
+    values : ohm and farad by part name; holds R100 … for the inverters and, for each clearance, R50
+    and the resistors of the dead-zone stage (``dead_zone_place``).
+    clearances : each gets a nonlinear stage. constants : the constant force on each mass, of which
+    only the sign counts here. stage : of the dead zones. composites : resistors NAME made of two,
+    whose values are those of NAMEA and NAMEB.
 
     Raises
     ------
-    InputError : a composite of what is no resistor here; a rectifier without its parts.
+    InputError : a composite of what is no resistor here; a rectifier without its parts; a clearance
+        that the stage cannot make.
     """
     resistors = Resistors(values, composites)
+    rails = ReferenceRails(stage.reference, resistors, stage.feeds)
+    places = stage.places(clearances)
     masses = len({t.quantity[1] for t in terms})
     parts: list[Part] = []
     for state in range(2 * masses):
-        stop = clearance is not None and state == 1
-        parts += _integrator(state, terms, values, resistors, stop)
-    inverted = set(inverted_states(terms))
-    if clearance is not None and stage.kind == "rectifier":
-        inverted.add(0)  # it works on -v1, whether or not a term needs that
-    for state in sorted(inverted):
+        parts += _integrator(state, terms, values, resistors, places)
+        if state % 2 and any(constants[state // 2 : state // 2 + 1]):
+            parts += _constant(state // 2, -constants[state // 2], resistors)
+    # A stage may work on a displacement's negative, whether or not a term needs that.
+    inverted = {*inverted_states(terms), *(p.inverted_state for p in places)}
+    for state in sorted(state for state in inverted if state is not None):
         parts += _inverter(state, resistors)
-    stops: tuple[Stop, ...] = ()
-    if clearance is not None:
-        stage_parts, dead_zone = stage.parts(clearance, resistors)
+    if any(t.source is None and t.inverted for t in terms):
+        parts += _generator_inverse(resistors)
+    stops: list[Stop] = []
+    for place in places:
+        parts += place.between(resistors)
+        stage_parts, stop = stage.parts(place, resistors, rails)
         parts += stage_parts
-        stops = (dead_zone,)
+        stops.append(stop)
+    for force in filter(None, constants):
+        sign, end = (-1, "lower") if force > 0.0 else (1, "upper")
+        feed = f"feed of the reference, {end} half"
+        parts += rails(sign, "reference of the constant forces", feed)
     resistors.done()
     circuit = Circuit(
         parts=tuple(parts),
         generator=GENERATOR,
         states=tuple(f"C{i + 1}" for i in range(2 * masses)),
         state_nets=tuple(f"v{i + 1}" for i in range(2 * masses)),
-        stops=stops,
+        stops=tuple(stops),
         opamp=opamp.name,
         gain=opamp.gain.typ or 1e5,
         bias=opamp.bias.typ or 0.0,
@@ -130,26 +149,40 @@ def _integrator(
     terms: Sequence[Term],
     values: Mapping[str, float],
     resistors: Resistors,
-    stop: bool,
+    places: Sequence[DeadZonePlace],
 ) -> list[Part]:
     node, out, cap = f"s{state + 1}", f"v{state + 1}", f"C{state + 1}"
     what = "velocity" if state % 2 else "displacement"
-    mass = state // 2 + 1
+    mass = state // 2
+    role = f"integrator, {what} of M{mass + 1}"
     parts: list[Part] = [
-        Section(_section("integrator", state), node, GROUND, out, f"integrator, {what} of M{mass}"),
-        Capacitor(cap, out, node, values[cap], f"integrator, {what} of M{mass}"),
+        Section(_section("integrator", state), node, GROUND, out, role),
+        Capacitor(cap, out, node, values[cap], role),
     ]
     for t in terms:
-        if t.state != state:
-            continue
-        if t.source is None:
-            net = GENERATOR.net
-        else:
-            net = f"v{t.source + 1}" + ("n" if t.inverted else "")
-        parts += resistors(t.resistor, net, node, _role(t))
-    if stop:
-        parts += resistors("R50", OUTPUT, node, "stop force on M1")
+        if t.state == state:
+            parts += resistors(t.resistor, _source(t), node, _role(t))
+    for place in places if state % 2 else ():
+        force = f"stop force on M{mass + 1}"
+        if place.clearance.mass == mass:
+            parts += resistors(place.part("R50"), place.output, node, force)
+        if place.clearance.other == mass:
+            parts += resistors(place.part("R51"), place.reaction, node, force)
     return parts
+
+
+def _source(term: Term) -> str:
+    """The net that feeds a term's resistor."""
+    if term.source is None:
+        return INVERSE if term.inverted else GENERATOR.net
+    return f"v{term.source + 1}" + ("n" if term.inverted else "")
+
+
+def _constant(mass: int, sign: float, resistors: Resistors) -> list[Part]:
+    """The resistor of a constant force, from the reference of this sign: integrators invert."""
+    net, node = RAILS[1 if sign > 0.0 else -1], f"s{2 * mass + 2}"
+    name = f"R{CONSTANT + mass}"
+    return [*resistors(name, net, node, f"constant force on M{mass + 1}")]
 
 
 def _inverter(state: int, resistors: Resistors) -> list[Part]:
@@ -162,10 +195,16 @@ def _inverter(state: int, resistors: Resistors) -> list[Part]:
     ]
 
 
+def _generator_inverse(resistors: Resistors) -> list[Part]:
+    role = "inverter of the generator"
+    return [
+        Section("U4C", "ig", GROUND, INVERSE, role),
+        *resistors("R190", GENERATOR.net, "ig", role),
+        *resistors("R191", "ig", INVERSE, role),
+    ]
+
+
 def _section(kind: str, state: int) -> str:
+    """The paper's name of an amplifier; past its two masses a provisional one."""
     known = _PAPER_SECTIONS.get((kind, state))
-    if known is not None:
-        return known
-    # Past the paper's two masses: four sections a package, from U4 on.
-    index = 2 * (state - 4) + (kind == "inverter")
-    return f"U{4 + index // 4}{'ABCD'[index % 4]}"
+    return known or f"U{1000 + state}{'AB'[kind == 'inverter']}"

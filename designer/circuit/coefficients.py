@@ -1,10 +1,11 @@
 """How far a finished circuit's equation is from the model's: the coefficient error.
 
 docs/definitions.md: the minimum over the time scale and a positive scale for each state of the
-largest |ln(realised/wanted)| over all coefficients of the state equations. The dead-zone null, a
-wanted zero, counts in units of K1: mu |ln(1 - leftover/slope)|. So does the constant force that a
-stage with one stop leaves inside the clearance, over K1 times the threshold. Realised coefficients
-come from the nodal reduction with ideal op-amps, never from the formulas that chose the parts.
+largest |ln(realised/wanted)| over all coefficients of the state equations, gaps among them but for
+the one that sets the amplitude. A dead-zone null, a wanted zero, counts in units of the spring on
+its mass: mu |ln(1 - leftover/slope)|. So does a constant force, over that spring times a gap.
+Realised coefficients come from the nodal reduction with ideal op-amps, never from the formulas that
+chose the parts (``circuit.dead_zone_reading``).
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.dead_zone_reading import DeadZoneReading
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.circuit.scale_fit import minimax
-from designer.model.mechanics import SecondOrderSystem
+from designer.model.mechanics import SecondOrderSystem, state_names
 
 EXACT = 1e-6
 """What a coefficient error means: one up to this is none ("exact"), two that differ by no more are
@@ -34,26 +35,27 @@ class Scales:
     volts: Array
     """(states,) volts per unit of each model state (x1, dx1/dt, …)."""
     threshold: float
-    """Magnitude of v1 at the upper stop, or at the only one [V]."""
+    """The moving mass's displacement at the first clearance's upper stop, or at the only one, as a
+    distance from rest [V]; negative where the stop is in contact at rest."""
     threshold_lower: float = float("nan")
-    """Magnitude of v1 at the lower stop [V]. nan where there is none."""
+    """The same of the lower stop. nan where there is none."""
+    middle: float = 0.0
+    """Where the middle of the clearance is wanted, over half the clearance."""
 
     @property
     def offcentre(self) -> float:
-        """How far the middle of the clearance lies from rest, over half the clearance.
+        """How far the clearance's middle lies from where it is wanted, over half the clearance.
 
         Stated, not an error: a DC offset of the generator moves it. 0 with one stop or none.
         """
         both = self.threshold + self.threshold_lower
-        return float((self.threshold - self.threshold_lower) / both) if both == both else 0.0
+        if both != both:
+            return 0.0
+        return float((self.threshold - self.threshold_lower) / both) - self.middle
 
     def frequency(self, omega: float) -> float:
         """Generator frequency [Hz] of a dimensionless frequency omega."""
         return float(omega / (2.0 * np.pi * self.seconds))
-
-
-class CutShort(ArithmeticError):
-    """An op-amp that is meant to be linear inside the clearance is not."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +72,27 @@ class CoefficientErrors:
     """Model force per generator volt, for the driven masses (0 where not driven)."""
 
 
+@dataclass(frozen=True)
+class _Coefficient:
+    """One logarithm of realised over wanted, and how the scales move it.
+
+    weights : by scale, 0 the time's and 1 + i that of state i.
+    """
+
+    log: float
+    weights: dict[int, float]
+
+
 def coefficient_errors(
     circuit: Circuit,
     model: SecondOrderSystem,
     board: Board | None = None,
     swing: tuple[float, Array] | None = None,
 ) -> CoefficientErrors:
-    """Errors of ``circuit`` (or of one ``board`` of it) against the dimensionless ``model``.
+    """Errors of ``circuit`` (or of one ``board`` of it) against ``model``.
 
-    The amplitude is set by the clearance, volts[0] = threshold/b; without one, by ``swing``: the
-    voltage [V] that the largest of the states' peaks (states,) shall have.
+    The amplitude is set by the first gap that is not zero, volts[0] = threshold/b; without one, by
+    ``swing``: the voltage [V] that the largest of the states' peaks (states,) shall have.
 
     Raises
     ------
@@ -87,51 +100,31 @@ def coefficient_errors(
         clips or a diode switches inside the clearance, so its stiffness is not one number.
     """
     reduction = Reduction(circuit, board or nominal_board(circuit, ideal=True))
-    rest = reduction.system().mode(circuit.rest)
-    dead_zone = _dead_zone(reduction) if circuit.stops else None
-    realised = rest.A if dead_zone is None else dead_zone.A
+    rest = reduction.system().mode(circuit.open)
+    zones = [DeadZoneReading.of(reduction, k, c) for k, c in enumerate(model.clearances)]
+    realised = rest.A
+    for zone in zones:
+        realised = realised - zone.leftover
     wanted = model.state_matrix()
-    n = len(wanted)
-    pairs = {
-        f"{_state(i)}' {_state(j)}": (i, j, realised[i, j], wanted[i, j])
-        for i, j in np.argwhere(wanted != 0.0).tolist()
-    }
-    if dead_zone is not None:
-        stop = model.clearances[0]
-        stiffness = -stop.first.stiffness / model.mass[stop.mass]
-        pairs |= {name: (1, 0, slope, stiffness) for name, slope in dead_zone.slopes.items()}
-    # The error is ln realised + ln seconds + ln volts_j - ln volts_i - ln wanted.
-    h, D = np.zeros(len(pairs)), np.zeros((len(pairs), 1 + n))
-    for row, (i, j, value, want) in enumerate(pairs.values()):
-        h[row] = np.log(value / want) if value / want > 0.0 else np.inf
-        D[row, 0] = 1.0
-        D[row, 1 + j] += 1.0
-        D[row, 1 + i] -= 1.0
-    if not np.all(np.isfinite(h)):
-        wrong = [name for name, value in zip(pairs, h, strict=True) if not np.isfinite(value)]
-        raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
-    D = D[:, [0, *range(2, 1 + n)]]  # volts of x1 is the amplitude, set below
-    free = minimax(h, D)
-    errors = dict(zip(pairs, (h + D @ free).tolist(), strict=True))
-    relative = np.exp(np.concatenate([[0.0], free[1:]]))
+    coefficients = _entries(realised, wanted)
+    for zone in zones:
+        coefficients |= _slopes(zone, model, several=len(zones) > 1)
+    lead = next((z for z in zones if any(stop.gap for _, stop in z.clearance.sides)), None)
+    if lead is not None:
+        coefficients |= _gaps(zones, lead)
+    errors, logs = _least(coefficients, len(wanted))
+    relative = np.exp(np.concatenate([[0.0], logs[1:]]))
     amplitude = 1.0
-    if swing is not None:
+    if lead is not None:
+        side, gap = lead.first_gap
+        amplitude = abs(lead.thresholds[side] / gap) / float(relative[2 * lead.clearance.mass])
+    elif swing is not None:
         amplitude = swing[0] / float((swing[1] * relative).max())
-    thresholds: dict[int, float] = {}
-    if dead_zone is not None:
-        thresholds = dead_zone.thresholds
-        amplitude = next(iter(thresholds.values())) / model.clearances[0].first.gap
-        mu = model.clearances[0].first.stiffness / -wanted[1, 0] / model.mass[0]
-        errors["dead-zone null"] = float(mu * dead_zone.null)
-        if len(thresholds) == 1:
-            errors["dead-zone bias"] = dead_zone.bias
-    lower = thresholds.get(-1, float("nan"))
-    scales = Scales(
-        seconds=float(np.exp(free[0])),
-        volts=amplitude * relative,
-        threshold=thresholds.get(1, lower),
-        threshold_lower=lower,
-    )
+    for zone in zones:
+        errors |= _flatness(zone, model, wanted, several=len(zones) > 1)
+    scales = _scales(float(np.exp(logs[0])), amplitude * relative, zones)
+    if model.constant.any():
+        errors |= _constants(rest.d, zones, lead, model, scales)
     drive = -rest.B * scales.seconds / scales.volts
     return CoefficientErrors(
         errors=errors,
@@ -141,64 +134,133 @@ def coefficient_errors(
     )
 
 
-@dataclass(frozen=True)
-class _DeadZone:
-    """A : the state matrix without the stop. slopes : the stop's entry in A, by error name.
+def _entries(realised: Array, wanted: Array) -> dict[str, _Coefficient]:
+    """The entries of the state matrix."""
+    names = state_names(len(wanted) // 2)
+    return {
+        f"{names[i]}' {names[j]}": _entry(i, j, realised[i, j], wanted[i, j])
+        for i, j in np.argwhere(wanted != 0.0).tolist()
+    }
 
-    null : ln of the null's gain ratio, at the side where it is worst. bias : constant force inside
-    the clearance over K1 times the threshold. thresholds : magnitude of v1 [V] by side.
+
+def _entry(i: int, j: int, value: float, want: float) -> _Coefficient:
+    """Its error is ln realised + ln seconds + ln volts_j - ln volts_i - ln wanted."""
+    weights = {0: 1.0, 1 + j: 0.0, 1 + i: 0.0}
+    weights[1 + j] += 1.0
+    weights[1 + i] -= 1.0
+    return _Coefficient(_log(value, want), weights)
+
+
+def _log(value: float, want: float) -> float:
+    return float(np.log(value / want)) if value / want > 0.0 else np.inf
+
+
+def _slopes(
+    zone: DeadZoneReading, model: SecondOrderSystem, *, several: bool
+) -> dict[str, _Coefficient]:
+    """The force of each stop on each mass, by each displacement."""
+    clearance = zone.clearance
+    row = model.displacement(clearance)
+    masses = [i for i in (clearance.mass, clearance.other) if i is not None]
+    stops = dict(clearance.sides)
+    out = {}
+    for side, slope in zone.slopes.items():
+        words = {0: "stop slope", 1: "upper stop slope", -1: "lower stop slope"}
+        stiffness = (clearance.first if side == 0 else stops[side]).stiffness
+        for i in masses:
+            for j in masses:
+                own = i == j == clearance.mass
+                name = words[side] + (f" {clearance.name}" if several else "")
+                name += "" if own else f" x{i + 1}' x{j + 1}"
+                want = -stiffness * row[i] * row[j] / model.mass[i]
+                out[name] = _entry(2 * i + 1, 2 * j, slope[2 * i + 1, 2 * j], want)
+    return out
+
+
+def _gaps(zones: list[DeadZoneReading], lead: DeadZoneReading) -> dict[str, _Coefficient]:
+    """Each further gap over the one that sets the amplitude.
+
+    An even clearance alone has none: an offset of the generator moves its middle.
     """
-
-    A: Array
-    slopes: dict[str, float]
-    null: float
-    bias: float
-    thresholds: dict[int, float]
-
-
-def _dead_zone(reduction: Reduction) -> _DeadZone:
-    c = reduction.circuit
-    stop = c.stops[0]
-    system = reduction.system()
-    state, row = c.states.index(stop.state), c.states.index(stop.state) + 1
-    rest, inside = system.mode(c.rest), reduction.solution(c.rest).voltage[OUTPUT]
-    flat = float(inside[state])
-    slopes: dict[str, float] = {}
-    thresholds: dict[int, float] = {}
-    nulls: list[float] = []
-    A, bias = rest.A, 0.0
-    for side, contact in stop.contacts:
-        key = c.carrying(contact)
-        steep = float(reduction.solution(key).voltage[OUTPUT][state])
-        per_gain = (system.mode(key).A - rest.A) / (steep - flat)
-        switch = c.switches.index(contact.switch)
-        guard = next(g for g in rest.guards if g.target[switch] == contact.position)
-        end = -guard.e / float(guard.C[state])
-        threshold = abs(end)
-        _stays_linear(reduction, state, end, contact.switch)
-        if not thresholds:
-            A = rest.A - flat * per_gain
-            force = float(inside[-1] * per_gain[row, state])
-            bias = force / abs(float(A[row, state]) * threshold)
-        thresholds[side] = threshold
-        nulls.append(float(np.log1p(-flat / steep)))
-        name = "upper stop slope" if side > 0 else "lower stop slope"
-        if stop.shared or len(stop.contacts) == 1:
-            name = "stop slope"
-        slopes.setdefault(name, float(steep * per_gain[row, state]))
-    return _DeadZone(A, slopes, max(nulls, key=abs), bias, thresholds)
+    first, unit = lead.first_gap
+    out = {}
+    for zone in zones:
+        if len(zones) == 1 and zone.clearance.upper == zone.clearance.lower:
+            continue
+        for side, stop in zone.clearance.sides:
+            if not stop.gap or (zone is lead and side == first):
+                continue
+            ratio = zone.thresholds[side] / abs(lead.thresholds[first])
+            weights = {1 + 2 * zone.clearance.mass: 0.0, 1 + 2 * lead.clearance.mass: 0.0}
+            weights[1 + 2 * zone.clearance.mass] -= 1.0
+            weights[1 + 2 * lead.clearance.mass] += 1.0
+            name = f"gap {zone.clearance.name} {'upper' if side > 0 else 'lower'}"
+            out[name] = _Coefficient(_log(ratio, stop.gap / abs(unit)), weights)
+    return out
 
 
-def _stays_linear(reduction: Reduction, state: int, end: float, ends: str) -> None:
-    """The mode at rest has to hold up to where contact begins, at ``end`` [V]."""
-    c = reduction.circuit
-    for guard in reduction.system().mode(c.rest).guards:
-        pairs = zip(c.switches, c.rest, guard.target, strict=True)
-        switch = next(name for name, here, there in pairs if here != there)
-        reach = abs(float(guard.C[state]) * end) + abs(guard.e)
-        if switch != ends and float(guard.C[state]) * end + guard.e > 1e-9 * reach:
-            raise CutShort(f"{switch} changes inside the clearance, before v1 = {end:.4g} V")
+def _least(coefficients: dict[str, _Coefficient], states: int) -> tuple[dict[str, float], Array]:
+    """The errors at the scales that make the largest least, and the logarithms (states,) of those:
+    the time's and those of the states over the first one's, which moves none."""
+    h = np.array([c.log for c in coefficients.values()])
+    if not np.all(np.isfinite(h)):
+        wrong = [name for name, c in coefficients.items() if not np.isfinite(c.log)]
+        raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
+    D = np.zeros((len(coefficients), 1 + states))
+    for row, c in enumerate(coefficients.values()):
+        for place, weight in c.weights.items():
+            D[row, place] += weight
+    D = D[:, [0, *range(2, 1 + states)]]  # volts of x1 is the amplitude, which a gap sets
+    free = minimax(h, D)
+    return dict(zip(coefficients, (h + D @ free).tolist(), strict=True)), free
 
 
-def _state(i: int) -> str:
-    return f"x{i // 2 + 1}" + ("'" if i % 2 else "")
+def _flatness(
+    zone: DeadZoneReading, model: SecondOrderSystem, wanted: Array, *, several: bool
+) -> dict[str, float]:
+    """What the stage leaves inside its clearance: stiffness and, with one stop, a constant."""
+    mass = zone.clearance.mass
+    own = -wanted[2 * mass + 1, 2 * mass]
+    shares = [
+        stop.stiffness / own / model.mass[mass] * zone.nulls[side]
+        for side, stop in zone.clearance.sides
+    ]
+    end = f" {zone.clearance.name}" if several else ""
+    out = {f"dead-zone null{end}": float(max(shares, key=abs))}
+    if len(zone.thresholds) == 1 and zone.clearance.first.gap:
+        out[f"dead-zone bias{end}"] = zone.bias
+    return out
+
+
+def _scales(seconds: float, volts: Array, zones: list[DeadZoneReading]) -> Scales:
+    """Thresholds of the first clearance are those that the circuit has."""
+    if not zones:
+        return Scales(seconds, volts, float("nan"))
+    clearance, thresholds = zones[0].clearance, zones[0].thresholds
+    lower, middle = thresholds.get(-1, float("nan")), 0.0
+    if clearance.upper is not None and clearance.lower is not None:
+        upper_gap, lower_gap = clearance.upper.gap, clearance.lower.gap
+        middle = (upper_gap - lower_gap) / (upper_gap + lower_gap)
+    return Scales(seconds, volts, thresholds.get(1, lower), lower, middle)
+
+
+def _constants(
+    d: Array,
+    zones: list[DeadZoneReading],
+    lead: DeadZoneReading | None,
+    model: SecondOrderSystem,
+    scales: Scales,
+) -> dict[str, float]:
+    """Error of each constant force over the mass's springs at the gap that sets the amplitude;
+    without a gap over the largest force of the drive."""
+    for zone in zones:
+        d = d - zone.constant
+    forces = d[1::2] * scales.seconds / scales.volts[1::2] * model.mass
+    if lead is None:
+        units = np.full(model.size, np.abs(model.drive_force(model.own_frequency)).max())
+    else:
+        units = np.diag(model.stiffness) * abs(lead.first_gap[1])
+    return {
+        f"constant x{i + 1}": float((forces[i] - model.constant[i]) / units[i])
+        for i in np.flatnonzero(model.constant).tolist()
+    }

@@ -1,19 +1,20 @@
 """The parts of both dead-zone stages: one that clips (the paper's Fig. 5), one that rectifies.
 
-Both take v1 and give fv, zero inside the clearance; R50, which turns fv into the stop's force,
-belongs to the integrator. docs/synthesis.md has the formulas.
+Both take the displacement in a clearance and give fv, zero inside it; R50, which turns fv into the
+stop's force, belongs to the integrator. docs/synthesis.md has the formulas.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from designer.base.errors import InputError
 from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
 from designer.catalog.entries import DiodeEntry, ReferenceEntry
+from designer.circuit.dead_zone_place import DeadZonePlace, part_of
 from designer.circuit.netlist import (
     GROUND,
     NEGATIVE,
@@ -22,49 +23,86 @@ from designer.circuit.netlist import (
     Contact,
     Diode,
     Part,
-    Reference,
     Section,
     Stop,
 )
+from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails
 from designer.circuit.resistors import Resistors
 from designer.model.circuit_table import CircuitSpec
-from designer.model.mechanics import POSITIONS, MechanicalModel, Sides
+from designer.model.mechanics import Clearance, MechanicalModel, Side
 
 Kind = Literal["saturation", "rectifier"]
-
-OUTPUT = "fv"
-"""Net of the stage's output."""
-MOVING = "C1"
-"""Capacitor whose voltage is the displacement at the stop."""
 
 
 @dataclass(frozen=True)
 class DeadZoneStage:
-    """Which stage makes the dead zone."""
+    """Which stage makes the dead zones."""
 
     kind: Kind = "saturation"
     """"saturation", the paper's stage that clips, or "rectifier", whose dead zone is flat."""
-    sides: Sides = "both"
-    """The stops that exist."""
     diode: DiodeEntry | None = None
     """The rectifier's diode; None for the other kind."""
     reference: ReferenceEntry | None = None
-    """The rectifier's reference; None for the other kind."""
+    """The reference of thresholds and constant forces; None where nothing needs one."""
 
     @property
-    def positions(self) -> tuple[int, ...]:
-        """1 for the upper stop, -1 for the lower."""
-        return POSITIONS[self.sides]
+    def inverts(self) -> bool:
+        """Whether it works on the displacement's negative."""
+        return self.kind == "rectifier"
 
-    def parts(self, clearance: str, resistors: Resistors) -> tuple[list[Part], Stop]:
-        """The stage's parts, and how the clearance of this name shows in them.
+    @property
+    def feeds(self) -> Mapping[int, str]:
+        """Names of the resistors that feed the references, by the reference's sign."""
+        return RECTIFIER_FEEDS if self.kind == "rectifier" else FEEDS
+
+    def places(self, clearances: tuple[Clearance, ...]) -> tuple[DeadZonePlace, ...]:
+        """Where the stage of each clearance stands."""
+        alone = len(clearances) == 1
+        return tuple(
+            DeadZonePlace(clearance, index, alone, self.inverts)
+            for index, clearance in enumerate(clearances)
+        )
+
+    def parts(
+        self, place: DeadZonePlace, resistors: Resistors, rails: ReferenceRails
+    ) -> tuple[list[Part], Stop]:
+        """The parts of the stage at a place, and how its clearance shows in them.
 
         Raises
         ------
-        InputError : a rectifier without its diode or reference.
+        InputError : a rectifier without its diode or reference; a clearance that the stage cannot
+            make (``refused``).
         """
-        make = _saturation if self.kind == "saturation" else _rectifier
-        return make(self, clearance, resistors)
+        refusal = self.refused(place.clearance)
+        if refusal is not None:
+            raise refusal
+        if self.kind == "saturation":
+            return _saturation(place, resistors)
+        if self.diode is None:
+            raise InputError(None, "dead zone", "no diode", "a diode, for a rectifier")
+        return _rectifier(place, resistors, rails, diode_model(self.diode))
+
+    def refused(self, clearance: Clearance) -> InputError | None:
+        """Why the stage cannot make this clearance; None if it can."""
+        name, stops = clearance.name, [stop for _, stop in clearance.sides]
+        if any(stop.further for stop in stops):
+            return InputError(
+                None,
+                f"clearance {name}",
+                "a stop that stiffens in steps",
+                "one [[clearance]] for each step, at the same place, with rising gaps",
+            )
+        if self.kind == "rectifier":
+            return None
+        if any(stop.gap <= 0.0 for stop in stops):
+            found = f'"saturation", with the stop of clearance {name} in contact at rest'
+            expected = '"rectifier": an amplifier that clips is linear where nothing moves'
+        elif len(stops) == 2 and stops[0] != stops[1]:
+            found = f'"saturation", with unequal stops in clearance {name}'
+            expected = '"rectifier": an amplifier that clips has the same stop on both sides'
+        else:
+            return None
+        return InputError(None, "circuit.dead_zone", found, expected)
 
 
 def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -> DeadZoneStage:
@@ -74,17 +112,15 @@ def dead_zone_stage(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog)
     ------
     InputError : the catalogue has no such diode or reference.
     """
-    stops = model.second_order().clearances
-    sides = stops[0].which if stops else "both"
-    if spec.dead_zone == "saturation":
-        return DeadZoneStage(spec.dead_zone, sides)
-    diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
-    return DeadZoneStage(spec.dead_zone, sides, diode, reference)
+    if spec.dead_zone == "rectifier":
+        diode, reference = catalog.diode(spec.diode), catalog.reference(spec.reference)
+        return DeadZoneStage(spec.dead_zone, diode, reference)
+    if model.second_order().constant.any():
+        return DeadZoneStage(spec.dead_zone, None, catalog.reference(spec.reference))
+    return DeadZoneStage(spec.dead_zone)
 
 
-def _saturation(
-    stage: DeadZoneStage, clearance: str, resistor: Resistors
-) -> tuple[list[Part], Stop]:
+def _saturation(place: DeadZonePlace, resistor: Resistors) -> tuple[list[Part], Stop]:
     """The saturating path U3B, U3C and the linear path U3A, added by U3D.
 
     U3C is linear inside the clearance and at its limit in contact. With one stop only, a constant
@@ -92,142 +128,218 @@ def _saturation(
     """
     steep, flat = "saturating path of the dead zone", "linear path of the dead zone"
     total = "sum of the dead zone"
+    v, out, part = place.displacement, place.output, place.part
+    d1, d2, d3, d4, w1, w2, v11, v12 = map(
+        place.net, ("d1", "d2", "d3", "d4", "w1", "w2", "v11", "v12")
+    )
     parts: list[Part] = [
-        _section("U3B", "d1", "w1", steep),
-        *resistor("R200", "v1", "d1", steep),
-        *resistor("R201", "d1", "w1", steep),
-        _section("U3C", "d2", "w2", steep),
-        *resistor("R202", "w1", "d2", steep),
-        *resistor("R203", "d2", "w2", steep),
-        *resistor("R204", "w2", "v11", "divider of the saturating path"),
-        *resistor("R205", "v11", GROUND, "divider of the saturating path"),
-        _section("U3A", "d3", "v12", flat),
-        *resistor("R206", "v1", "d3", flat),
-        *resistor("R207", "d3", "v12", flat),
-        _section("U3D", "d4", OUTPUT, total),
-        *resistor("R208", "v11", "d4", total),
-        *resistor("R209", "v12", "d4", total),
-        *resistor("R210", "d4", OUTPUT, total),
+        _section(place.section("U3B"), d1, w1, steep),
+        *resistor(part("R200"), v, d1, steep),
+        *resistor(part("R201"), d1, w1, steep),
+        _section(place.section("U3C"), d2, w2, steep),
+        *resistor(part("R202"), w1, d2, steep),
+        *resistor(part("R203"), d2, w2, steep),
+        *resistor(part("R204"), w2, v11, "divider of the saturating path"),
+        *resistor(part("R205"), v11, GROUND, "divider of the saturating path"),
+        _section(place.section("U3A"), d3, v12, flat),
+        *resistor(part("R206"), v, d3, flat),
+        *resistor(part("R207"), d3, v12, flat),
+        _section(place.section("U3D"), d4, out, total),
+        *resistor(part("R208"), v11, d4, total),
+        *resistor(part("R209"), v12, d4, total),
+        *resistor(part("R210"), d4, out, total),
     ]
-    if stage.sides != "both":
-        here, back = (POSITIVE, NEGATIVE) if stage.sides == "upper" else (NEGATIVE, POSITIVE)
-        parts += resistor("R211", here, "d1", "shift to one stop")
-        parts += resistor("R212", back, "d4", "shift to one stop, taken out again")
-    ends = {side: Contact("U3C", side) for side in stage.positions}
-    return parts, Stop(clearance, MOVING, ends.get(1), ends.get(-1), OUTPUT)
+    sides = place.clearance.which
+    if sides != "both":
+        here, back = (POSITIVE, NEGATIVE) if sides == "upper" else (NEGATIVE, POSITIVE)
+        parts += resistor(part("R211"), here, d1, "shift to one stop")
+        parts += resistor(part("R212"), back, d4, "shift to one stop, taken out again")
+    switch = place.section("U3C")
+    ends = {side: Contact(switch, side) for side in place.clearance.positions}
+    return parts, _stop(place, ends, parts)
 
 
 @dataclass(frozen=True)
-class _Half:
+class HalfNames:
     """Names and nets of one half of the rectifier.
 
-    source, threshold, feedback : resistors from v1n, the reference and fv to the summing node.
-    series, clamp : diodes, and the net between the clamp and its resistor.
-    reference, its rail, and the resistor that feeds it from a supply.
+    source, threshold, feedback : resistors from the displacement's negative, the reference and fv
+    to the summing node. series, clamp : diodes, and the net between the clamp and its resistor.
     """
 
     section: str
+    """The amplifier."""
     node: str
+    """Its summing node."""
     output: str
+    """Net of its output."""
     source: str
+    """Resistor from the displacement's negative."""
     threshold: str
+    """Resistor from the reference."""
     feedback: str
+    """Resistor from the stage's output."""
     series: str
+    """Diode to the stage's output."""
     clamp: str
+    """Diode that holds the amplifier inside the clearance."""
     between: str
+    """Net between the clamp and its resistor."""
     lift: str
-    reference: str
-    rail: str
-    feed: str
-    supply: str
+    """The clamp's resistor."""
 
 
 _HALVES = {
-    1: _Half(
-        section="U3A", node="d1", output="w1", source="R200", threshold="R201", feedback="R202",
-        series="D200", clamp="D201", between="c1", lift="R208",
-        reference="VR1", rail="vrp", feed="R206", supply=POSITIVE,
-    ),
-    -1: _Half(
-        section="U3B", node="d2", output="w2", source="R203", threshold="R204", feedback="R205",
-        series="D202", clamp="D203", between="c2", lift="R209",
-        reference="VR2", rail="vrn", feed="R207", supply=NEGATIVE,
-    ),
-}  # fmt: skip
+    1: HalfNames("U3A", "d1", "w1", "R200", "R201", "R202", "D200", "D201", "c1", "R208"),
+    -1: HalfNames("U3B", "d2", "w2", "R203", "R204", "R205", "D202", "D203", "c2", "R209"),
+}
+
+
+def half_names(place: DeadZonePlace, side: int) -> HalfNames:
+    """The names of one half, 1 upper or -1 lower, at a place."""
+    h, net = _HALVES[side], place.net
+    return replace(
+        half_parts(place.index, side),
+        section=place.section(h.section),
+        node=net(h.node),
+        output=net(h.output),
+        between=net(h.between),
+    )
+
+
+def half_parts(index: int, side: int) -> HalfNames:
+    """The same for a clearance by its place in their order; nets and section are the first's."""
+    h = _HALVES[side]
+    parts = ("source", "threshold", "feedback", "series", "clamp", "lift")
+    return replace(h, **{name: part_of(index, getattr(h, name)) for name in parts})
 
 
 def _rectifier(
-    stage: DeadZoneStage, clearance: str, resistor: Resistors
+    place: DeadZonePlace, resistor: Resistors, rails: ReferenceRails, model: DiodeModel
 ) -> tuple[list[Part], Stop]:
     """A half-wave rectifier for each stop, both on one output node.
 
     Inside the clearance the clamp diode holds the half's output away and the feedback resistor
-    holds fv at 0 V; beyond the threshold the clamp lets go and the series diode takes over.
+    holds fv at 0 V; beyond the threshold the clamp lets go and the series diode takes over. A
+    preloaded stop takes the reference of the other sign, so that its half drives fv at rest.
 
     While one half drives fv, the other's series diode has to stay off: its op-amp's output must
     stand above fv (below it, in the upper half). A resistor in series with the clamp sees to that:
-    the clamp then carries 2 Vref/R201, whatever the depth of the contact, so the output stands at
-    2 Vref R208/R201 and a drop. It has R201's value unless it is given one of its own. Without the
-    other half there is nothing to keep off.
+    between equal halves the clamp then carries 2 Vref/R201, whatever the depth of the contact, so
+    the output stands at 2 Vref R208/R201 and a drop. It has R201's value unless it is given one of
+    its own. Without the other half there is nothing to keep off. ``idle_limits`` has unequal ones.
     """
-    if stage.diode is None or stage.reference is None:
-        raise InputError(None, "dead zone", "no diode or reference", "both, for a rectifier")
-    model = diode_model(stage.diode)
     parts: list[Part] = []
     contacts: dict[int, Contact] = {}
-    for side in stage.positions:
-        half = _HALVES[side]
-        word = "upper" if side > 0 else "lower"
-        role, clamped = f"{word} half of the dead zone", half.output
-        parts += [
-            _section(half.section, half.node, half.output, role),
-            *resistor(half.source, "v1n", half.node, role),
-            *resistor(half.threshold, half.rail, half.node, f"threshold of the {role}"),
-            *resistor(half.feedback, half.node, OUTPUT, role),
-            _diode(half.series, half.output, OUTPUT, side, model, False, role),
-        ]
-        if stage.sides == "both":
-            clamped = half.between
-            parts += resistor(
-                half.lift, clamped, half.output, f"clamp of the {role}", like=half.threshold
-            )
-        ground = (half.rail, GROUND) if side > 0 else (GROUND, half.rail)
-        parts += [
-            _diode(half.clamp, half.node, clamped, side, model, True, f"clamp of the {role}"),
-            Reference(
-                half.reference,
-                *ground,
-                volts=stage.reference.voltage,
-                grade=stage.reference.grade,
-                model=stage.reference.name,
-                role=f"reference of the {role}",
-                least=stage.reference.least_current,
-                impedance=stage.reference.dynamic_impedance,
-            ),
-            *resistor(half.feed, half.supply, half.rail, f"feed of the reference, {word} half"),
-        ]
+    both = place.clearance.which == "both"
+    for side, stop in place.clearance.sides:
+        half = half_names(place, side)
+        parts += _half(place, half, side, stop, resistor, rails, model, both=both)
         contacts[side] = Contact(half.clamp, 0, ((half.series, 1),))
-    return parts, Stop(clearance, MOVING, contacts.get(1), contacts.get(-1), OUTPUT)
+    return parts, _stop(place, contacts, parts)
+
+
+def _half(
+    place: DeadZonePlace,
+    half: HalfNames,
+    side: int,
+    stop: Side,
+    resistor: Resistors,
+    rails: ReferenceRails,
+    model: DiodeModel,
+    *,
+    both: bool,
+) -> list[Part]:
+    """The half of one stop; ``both``: the other one is there too."""
+    word = "upper" if side > 0 else "lower"
+    role, clamped = f"{word} half of the dead zone", half.output
+    sign, preloaded = _reference_sign(side, stop), stop.gap < 0.0
+    parts: list[Part] = [
+        _section(half.section, half.node, half.output, role),
+        *resistor(half.source, place.displacement, half.node, role),
+    ]
+    if stop.gap:
+        parts += resistor(half.threshold, RAILS[sign], half.node, f"threshold of the {role}")
+    parts += [
+        *resistor(half.feedback, half.node, place.output, role),
+        _diode(half.series, half.output, place.output, side, model, preloaded, role),
+    ]
+    if both:
+        clamped = half.between
+        like = half.threshold if stop.gap else half.source
+        parts += resistor(half.lift, clamped, half.output, f"clamp of the {role}", like=like)
+    clamps = f"clamp of the {role}"
+    parts.append(_diode(half.clamp, half.node, clamped, side, model, not preloaded, clamps))
+    if stop.gap:
+        end = "upper" if sign > 0 else "lower"
+        parts += rails(sign, f"reference of the {role}", f"feed of the reference, {end} half")
+    return parts
+
+
+def _reference_sign(side: int, stop: Side) -> int:
+    """Which reference sets the threshold of a side: its own, of a preloaded stop the other."""
+    return side if stop.gap >= 0.0 else -side
+
+
+def _stop(place: DeadZonePlace, contacts: Mapping[int, Contact], parts: Sequence[Part]) -> Stop:
+    clearance = place.clearance
+    return Stop(
+        clearance.name,
+        f"C{2 * clearance.mass + 1}",
+        contacts.get(1),
+        contacts.get(-1),
+        place.output,
+        tuple(part.name for part in parts if isinstance(part, Section | Diode)),
+        place.difference,
+    )
 
 
 def idle_limits(circuit: Circuit, values: Mapping[str, float]) -> dict[str, tuple[str, float]]:
-    """How far a half of the rectifier may drive fv [V] before the other's series diode conducts.
+    """How far a half of a rectifier may drive fv [V] before the other's series diode conducts.
 
-    By the driving section: that diode, and 2 Vref R208/R201 and two drops of the idle half, with
-    the sign that fv has then. values : [ohm] by name, a composite's as one. Empty where there are
-    not both halves.
+    By the driving section: that diode, and the voltage with the sign that fv has then. At a depth d
+    of the contact the idle half's clamp carries (t + t')/R' + d (1/R' - s/F'): t and t' are the
+    thresholds of the driving and the idle half, s the driving half's gain, R' and F' the idle
+    half's input and feedback resistor. The clamp's resistor and two drops are what keeps the diode
+    off; a half steeper than the idle one takes from that current. values : [ohm] by name, a
+    composite's as one. Empty where no clearance has both halves.
     """
-    references = {r.name: r for r in circuit.references}
-    if any(half.reference not in references for half in _HALVES.values()):
-        return {}
     out = {}
-    for side, driving in _HALVES.items():
-        idle = _HALVES[-side]
-        lift = 2.0 * references[idle.reference].volts * values[idle.lift] / values[idle.threshold]
-        drop = next(d.model.drop for d in circuit.diodes if d.name == idle.series)
-        section = next(s.name for s in circuit.sections if s.inverting == driving.node)
-        out[section] = (idle.series, side * (lift + 2.0 * drop))
+    for index, stop in enumerate(circuit.stops):
+        if circuit.diodes and len(stop.contacts) == 2:
+            for side in (1, -1):
+                driving, idle = (half_parts(index, end) for end in (side, -side))
+                diodes = {d.name: d for d in circuit.diodes}
+                feeding = diodes[driving.series].nets
+                section = next(s.name for s in circuit.sections if s.output in feeding)
+                reach = _idle_reach(circuit, values, driving, idle)
+                out[section] = (idle.series, side * reach)
     return out
+
+
+def _idle_reach(
+    circuit: Circuit, values: Mapping[str, float], driving: HalfNames, idle: HalfNames
+) -> float:
+    """Size of the limit of ``idle_limits`` [V]; infinite where there is none."""
+    diodes = {d.name: d for d in circuit.diodes}
+    volts = max((r.volts for r in circuit.references), default=0.0)
+    signs = [-1.0 if diodes[half.series].rest else 1.0 for half in (driving, idle)]
+    own, other = (
+        sign * volts * values[half.source] / values[half.threshold]
+        if half.threshold in values
+        else 0.0
+        for half, sign in zip((driving, idle), signs, strict=True)
+    )
+    if other:
+        share = (1.0 + own / other) * signs[1]
+        lift = share * volts * values[idle.lift] / values[idle.threshold]
+    else:
+        lift = own * values[idle.lift] / values[idle.source]
+    gain = values[idle.feedback] / values[idle.source]
+    steeper = 1.0 - gain / (values[driving.feedback] / values[driving.source])
+    taken = 1.0 + values[idle.lift] / values[idle.feedback] * steeper
+    reach = lift + 2.0 * diodes[idle.series].model.drop
+    return reach / taken if taken > 0.0 else float("inf")
 
 
 def _section(name: str, node: str, out: str, role: str) -> Section:

@@ -111,7 +111,7 @@ class Diode:
     model: DiodeModel
     """Its curve."""
     rest: bool
-    """Whether it conducts with everything at rest."""
+    """Whether it conducts with every displacement at zero."""
     role: str
     """What it is for, in words."""
     views: View = View.EVERYWHERE
@@ -194,13 +194,18 @@ class Stop:
     clearance: str
     """Its name."""
     state: str
-    """Name of the capacitor whose voltage is the displacement."""
+    """Name of the capacitor whose voltage is the displacement, or of two masses the first's."""
     upper: Contact | None
     """How the upper stop shows; None where there is none."""
     lower: Contact | None
     """How the lower stop shows; None where there is none."""
     output: str
-    """Net of its dead-zone stage's output, zero inside the clearance."""
+    """Net of the dead-zone stage's output."""
+    switches: tuple[str, ...]
+    """Names of the stage's op-amp sections and diodes."""
+    difference: tuple[str, int] | None = None
+    """Between two masses: the net that carries the difference of their displacements, and the sign
+    that it has there, 1 or -1."""
 
     @property
     def contacts(self) -> tuple[tuple[int, Contact], ...]:
@@ -318,13 +323,27 @@ class Circuit:
 
     @property
     def rest(self) -> tuple[int, ...]:
-        """Position of each switch at rest: op-amps linear, diodes as they say."""
+        """Position of each switch with every displacement at zero: op-amps linear, diodes as they
+        say. A preloaded stop carries force there."""
         return (*(0 for _ in self.sections), *(int(d.rest) for d in self.diodes))
 
+    @property
+    def open(self) -> tuple[int, ...]:
+        """Position of each switch with every clearance open."""
+        contacts = [contact for stop in self.stops for _, contact in stop.contacts]
+        moved = {
+            name: int(position == 0)
+            for contact in contacts
+            for name, position in ((contact.switch, contact.position), *contact.others)
+        }
+        return self._moved(self.rest, moved)
+
     def carrying(self, contact: Contact) -> tuple[int, ...]:
-        """Position of each switch while this stop carries force and nothing else has changed."""
-        moved = dict([(contact.switch, contact.position), *contact.others])
-        pairs = zip(self.switches, self.rest, strict=True)
+        """Position of each switch while this stop alone carries force."""
+        return self._moved(self.open, dict([(contact.switch, contact.position), *contact.others]))
+
+    def _moved(self, key: tuple[int, ...], moved: Mapping[str, int]) -> tuple[int, ...]:
+        pairs = zip(self.switches, key, strict=True)
         return tuple(moved.get(name, position) for name, position in pairs)
 
     def may_limit(self, section: Section, position: int) -> bool:

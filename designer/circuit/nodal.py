@@ -54,7 +54,7 @@ class NodalEquations:
         self.board = board
         self.lead = np.shape(board.inverse_gain)
         self._sections, self._diodes = circuit.sections, circuit.diodes
-        self._stops = [(stop.contacts, circuit.states.index(stop.state)) for stop in circuit.stops]
+        self._moving = [circuit.states.index(stop.state) for stop in circuit.stops]
         self._nets = {net: i for i, net in enumerate(circuit.nets)}
         self._first = _layout(circuit, len(self._nets))
         self._number = {name: i for i, name in enumerate(circuit.switches)}
@@ -124,7 +124,7 @@ class NodalEquations:
                 if j >= 0 or isinstance(switch, Diode):
                     largest = np.abs(row[..., :n]).max(axis=-1, initial=0.0)
                     if j >= 0:
-                        across = np.abs(row[..., self._stops[j][1]])
+                        across = np.abs(row[..., self._moving[j]]) / self._per_state(j, solved)
                         scale = np.where(across > 1e-9 * largest, across, 1.0)
                     else:  # amperes beside volts: bring both to states
                         scale = np.where(largest > 0.0, largest, 1.0)
@@ -139,6 +139,13 @@ class NodalEquations:
             known = tuple(self._side(stop, key) for stop in self.circuit.stops)
             self._sided[key] = known
         return known
+
+    def _per_state(self, j: int, solved: Solution) -> Any:
+        """Volts of the displacement in a clearance per volt of the first mass's state."""
+        difference = self.circuit.stops[j].difference
+        if difference is None:
+            return 1.0
+        return np.abs(solved.voltage[difference[0]][..., self._moving[j]])
 
     def clipped(self, key: ModeKey) -> bool:
         """Whether an op-amp that ought to be linear is at a limit."""

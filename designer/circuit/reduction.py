@@ -64,12 +64,11 @@ class Reduction:
         A mode's key has one entry per op-amp section in the circuit's order, then one per diode.
         """
         c = self.circuit
-        moving = (c.states.index(s.state) for s in c.stops)
-        displacement, velocity = motion_of_states(len(c.states), moving)
+        displacement, velocity = self._motion()
         return PiecewiseLinearSystem(
             states=c.states,
             build=self._mode,
-            start=c.rest,
+            start=c.open,
             clearances=tuple(s.clearance for s in c.stops),
             displacement=displacement,
             velocity=velocity,
@@ -90,6 +89,20 @@ class Reduction:
         """Voltage (k,) of a net along states x (k, n) and generator voltages u (k,)."""
         row = self.solution(key).voltage[net]
         return np.asarray(x @ row[:-2] + row[-2] * u + row[-1])
+
+    def _motion(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """Rows of the displacement in each clearance and of its velocity: of one mass the states,
+        of two what their difference amplifier makes of them, in volts of the first one's."""
+        c = self.circuit
+        size, moving = len(c.states), [c.states.index(s.state) for s in c.stops]
+        displacement, velocity = map(list, motion_of_states(size, moving))
+        for k, (stop, i) in enumerate(zip(c.stops, moving, strict=True)):
+            if stop.difference is not None:
+                net, sign = stop.difference
+                A, row = self._mode(c.open).A, sign * self.solution(c.open).voltage[net]
+                displacement[k] = row
+                velocity[k] = np.append(row[:size] @ A / A[i, i + 1], row[size])
+        return tuple(displacement), tuple(velocity)
 
     def _mode(self, key: ModeKey) -> Mode:
         solved, n = self.solution(key), len(self.circuit.states)
@@ -115,7 +128,7 @@ class Reduction:
         that is fed from a rail, are compared by what they do: the flow in contact, and where
         contact begins.
         """
-        if not self.board.mirror_symmetric:
+        if not self.board.mirror_symmetric or (self.circuit.references and not self.circuit.stops):
             return False
         for stop in self.circuit.stops:
             if stop.upper is None or stop.lower is None:
@@ -128,7 +141,7 @@ class Reduction:
         assert stop.upper is not None
         assert stop.lower is not None
         c = self.circuit
-        rest = self._mode(c.rest)
+        rest = self._mode(c.open)
         above, below = (self._mode(c.carrying(contact)) for contact in (stop.upper, stop.lower))
         ends = sorted(-g.e for g in rest.guards if g.clearance == c.stops.index(stop))
         return (

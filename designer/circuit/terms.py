@@ -30,7 +30,7 @@ class Term:
     source: int | None
     """Index of the state fed in, or None for the generator."""
     inverted: bool
-    """Whether the state's negative is needed."""
+    """Whether the negative of the state, or of the generator, is needed."""
     quantity: Quantity
     """The coefficient that it realises."""
 
@@ -49,7 +49,8 @@ def terms(
 
     Entries may be numbers or symbols; ``sign`` tells -1, 0 or 1 of an entry. An inverting
     integrator fed with +s realises a coefficient of -s: positive entries of C and K take the
-    state itself, negative ones its inverse; the generator's inversion is its phase.
+    state itself, negative ones its inverse. The generator's inversion is its phase; a force in
+    antiphase takes the generator's inverse.
     """
     n = len(force)
     out: list[Term] = []
@@ -64,8 +65,8 @@ def terms(
             if s := sign(stiffness[i][j]):
                 quantity = ("stiffness", i, j)
                 out.append(Term(f"R{first + 1 + n + j}", velocity, 2 * j, s < 0, quantity))
-        if sign(force[i]):
-            out.append(Term(f"R{first + 2 * n + 1}", velocity, None, False, ("force", i, 0)))
+        if s := sign(force[i]):
+            out.append(Term(f"R{first + 2 * n + 1}", velocity, None, s < 0, ("force", i, 0)))
     return tuple(out)
 
 

@@ -18,14 +18,14 @@ from designer.dynamics.working_modes import STATES, empty_modes
 
 
 def working_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
-    """Keys of the modes between which a good board moves: at rest, and on the way into each contact
+    """Keys of the modes between which a good board moves: open, and on the way into each contact
     one switch after the other. None where the fast path does not fit."""
     if len(circuit.states) != STATES or len(circuit.stops) != 1:
         return ()
     names = circuit.switches
-    keys = [circuit.rest]
+    keys = [circuit.open]
     for _, contact in circuit.stops[0].contacts:
-        key = list(circuit.rest)
+        key = list(circuit.open)
         for switch, position in ((contact.switch, contact.position), *contact.others):
             key[names.index(switch)] = position
             keys.append(tuple(key))

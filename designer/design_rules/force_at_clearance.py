@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.dead_zone_parts import OUTPUT
 from designer.circuit.netlist import GROUND, Circuit, nominal_board
 from designer.circuit.nodal import NodalEquations
 
@@ -118,10 +117,10 @@ def leftover(circuit: Circuit, values: Mapping[str, float] | None = None) -> flo
     stop = circuit.stops[0]
     place = circuit.states.index(stop.state)
     slopes = []
-    for key in (circuit.rest, *(circuit.carrying(c) for _, c in stop.contacts)):
+    for key in (circuit.open, *(circuit.carrying(c) for _, c in stop.contacts)):
         G, right = equations.of(key)
         y = np.asarray(np.linalg.solve(G, right), dtype=np.float64)
         solved = equations.solution(y)
-        slopes.append(float(solved.voltage[OUTPUT][place]))
+        slopes.append(float(solved.voltage[stop.output][place]))
     contact = float(np.mean(slopes[1:])) - slopes[0]
     return slopes[0] / contact

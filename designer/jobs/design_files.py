@@ -118,9 +118,7 @@ def load(folder: Folder, modelfile: ModelFile, catalog: Catalog) -> Synthesis:
         largest = peaks(model, responses).states
         volts = np.array(list(document["scales"]["volts"].values()), dtype=float)
         swing = (float((volts * largest).max()), largest)
-        errors = coefficient_errors(
-            circuit, model.second_order(), swing=None if circuit.stops else swing
-        )
+        errors = coefficient_errors(circuit, model.second_order(), swing=swing)
         if abs(errors.max_error - float(document["max_error"])) > 1e-9:
             raise ValueError("parts and max_error do not belong together")
         conditions = document["conditions"]

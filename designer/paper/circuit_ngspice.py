@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.dead_zone_parts import OUTPUT
+from designer.circuit.dead_zone_place import OUTPUT
 from designer.circuit.netlist import GROUND, Circuit, Excitation, Generator, Section, nominal_board
 from designer.dynamics.kernel_boards import POINTS
 from designer.paper.circuits import Built, SettledResponse

@@ -167,7 +167,7 @@ def column(
     circuit = candidate.circuit
     errors, reason = None, ""
     try:
-        swing = None if circuit.stops else (circuit.saturation, np.ones(len(circuit.states)))
+        swing = circuit.saturation, np.ones(len(circuit.states))
         errors = coefficient_errors(circuit, model.second_order(), swing=swing)
     except (ArithmeticError, FloatingCircuit) as error:
         reason = str(error)

@@ -14,8 +14,9 @@ from designer.base.arrays import Array
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind, OpAmp
 from designer.circuit import build
-from designer.circuit.coefficients import CoefficientErrors, CutShort, coefficient_errors
+from designer.circuit.coefficients import CoefficientErrors, coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
+from designer.circuit.dead_zone_reading import CutShort
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.model.circuit_table import CircuitSpec
@@ -132,8 +133,8 @@ class Order:
         )
 
     def errors(self, circuit: Circuit, swing: float) -> CoefficientErrors:
-        """Errors of the circuit; without a clearance ``swing`` [V] sets the amplitude."""
-        aim = None if circuit.stops else (swing, self.peaks.states)
+        """Errors of the circuit; without a gap ``swing`` [V] sets the amplitude."""
+        aim = swing, self.peaks.states
         return coefficient_errors(circuit, self.model.second_order(), swing=aim)
 
 

@@ -20,6 +20,7 @@ from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Clearance
 from designer.model.model import Dimensionless
 from designer.model.response_table import Response
 from designer.spice import numerics_gate
@@ -32,6 +33,7 @@ from tests.shared.stages import one_sided, rectifier, stage
 
 CATALOG = load_catalog()
 OPAMP = CATALOG.opamp("TL074C")
+STOP = Clearance.even(0, 19.0, 0.25)
 PAPER = {"m": 0.5, "k": 0.5, "k0": 0.95, "c": 0.5, "zeta": 0.1, "f20": 0.0, "b": 0.25}
 FREQUENCY, AMPLITUDE = 355.88, 1.2346
 LINEAR = {f"R{i}" for i in (1, 2, 3, 4, 5, 7, 8, 9, 10, 11)}
@@ -132,7 +134,7 @@ def test_a_damping_that_is_zero_has_no_part() -> None:
     """M1 to ground only: neither coupling nor damping on M2, so R3, R8 and R9 are not there."""
     terms = matching.terms([[0.2, 0.0], [0.0, 0.0]], [[1.0, -1.0], [-1.0, 2.0]], [1.0, 0.0])
     values = paper_values.corrected()
-    circuit = build.build(terms, values, OPAMP, supply=15.0, saturation=13.0, clearance="A")
+    circuit = build.build(terms, values, OPAMP, supply=15.0, saturation=13.0, clearances=(STOP,))
     wanted = (LINEAR - {"R3", "R8", "R9"}) | INVERTERS | SATURATING | {"R6"}
     assert {r.name for r in circuit.resistors} == wanted
     into = [r for r in circuit.resistors if "s4" in (r.a, r.b)]
@@ -143,9 +145,7 @@ def test_a_sign_that_nothing_needs_has_no_inverter() -> None:
     """Without a coupling spring from M2 to M1 (a matrix that is not a mechanism's, but a rule is a
     rule) nothing takes -v3."""
     terms = matching.terms([[0.2, -0.2], [-0.2, 0.4]], [[1.0, 0.0], [-1.0, 2.0]], [1.0, 0.0])
-    circuit = build.build(
-        terms, paper_values.corrected(), OPAMP, supply=15.0, saturation=13.0, clearance=None
-    )
+    circuit = build.build(terms, paper_values.corrected(), OPAMP, supply=15.0, saturation=13.0)
     names = {r.name for r in circuit.resistors}
     assert {"R104", "R105"}.isdisjoint(names)
     assert "R5" not in names

@@ -150,5 +150,5 @@ def test_one_integrator_a_state_one_resistor_a_coefficient(seed: int, n: int) ->
         if kind == "stiffness":
             assert t.source == 2 * j
             assert t.inverted == (stiffness[i, j] < 0)
-    needed = {t.source for t in found if t.inverted}
+    needed = {t.source for t in found if t.inverted and t.source is not None}
     assert set(inverted_states(found)) == needed

@@ -304,9 +304,11 @@ def test_a_response_without_a_period_has_a_highest_harmonic_too() -> None:
 
 
 def test_how_far_a_rectifier_may_drive_its_output() -> None:
-    """2 Vref R208/R201 and two drops, each side by the other half's parts; the driving section is
-    a drop beyond fv, and what it holds while idle does not count."""
-    made = circuit("rectifier", R201=1.2e4, R204=1e4, R208=1.2e4, R209=9e3)
+    """The idle half's clamp carries what both thresholds ask of its input resistor, by Kirchhoff's
+    law, and two drops come on top; the driving section is a drop beyond fv, and what it holds while
+    idle does not count."""
+    halves = dict.fromkeys(("R200", "R203"), 1e4) | dict.fromkeys(("R202", "R205"), 2e4)
+    made = circuit("rectifier", **halves, R201=1.2e4, R204=1e4, R208=1.2e4, R209=9e3)
     volts = {r.name: r.volts for r in made.references}
     drop = made.diodes[0].model.drop
     reach = idle_limits(made, made.values)
@@ -314,8 +316,8 @@ def test_how_far_a_rectifier_may_drive_its_output() -> None:
         "U3A": "D202",
         "U3B": "D200",
     }
-    assert reach["U3A"][1] == pytest.approx(1.8 * volts["VR2"] + 2.0 * drop)
-    assert reach["U3B"][1] == pytest.approx(-2.0 * volts["VR1"] - 2.0 * drop)
+    assert reach["U3A"][1] == pytest.approx((0.9 + 0.75) * volts["VR2"] + 2.0 * drop)
+    assert reach["U3B"][1] == pytest.approx(-(1.0 + 1.2) * volts["VR1"] - 2.0 * drop)
     assert idle_limits(circuit("saturation"), circuit("saturation").values) == {}
     design_ = replace(design(), circuit=made)
     for low, high, diode, fv in (

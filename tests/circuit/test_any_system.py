@@ -1,0 +1,268 @@
+"""The circuit of any system: with exact values its reduction is the model, matrix for matrix."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
+from designer.circuit.netlist import Circuit, Section, nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.flow import Flow
+from designer.dynamics.piecewise_linear import Drive, ModeKey
+from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from tests.shared.exact_circuits import Scale, exact_circuit
+
+
+def random_system(seed: int) -> SecondOrderSystem:
+    """1 to 3 masses, 0 to 2 clearances of any kind, forces of both signs or a moving base."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 4))
+    mass = rng.uniform(0.5, 2.0, n)
+
+    def chain(least: float, most: float) -> Array:
+        ends = rng.uniform(least, most, n)
+        out = np.diag(ends)
+        for i in range(n - 1):
+            out[i, i] += ends[i + 1]
+            out[i, i + 1] = out[i + 1, i] = -ends[i + 1]
+        return out
+
+    clearances = []
+    for name in "AB"[: int(rng.integers(0, 3))]:
+        first = int(rng.integers(0, n))
+        other = int(rng.integers(0, n))
+        sides = [Side(float(rng.uniform(0.2, 0.6)), float(rng.uniform(3.0, 12.0))) for _ in "ul"]
+        shape = rng.integers(0, 4)
+        if shape == 1:  # preloaded on one side
+            sides[0] = replace(sides[0], gap=float(-rng.uniform(0.05, 0.15)))
+        clearances.append(
+            Clearance(
+                name,
+                first,
+                None if other == first else other,
+                None if shape == 2 else sides[0],
+                None if shape == 3 else sides[1],
+            )
+        )
+    moving = bool(rng.integers(0, 2))
+    force = np.zeros(n) if moving else rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 0.0, 1.0], n)
+    force[0] += 0.0 if moving else 1.5
+    return SecondOrderSystem(
+        mass=mass,
+        damping=chain(0.05, 0.3),
+        stiffness=chain(0.8, 2.0),
+        force=force,
+        clearances=tuple(clearances),
+        constant=rng.uniform(-0.3, 0.3, n) * rng.integers(0, 2, n),
+        base=0.4 if moving else 0.0,
+    )
+
+
+def random_scale(system: SecondOrderSystem, seed: int) -> Scale:
+    rng = np.random.default_rng(seed + 1)
+    return Scale(1e-3, rng.uniform(2.0, 6.0, 2 * system.size), 1.3)
+
+
+def keys(circuit: Circuit, sides: tuple[int, ...]) -> ModeKey:
+    """The circuit's mode with each stop in contact with this side, or open."""
+    moved = dict(zip(circuit.switches, circuit.open, strict=True))
+    for stop, side in zip(circuit.stops, sides, strict=True):
+        if side:
+            contact = dict(stop.contacts)[side]
+            moved |= dict([(contact.switch, contact.position), *contact.others])
+    return tuple(moved.values())
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 10**6))
+def test_every_mode_has_the_model_s_matrices(seed: int) -> None:
+    system = random_system(seed)
+    scale = random_scale(system, seed)
+    circuit = exact_circuit(system, scale)
+    board = replace(nominal_board(circuit, ideal=True), drop={d.name: 0.6 for d in circuit.diodes})
+    reduced = Reduction(circuit, board).system()
+    model = system.piecewise_linear(system.own_frequency)
+    volts, seconds = scale.volts, scale.seconds
+    for sides in product(*([0, *c.positions] for c in system.clearances)):
+        key = keys(circuit, sides)
+        ours, wanted = reduced.mode(key), model.mode(sides)
+        assert ours.sides == sides
+        size = np.abs(wanted.A).max()
+        assert seconds * ours.A / volts[:, None] * volts == pytest.approx(wanted.A, abs=1e-9 * size)
+        drive = -ours.B * scale.generator * seconds / volts
+        assert drive == pytest.approx(wanted.B, abs=1e-9 * size)
+        assert seconds * ours.d / volts == pytest.approx(wanted.d, abs=1e-9 * size)
+    # Without gain the hand-over from clamp to series diode has no answer.
+    reduced = Reduction(circuit, replace(board, inverse_gain=1e-8)).system()
+    for k, clearance in enumerate(system.clearances):
+        rows, theirs = reduced.contact_rows(k), model.contact_rows(k)
+        assert rows.keys() == theirs.keys() == set(clearance.positions)
+        for side, row in rows.items():
+            in_model = row[:-2] * volts / volts[2 * clearance.mass]
+            assert in_model == pytest.approx(theirs[side][:-2], abs=1e-5)
+            assert row[-1] / volts[2 * clearance.mass] == pytest.approx(theirs[side][-1], abs=1e-5)
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 10**6))
+def test_exact_values_have_no_error(seed: int) -> None:
+    """Each kind of coefficient is counted, and none of an exact circuit has an error."""
+    system = random_system(seed)
+    scale = random_scale(system, seed)
+    circuit = exact_circuit(system, scale)
+    peaks = np.ones(2 * system.size)
+    found = coefficient_errors(circuit, system, swing=(float(scale.volts.max()), peaks))
+    assert found.max_error < 1e-8
+    for i in np.flatnonzero(system.constant).tolist():
+        assert f"constant x{i + 1}" in found.errors
+    if len(system.clearances) == 2:
+        assert {n for n in found.errors if n.startswith("dead-zone null")} == {
+            "dead-zone null A", "dead-zone null B"
+        }  # fmt: skip
+    gaps = sum(len(c.positions) for c in system.clearances) - 1
+    assert sum(name.startswith("gap ") for name in found.errors) == max(gaps, 0)
+    if system.clearances:
+        assert found.scales.volts == pytest.approx(scale.volts, rel=1e-7)
+        wanted = system.drive_force(system.own_frequency) / scale.generator
+        assert found.drive_gain == pytest.approx(wanted, rel=1e-7, abs=1e-9)
+
+
+@settings(max_examples=12)
+@given(seed=st.integers(0, 10**6))
+def test_orbits_agree(seed: int) -> None:
+    """Three periods from a common start, as long as no half is driven past where both drive."""
+    system = random_system(seed)
+    scale = random_scale(system, seed)
+    circuit = exact_circuit(system, scale)
+    board = replace(nominal_board(circuit), inverse_gain=1e-7, bias={})
+    omega = 1.1 * system.own_frequency
+    size = system.drive_force(omega)[0] / system.drive_force(system.own_frequency)[0]
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-0.2, 0.2, 2 * system.size)
+    theirs = Flow(system.piecewise_linear(omega), Drive(omega), fast=False).run(x, 3)
+    drive = Drive(omega / scale.seconds, -scale.generator * size)
+    ours = Flow(Reduction(circuit, board).system(), drive, fast=False).run(x * scale.volts, 3)
+    peak = np.abs(theirs.strobes).max()
+    for k, clearance in enumerate(system.clearances):
+        wanted = system.piecewise_linear(omega)
+        reduced = Reduction(circuit, board).system()
+        unit = scale.volts[2 * clearance.mass : 2 * clearance.mass + 2]
+        moved, moving = reduced.displacement[k][:-2], reduced.velocity[k][:-1]
+        theirs_moved, theirs_moving = wanted.displacement[k][:-2], wanted.velocity[k][:-1]
+        assert moved * scale.volts / unit[0] == pytest.approx(theirs_moved, abs=1e-4)
+        assert moving * scale.volts / unit[1] == pytest.approx(theirs_moving, abs=1e-4)
+    uneven = any(c.upper and c.lower and c.upper.stiffness != c.lower.stiffness
+                 for c in system.clearances)  # fmt: skip
+    if not uneven:
+        assert ours.strobes / scale.volts == pytest.approx(theirs.strobes, abs=2e-4 * peak)
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 10**6))
+def test_how_far_unequal_halves_drive_their_output(seed: int) -> None:
+    """The idle half's series diode conducts where ``idle_limits`` says, by the exact circuit."""
+    rng = np.random.default_rng(seed)
+    preload = -0.1 if rng.integers(0, 2) else 0.3
+    sides = [Side(preload, float(rng.uniform(3, 12))), Side(0.4, float(rng.uniform(3, 12)))]
+    upper, lower = sides[:: int(rng.choice([1, -1]))]
+    system = two(clearances=(Clearance("A", 0, None, upper, lower),))
+    circuit = exact_circuit(system, SCALE)
+    limits = idle_limits(circuit, circuit.values)
+    board = replace(nominal_board(circuit), inverse_gain=1e-7, bias={})
+    reduction = Reduction(circuit, board)
+    flow = reduction.system()
+    for diode, limit in limits.values():
+        if not np.isfinite(limit) or abs(limit) > 500.0:
+            continue
+        at = circuit.switches.index(diode)
+
+        def conducts(v: float, at: int = at) -> tuple[bool, float]:
+            x = np.array([v, 0.0, 0.0, 0.0])
+            key = flow.mode_at(x, 0.0)
+            fv = reduction.output(key, "fv", x[None, :], np.zeros(1))[0]
+            return bool(key[at]), float(fv)
+
+        high = 2e3 * np.sign(limit)
+        low = (0.3 * SCALE.volts[0] if preload > 0 else 0.05) * np.sign(limit)
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if conducts(middle)[0] else (middle, high)
+        assert conducts(low)[1] == pytest.approx(limit, rel=2e-3)
+
+
+def two(**changes: object) -> SecondOrderSystem:
+    base = SecondOrderSystem(
+        mass=np.array([1.0, 1.0]),
+        damping=np.array([[0.2, -0.2], [-0.2, 0.4]]),
+        stiffness=np.array([[1.0, -1.0], [-1.0, 2.0]]),
+        force=np.array([1.0, -1.0]),
+        clearances=(
+            Clearance("A", 0, None, Side(0.3, 5.0), Side(0.4, 8.0)),
+            Clearance("B", 0, 1, Side(0.5, 6.0), None),
+        ),
+    )
+    return replace(base, **changes)  # type: ignore[arg-type]
+
+
+SCALE = Scale(1e-3, np.array([4.0, 5.0, 3.0, 4.0]), 1.0)
+
+
+def test_names_follow_the_rule() -> None:
+    circuit = exact_circuit(two(), SCALE)
+    assert [stop.output for stop in circuit.stops] == ["fv_A", "fv_B"]
+    names = set(circuit.values)
+    assert {"R50", "R60", "R61", "R200", "R205", "R300", "R320", "R321", "R322"} <= names
+    assert {"R190", "R191"} <= names  # the force on M2 is in antiphase
+    assert {d.name for d in circuit.diodes} == {
+        "D200", "D201", "D202", "D203", "D300", "D301"
+    }  # fmt: skip
+    into = {r.name: {r.a, r.b} for r in circuit.resistors}
+    assert into["R60"] == {"fv_B", "s2"}
+    assert into["R61"] == {"fvn_B", "s4"}
+    assert len(circuit.packages) == -(-len(circuit.sections) // 4)
+    assert circuit.packages == tuple(f"U{i + 1}" for i in range(len(circuit.packages)))
+    assert all(isinstance(s, Section) for s in circuit.sections)
+
+
+def test_each_error_is_named() -> None:
+    """2 % on one part shows in the coefficient that it makes."""
+    circuit = exact_circuit(two(constant=np.array([0.2, 0.0])), SCALE)
+    for part, name in (
+        ("R304", None),
+        ("R301", "gap B upper"),
+        ("R204", "gap A lower"),
+        ("R205", "lower stop slope A"),
+        ("R61", "stop slope B x2' x1"),
+        ("R160", "constant x1"),
+    ):
+        if name is None:
+            assert part not in circuit.values
+            continue
+        board = nominal_board(circuit, ideal=True)
+        off = replace(board, values={**circuit.values, part: 1.02 * circuit.values[part]})
+        errors = coefficient_errors(circuit, two(constant=np.array([0.2, 0.0])), off).errors
+        assert max(abs(e) for e in errors.values()) > 2e-3
+        assert abs(errors[name]) > 2e-3
+
+
+@pytest.mark.parametrize(
+    ("clearance", "text"),
+    [
+        (Clearance("A", 0, None, Side(0.3, 5.0), Side(0.4, 5.0)), "unequal stops"),
+        (Clearance("A", 0, None, Side(-0.1, 5.0), None), "in contact at rest"),
+        (Clearance("A", 0, None, Side(0.3, 5.0, ((0.1, 2.0),)), None), "stiffens in steps"),
+    ],
+)
+def test_what_the_saturating_stage_cannot_make_is_refused(clearance: Clearance, text: str) -> None:
+    system = two(clearances=(clearance,), force=np.array([1.0, 0.0]))
+    with pytest.raises(InputError) as caught:
+        exact_circuit(system, SCALE, DeadZoneStage())
+    assert text in str(caught.value)
