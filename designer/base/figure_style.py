@@ -152,13 +152,20 @@ def axis_limits(values: Array, gaps: Sequence[float]) -> tuple[float, float]:
 
 
 def shade_stops(
-    axes: Axes, gaps: Sequence[float], limits: tuple[float, float], *, across: bool = False
+    axes: Axes,
+    stops: Sequence[tuple[int, float]],
+    limits: tuple[float, float],
+    *,
+    across: bool = False,
 ) -> None:
-    """Shade what lies beyond each stop, up to the axis limits; gaps and limits are of x, or of y
-    if ``across``."""
+    """Shade what lies beyond each stop, up to the axis limits.
+
+    stops : (side, where it stands), 1 for an upper and -1 for a lower one. They and the limits are
+    of x, or of y if ``across``.
+    """
     span, line = (axes.axhspan, axes.axhline) if across else (axes.axvspan, axes.axvline)
-    for gap in gaps:
-        span(gap, limits[1] if gap > 0 else limits[0], color=CONTACT, lw=0, zorder=0)
+    for side, gap in stops:
+        span(gap, limits[1] if side > 0 else limits[0], color=CONTACT, lw=0, zorder=0)
         line(gap, color=MUTED, lw=0.8, zorder=1)
 
 

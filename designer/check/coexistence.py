@@ -44,8 +44,8 @@ class Basin:
     count: int
     """Starts that end on it or on its twin."""
     twins: int | None
-    """How many of these starts end on the twin; None where it is its own or none is told apart
-    (aperiodic motions are all one)."""
+    """How many of these starts end on the twin; None where it is its own, where the model has no
+    mirror, or where none is told apart (aperiodic motions are all one)."""
 
 
 @dataclass(frozen=True)
@@ -142,10 +142,11 @@ def of_flow(
     """Where the starts end under a flow.
 
     box : (states,) half-widths in model units. known : attractors that are listed first, in this
-    order. unit : (states,) size of a model unit in the flow's states; ones by default.
+    order. unit : (states,) size of a model unit in the states of a circuit, whose twins are those
+    that look like mirror images; None for a model.
     """
     states = drawn(box, starts, seed) * (1.0 if unit is None else unit)
-    tally = _Tally(flow, known)
+    tally = _Tally(flow, known, alike=unit is not None)
     run, unsettled = tally.take(states)
     return Coexistence(run, starts, seed, box, tally.basins(), unsettled)
 
@@ -156,8 +157,10 @@ def of_flow(
 class _Tally:
     """Counts starts by the attractor that they end on."""
 
-    def __init__(self, flow: Flow, known: Sequence[Orbit]) -> None:
+    def __init__(self, flow: Flow, known: Sequence[Orbit], *, alike: bool) -> None:
         self._flow = flow
+        self._alike = alike and flow.system.mirror is None
+        self._twins = self._alike or flow.system.mirror is not None
         self._orbits: list[Orbit] = []
         self._images: list[tuple[Array, Array]] = []
         self._counts: list[list[int]] = []
@@ -186,7 +189,11 @@ class _Tally:
         """In the order in which they were met."""
         rows = zip(self._orbits, self._counts, strict=True)
         return tuple(
-            Basin(orbit, sum(counts), counts[1] if orbit.symmetric is False else None)
+            Basin(
+                orbit,
+                sum(counts),
+                counts[1] if self._twins and orbit.symmetric is False else None,
+            )
             for orbit, counts in rows
         )
 
@@ -214,7 +221,7 @@ class _Tally:
             for twin, images in enumerate(self._images[number]):
                 if (np.abs(images - orbit.start) < NEAR * peak).all(axis=1).any():
                     return number, twin
-            if self._flow.system.mirror is None and alike(other, orbit, ALIKE, mirrored=True):
+            if self._alike and alike(other, orbit, ALIKE, mirrored=True):
                 return number, 1
         return None
 

@@ -32,6 +32,7 @@ from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.dynamics.orbit import ANSWERS, SYMMETRY_TOLERANCE, Orbit, OrbitStatus
 from designer.dynamics.step_budget import Budget
+from designer.model.absolute_motion import absolute_extremes
 from designer.model.driven import model_flow
 from designer.model.find_responses import (
     STARTS,
@@ -42,6 +43,7 @@ from designer.model.find_responses import (
 )
 from designer.model.mechanics import MechanicalModel, check_omega
 from designer.model.model_file import ModelFile, naming, need_responses
+from designer.model.relative_motion import RelativeMotion, ground_of, relative_motions
 from designer.model.response_table import Response
 from designer.spice import numerics_gate, read_orbit
 from designer.spice.opamp_model import Rung
@@ -73,8 +75,15 @@ class Simulated:
     there is no mirror, or the engine was not asked (ngspice)."""
     b: float = float("nan")
     """The clearance."""
-    sides: tuple[int, ...] = ()
-    """The stops that there are: 1 upper, -1 lower."""
+    motions: tuple[RelativeMotion, ...] = ()
+    """What moves in each clearance."""
+    masses: tuple[str, ...] = ()
+    """Names of the masses; () where they have none."""
+    clearances: tuple[str, ...] = ()
+    """Names of the clearances."""
+    absolute: tuple[Array, ...] = ()
+    """Of the orbit and of each of ``others``, (states, 2): least and greatest absolute displacement
+    of each mass in the place of its state, refined; (0, 2) where it is not known."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Settings of the engine for this response."""
     traces: tuple[Trace, ...] = ()
@@ -217,7 +226,8 @@ def _on_model(
     met = coexistence.of_flow(flow, scale_of(model, r.omega), *drawn, known)
     others = (*_attractors(r.others), *(b.orbit for b in met.basins[len(known) :]))
     orbits = [_measured(flow, o) for o in (r.orbit, *others)]
-    twins = [_twin(flow, o) for o in orbits]
+    twins = [None if flow.system.mirror is None else _twin(flow, o) for o in orbits]
+    units = np.ones(flow.system.size)
     return Simulated(
         r.omega,
         r.expected,
@@ -227,11 +237,12 @@ def _on_model(
         0.0,
         tuple(twins),
         r.b,
-        _sides(model),
-        _exact_settings(flow, orbits[0], 1.0),
-        _traces(flow, (orbits[0], twins[0]), np.ones(flow.system.size), 1.0) if traces else (),
-        trust.of_orbit(flow, orbits[0]),
-        met,
+        settings=_exact_settings(flow, orbits[0], 1.0),
+        traces=_traces(flow, (orbits[0], twins[0]), units, 1.0) if traces else (),
+        trust=trust.of_orbit(flow, orbits[0]),
+        coexistence=met,
+        absolute=tuple(absolute_extremes(flow, o, ground_of(model)) for o in orbits),
+        **_of_system(model),
     )
 
 
@@ -240,10 +251,14 @@ def _attractors(orbits: Sequence[Orbit]) -> list[Orbit]:
     return [o for o in orbits if o.status in ANSWERS]
 
 
-def _sides(model: MechanicalModel) -> tuple[int, ...]:
-    """The stops of the first clearance: 1 upper, -1 lower."""
-    stops = model.second_order().clearances
-    return stops[0].positions if stops else ()
+def _of_system(model: MechanicalModel) -> dict[str, Any]:
+    """What ``Simulated`` says of the model itself."""
+    system = model.second_order()
+    return {
+        "motions": relative_motions(system),
+        "masses": system.names,
+        "clearances": tuple(stop.name for stop in system.clearances),
+    }
 
 
 def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
@@ -309,7 +324,8 @@ def _on_circuit(
     shown = [dimensionless(o, volts, seconds) for o in measured]
     kept = [i for i in _distinct(shown) if i == 0 or shown[i].status in ANSWERS]
     known = _attractors([measured[i] for i in kept])
-    box = scale_of(made.modelfile.model.at(r.b), r.omega)
+    model = made.modelfile.model.at(r.b)
+    box, ground = scale_of(model, r.omega), ground_of(model) * volts
     met = coexistence.of_flow(flow, box, *drawn, known, volts)
     more = [_measured(flow, b.orbit) for b in met.basins[len(known) :]]
     kept += range(len(measured), len(measured) + len(more))
@@ -325,11 +341,12 @@ def _on_circuit(
         0.0,
         tuple(None if t is None else dimensionless(t, volts, seconds) for t in twins.values()),
         r.b,
-        _sides(made.design.model),
-        _exact_settings(flow, measured[0], float(volts[0])),
-        _traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
-        trust.of_orbit(flow, measured[0]),
-        met,
+        settings=_exact_settings(flow, measured[0], float(volts[0])),
+        traces=_traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
+        trust=trust.of_orbit(flow, measured[0]),
+        coexistence=met,
+        absolute=tuple(absolute_extremes(flow, measured[i], ground) / volts[:, None] for i in kept),
+        **_of_system(model),
     )
 
 
@@ -376,13 +393,21 @@ def _in_ngspice(
                 tuple(shown[i] for i in _distinct(shown)[1:]),
                 seconds,
                 b=r.b,
-                sides=_sides(made.design.model),
                 settings=_gate_settings(gates[0]) if gates else {},
                 traces=spice_trace(gates[0], volts, scale) if gates and traces else (),
                 trust=trust.of_gate(gates[0]) if gates else Trust(),
+                absolute=_unmoved(made.modelfile.model, [shown[i] for i in _distinct(shown)]),
+                **_of_system(made.modelfile.model.at(r.b)),
             )
         )
     return tuple(out)
+
+
+def _unmoved(model: MechanicalModel, orbits: Sequence[Orbit]) -> tuple[Array, ...]:
+    """Extremes of the absolute displacements where the ground rests; of a moving one ngspice has
+    none."""
+    moved = ground_of(model).any()
+    return tuple(np.zeros((0, 2)) if moved else orbit.extremes for orbit in orbits)
 
 
 def _gate_settings(result: numerics_gate.GateResult) -> dict[str, Any]:

@@ -182,19 +182,16 @@ def simulated(answer: Mapping[str, Any]) -> None:
     """The responses on one engine."""
     head = f"Responses of the {answer['engine']}" if answer["engine"] != "ngspice" else "In ngspice"
     rows = answer["responses"]
-    si = all("x1_max_m" in r for r in rows)
-    ends = {"x1 max": "x1_max", "x1 min": "x1_min"}
-    si_ends = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if si else {}
+    masses = answer.get("masses", ())
     table(
         head,
         (
             {
-                **_asked(r, rows),
+                **(_asked_in_si if masses else _asked)(r, rows),
                 "response": r["response"]
                 + (" (not to be trusted)" if r["trust"]["trusted"] is False else ""),
                 "symmetric": YES_NO[r["symmetric"]],
-                **{h: "-" if r[k] is None else f"{r[k]:.6g}" for h, k in ends.items()},
-                **{h: "-" if r[k] is None else value_text(r[k], "m") for h, k in si_ends.items()},
+                **_reach(r, rows, masses),
                 "twin": "-" if r["twin"] is None else r["twin"]["response"],
                 "others": ", ".join(o["response"] for o in r["others"]) or "-",
             }
@@ -209,6 +206,26 @@ def simulated(answer: Mapping[str, Any]) -> None:
             say(f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
         for line in untrusted({"this response": r.get("trust")}):
             say(f"ω = {r['omega']:g}: {line}")
+
+
+def _reach(
+    row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], masses: Sequence[str]
+) -> dict[str, str]:
+    """How far the masses go: the first one, or each of those that have names."""
+    in_si = "frequency_hz" in rows[0]
+    cells = {}
+    for i, name in enumerate(masses):
+        ends = () if row["x_max"] is None else (row["x_min"][i], row["x_max"][i])
+        shown = (value_text(x, "m") if in_si else f"{x:.6g}" for x in ends)
+        cells[f"x{i + 1} ({name})"] = " to ".join(shown) or "-"
+    if masses:
+        return cells
+    si = {"x1 max (SI)": "x1_max_m", "x1 min (SI)": "x1_min_m"} if in_si else {}
+    for head, key in {"x1 max": "x1_max", "x1 min": "x1_min"}.items():
+        cells[head] = "-" if row[key] is None else f"{row[key]:.6g}"
+    for head, key in si.items():
+        cells[head] = "-" if row[key] is None else value_text(row[key], "m")
+    return cells
 
 
 def coexisting(starts: Mapping[str, Any]) -> str:
@@ -410,6 +427,14 @@ def _asked(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[st
         **_mechanism(row, rows, "frequency_hz"),
         "expected": row["expected"] or "-",
     }
+
+
+def _asked_in_si(row: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The same of a model whose plain numbers are SI values, where it has any."""
+    cells = _asked(row, rows)
+    if "mechanism" not in cells:
+        return cells
+    return {"ω [rad/s]": cells["ω"], "frequency": cells["mechanism"], "expected": cells["expected"]}
 
 
 def _mechanism(

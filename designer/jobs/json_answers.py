@@ -119,24 +119,19 @@ def simulate_json(
     si: SiScales | None = None,
 ) -> dict[str, Any]:
     """What ``simulate`` prints; with ``si`` also what that is in SI units."""
+    masses = simulated[0].masses if simulated else ()
     return {
         "format": FORMAT,
         "engine": engine,
+        **({"masses": masses, "clearances": simulated[0].clearances} if masses else {}),
         "responses": [
             {
                 "omega": s.omega,
                 **hertz_json(s.omega, si),
                 "expected": s.expected,
                 "found": s.found,
-                **orbit_json(s.orbit, si),
-                "twin": _twin_json(s.twin),
-                "others": [
-                    {
-                        **orbit_json(o, si),
-                        "twin": _twin_json(s.twins[i] if s.twins else None),
-                    }
-                    for i, o in enumerate(s.others, start=1)
-                ],
+                **_response_json(s, 0, si),
+                "others": [_response_json(s, i + 1, si) for i in range(len(s.others))],
                 "starts": None if s.coexistence is None else s.coexistence.as_dict(),
                 "engine": s.settings,
                 "trust": s.trust.as_dict(),
@@ -147,6 +142,29 @@ def simulate_json(
         "provenance": provenance,
         "cost": {"seconds": seconds},
     }
+
+
+def _response_json(simulated: Simulated, number: int, si: SiScales | None) -> dict[str, Any]:
+    """The orbit (number 0) or one of the others. Masses with names are those of a file of format 2,
+    whose plain numbers are the SI values already."""
+    orbit = (simulated.orbit, *simulated.others)[number]
+    twin = _twin_json(simulated.twins[number] if simulated.twins else None)
+    if not simulated.masses:
+        return {**orbit_json(orbit, si), "twin": twin}
+    answer = orbit_json(orbit)
+    known = simulated.absolute and len(simulated.absolute[number])
+    x = simulated.absolute[number][0::2] if known else None
+    low, high = (None, None) if x is None else (x[:, 0], x[:, 1])
+    answer |= {
+        "x1_max": None if high is None else high[0],
+        "x1_min": None if low is None else low[0],
+        "x_max": high,
+        "x_min": low,
+        "twin": twin,
+    }
+    for impact, stop in zip(answer["impacts"], orbit.impact_clearances, strict=True):
+        impact["clearance"] = simulated.clearances[stop]
+    return answer
 
 
 def _by_state(values: Array) -> dict[str, Any]:

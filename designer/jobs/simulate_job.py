@@ -126,6 +126,6 @@ def simulate(
     answer = simulate_json(simulated, engine, origin, seconds, modelfile.si)
     if plots is not None:
         progress.stage("pictures")
-        units = units_of(modelfile.si)
+        units = units_of(modelfile.si, modelfile.model)
         answer["files"] = simulate_plots.write(Path(plots), names, simulated, overwrite, units)
     return SimulationResult(plain(answer), simulated)

@@ -3,6 +3,9 @@ from . import (
     find_responses as find_responses,
     swept_model as swept_model,
 )
+from .absolute_motion import (
+    absolute_extremes as absolute_extremes,
+)
 from .ascii_sketch import (
     sketch as sketch,
 )
@@ -68,6 +71,13 @@ from .model_file import (
     need_responses as need_responses,
     parse_model_file as parse_model_file,
     read_model_file as read_model_file,
+)
+from .relative_motion import (
+    RelativeMotion as RelativeMotion,
+    ground_of as ground_of,
+    mass_label as mass_label,
+    relative_motions as relative_motions,
+    subscripted as subscripted,
 )
 from .response_table import (
     Response as Response,

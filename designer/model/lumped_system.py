@@ -35,6 +35,17 @@ LEAST: dict[str, dict[str, float]] = {
     "base": {"amplitude": SMALLEST},
 }
 """The numbers of each list of elements that can be changed, and the least that each may be."""
+UNITS = {
+    "mass": "kg",
+    "stiffness": "N/m",
+    "upper_stiffness": "N/m",
+    "lower_stiffness": "N/m",
+    "damping": "N s/m",
+    "upper": "m",
+    "lower": "m",
+    "constant": "N",
+}
+"""SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +84,7 @@ class LumpedSystem(Elements):
             constant=constant,
             base=0.0 if self.base is None else self.base.amplitude,
             fixed_stops=self.base is not None and self.base.stops == "fixed",
+            names=self.names,
         )
 
     def _clearance(self, gap: Gap) -> Clearance:
@@ -90,6 +102,15 @@ class LumpedSystem(Elements):
         A.upper, hammer.amplitude, base.amplitude."""
         lows = {name: LEAST[group][key] for name, (group, _, key) in self._places.items()}
         return {"b": (SMALLEST, GREATEST), **{name: (low, GREATEST) for name, low in lows.items()}}
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of each of ``parameters`` but the factor ``b``."""
+        amplitudes = {"forces": "N", "base": "m"}
+        return {
+            name: amplitudes[group] if key == "amplitude" else UNITS[key]
+            for name, (group, _, key) in self._places.items()
+        }
 
     @cached_property
     def _places(self) -> dict[str, tuple[str, int, str]]:

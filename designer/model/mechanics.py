@@ -125,6 +125,8 @@ class SecondOrderSystem:
     """Amplitude of the ground's displacement."""
     fixed_stops: bool = False
     """Whether the stops between a mass and ground stay where they are while the ground moves."""
+    names: tuple[str, ...] = ()
+    """Names of the masses; () where they have none."""
 
     def __post_init__(self) -> None:
         if not len(self.constant):
@@ -287,6 +289,11 @@ class MechanicalModel(Hashable, Protocol):
     def parameters(self) -> Mapping[str, tuple[float, float]]:
         """Names of the numbers that a sweep may change, ``b`` among them, with the closed interval
         of each."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of each of ``parameters`` that has one."""
         ...
 
     def parameter(self, name: str) -> float:

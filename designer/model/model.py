@@ -104,6 +104,11 @@ class Dimensionless(FileTable):
         """``DOMAINS``."""
         return DOMAINS
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """A length; the others are ratios."""
+        return {"b": "m"}
+
     def parameter(self, name: str) -> float:
         """The value of one of ``parameters``."""
         return float(getattr(self, name))

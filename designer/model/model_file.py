@@ -151,6 +151,8 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
             zip(tables.response, data.get("response", ()), strict=True), start=1
         )
     )
+    for index, response in enumerate(responses, start=1):
+        _check_expected(response, index, model, file)
     circuit = tables.circuit
     if circuit.saturation is not None and circuit.saturation > circuit.supply:
         raise InputError(
@@ -175,6 +177,20 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
         rules=overrides(tables.rules, file),
         search=tables.search,
     )
+
+
+def _check_expected(
+    response: Response, index: int, model: MechanicalModel, file: str | None
+) -> None:
+    """InputError unless n-p-q has p-q for each clearance."""
+    stops = model.second_order().clearances
+    expect, count = response.expect, max(len(stops), 1)
+    if expect is None or len(expect.impacts) == count:
+        return
+    shape = "1-" + ";".join(["p-q"] * count)
+    named = f", for the clearances {', '.join(stop.name for stop in stops)}" if count > 1 else ""
+    field = f"response[{index}].expect"
+    raise InputError(file, field, str(expect), f"p-q for each clearance, as in {shape}{named}")
 
 
 _FORMAT = whole("1 or 2, the formats that this version reads", 1, 2)

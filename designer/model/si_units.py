@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from designer.base.errors import InputError
 from designer.base.si_unit import Unit, value_text
 from designer.base.units import parse_quantity
-from designer.model.mechanics import MechanicalModel
+from designer.model.mechanics import MechanicalModel, state_names
 from designer.model.model import SiScales
 
 ANGULAR = "rad/s"
@@ -22,16 +22,30 @@ FREQUENCIES = '"10 Hz" or "62.8 rad/s"'
 FAR_ABOVE, FAR_BELOW = 5.0, 100.0
 """A plain ω is far out of a model's range above the first times its highest natural frequency (the
 stops closed), and below its lowest one (the stops open) over the second."""
-NAMES = {"omega": "Hz", "b": "m", "x1": "m", "x1'": "m/s", "x2": "m", "x2'": "m/s"}
-"""SI units of the model's quantities; the others have none."""
 
 
-def units_of(si: SiScales | None) -> dict[str, Unit]:
-    """The SI units of a model's quantities, by name; none of a model without SI values."""
+def unit_names(model: MechanicalModel) -> dict[str, str]:
+    """SI units of a model's quantities, by name; the others have none."""
+    states = state_names(model.second_order().size)
+    speeds = {name: "m/s" if name.endswith("'") else "m" for name in states}
+    return {"omega": "Hz", **speeds, **model.units}
+
+
+def in_si(si: SiScales | None, model: MechanicalModel) -> bool:
+    """Whether plain numbers of a model are SI values: those of a file of format 2 with units."""
+    return si == SiScales() and "b" not in model.units
+
+
+def units_of(si: SiScales | None, model: MechanicalModel) -> dict[str, Unit]:
+    """The SI units that a model's quantities are shown in beside its own numbers, by name: none of
+    a model without SI values, and no unit that the numbers have already, but for frequencies,
+    lengths and speeds of axes."""
     if si is None:
         return {}
     scales = {"Hz": si.hertz(1.0), "m": si.length_scale, "m/s": si.speed_scale}
-    return {quantity: Unit(name, scales[name]) for quantity, name in NAMES.items()}
+    own = model.units if in_si(si, model) else ()
+    names = unit_names(model)
+    return {name: Unit(unit, scales[unit]) for name, unit in names.items() if name not in own}
 
 
 NO_UNITS: Mapping[str, Unit] = {}
@@ -120,11 +134,12 @@ class Reader:
             return _quantity(option, text, self.units[name])
         if name == "omega" and not self.units:
             return self.frequency(option, text)
-        unit = None if self.units else NAMES.get(name)
+        unit = None if self.units else unit_names(self.model).get(name)
         if unit is None:
             raise InputError(None, option, text, f"a number: {name} has no unit")
-        length = _quantity(option, text, unit)
-        return length / units_of(self._scales(option, text))[name].scale
+        quantity = _quantity(option, text, unit)
+        shown = units_of(self._scales(option, text), self.model)
+        return quantity / shown[name].scale if name in shown else quantity
 
     def _scales(self, option: str, text: str) -> SiScales:
         if self.si is None:

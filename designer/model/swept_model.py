@@ -20,7 +20,7 @@ from designer.model.driven import model_flow
 from designer.model.find_responses import scale_of
 from designer.model.mechanics import MechanicalModel, check_omega, frequency_range, state_names
 from designer.model.model import SiScales
-from designer.model.si_units import units_of
+from designer.model.si_units import in_si, units_of
 from designer.model.swept_tables import ModalBatch
 
 
@@ -33,9 +33,6 @@ class ModelSubject:
     """The model."""
     omega: float | None = None
     """Drive frequency in the model's units; None: it has to be among the changes."""
-    units: Mapping[str, str] = field(default_factory=dict)
-    """Unit by parameter, and by "x", "v" and "λ" for the axes of a diagram; none where
-    dimensionless."""
     _batch: ModalBatch = field(default_factory=ModalBatch, repr=False)
     scales: SiScales | None = None
     """SI values of the model's units; None where they are not known."""
@@ -57,9 +54,17 @@ class ModelSubject:
         return np.tile([system.own_frequency, 1.0], system.size)
 
     @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of plain numbers by parameter, and by "x", "v" and "λ" for the axes of a diagram;
+        none where they are no SI values."""
+        if not in_si(self.scales, self.model):
+            return {}
+        return {"omega": "rad/s", **self.model.units, "x": "m", "v": "m/s", "λ": "1/s"}
+
+    @property
     def si(self) -> dict[str, Unit]:
-        """SI units of the quantities that have one, by name."""
-        return units_of(self.scales)
+        """SI units of the quantities that are shown in one beside their plain numbers, by name."""
+        return units_of(self.scales, self.model)
 
     def check(self, option: str, name: str, value: float) -> None:
         """InputError that names the option, unless the parameter may have this value."""

@@ -321,7 +321,7 @@ def portraits(model: Piece, one: Piece) -> Figure:
 def _portrait(axes: Axes, wanted: Piece, shown: Piece) -> None:
     x, v = wanted["portrait"]
     reach = 1.15 * max(map(abs, x))
-    shade_stops(axes, (-MODEL.b, MODEL.b), (-reach, reach))
+    shade_stops(axes, ((-1, -MODEL.b), (1, MODEL.b)), (-reach, reach))
     axes.plot(x, v, color=MODEL_COLOUR, lw=4.0, zorder=1)
     axes.plot(*shown["portrait"], color=CIRCUIT_COLOUR, lw=1.0, zorder=2)
     axes.plot(*shown["ngspice_portrait"], color=NGSPICE_COLOUR, lw=1.0, ls=(0, (2, 2)), zorder=3)

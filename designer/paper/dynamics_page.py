@@ -253,7 +253,7 @@ def portrait_sheet(panels: Mapping[int, Sequence[Portrait]]) -> Figure:
 
 def _panel(axes: Axes, panel: Portrait) -> None:
     reach = 1.12 * max(float(np.abs(c[:, 0]).max()) for c in panel.curves)
-    shade_stops(axes, (-panel.b, panel.b), (-reach, reach))
+    shade_stops(axes, ((-1, -panel.b), (1, panel.b)), (-reach, reach))
     for curve, colour in zip(panel.curves, (BLACK, RED), strict=False):
         axes.plot(curve[:, 0], curve[:, 1], color=colour, lw=0.9, zorder=3 - (colour == RED))
     axes.set_xlim(-reach, reach)

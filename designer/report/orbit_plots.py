@@ -114,11 +114,12 @@ def time_traces(
             axes.plot(cycles[at], x[at], **_look(name, orbits[name]))
         else:
             axes.plot(cycles, x, **_look(name, orbits[name]))
-    gaps = _gaps(checked, sides)
+    stops = _stops(checked, sides)
+    gaps = [gap for _, gap in stops]
     limits = axis_limits(np.concatenate([*shown, [0.0]]), gaps)
     axes.set_ylim(limits)
     axes.set_xlim(0.0, span)
-    shade_stops(axes, gaps, limits, across=True)
+    shade_stops(axes, stops, limits, across=True)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=span > 2))
     axes.yaxis.set_major_locator(MaxNLocator(4))
     length = f"{1e3 / checked.excitation.frequency:.3g} ms"
@@ -152,36 +153,36 @@ def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str
     }
 
 
-def _gaps(checked: CheckedResponse, sides: Sequence[int]) -> tuple[float, ...]:
-    """Where the stops stand, in model units."""
-    return tuple(side * checked.model.b for side in sides)
+def _stops(checked: CheckedResponse, sides: Sequence[int]) -> tuple[tuple[int, float], ...]:
+    """(side, where it stands) of each stop, in model units."""
+    return tuple((side, side * checked.model.b) for side in sides)
 
 
 def _portrait(
     axes: Axes, checked: CheckedResponse, traces: Mapping[str, Trace], sides: Sequence[int]
 ) -> None:
-    orbits, gaps = _orbits(checked), _gaps(checked, sides)
+    orbits, stops = _orbits(checked), _stops(checked, sides)
     drawn = {
         name: states[np.isfinite(states).all(axis=1)]
         for name, trace in _drawn(traces, orbits).items()
         for states in [trace.states[:, :2]]
     }
     every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
-    xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
-    shade_stops(axes, gaps, xlim)
+    xlim, ylim = axis_limits(every[:, 0], [gap for _, gap in stops]), axis_limits(every[:, 1], ())
+    shade_stops(axes, stops, xlim)
     for name, states in drawn.items():
         if name == "ngspice":
             scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
             states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
         axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
     model = checked.model.orbit
-    for gap, marker in zip(gaps, [">" if gap > 0 else "<" for gap in gaps], strict=True):
-        entry = model.impact_velocities[model.impact_sides * gap > 0]
+    for side, gap in stops:
+        entry = model.impact_velocities[model.impact_sides == side]
         axes.plot(
             np.full(len(entry), gap),
             entry,
             ls="",
-            marker=marker,
+            marker=">" if side > 0 else "<",
             **_IMPACT,
             zorder=5,
             clip_on=False,

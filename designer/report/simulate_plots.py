@@ -1,8 +1,8 @@
 """Pictures of ``simulate --plots``: phase portrait and time trace of each response.
 
-Black is the orbit that was found, red its mirror twin where it is not its own; beyond ±b the mass
-is in contact with a stop. The names are fixed by the frequencies, so that what would be replaced
-is known before anything is computed.
+Each has a panel for the displacement in each clearance. Black is the orbit that was found, red its
+mirror twin where it is not its own; shaded is contact with a stop. The names are fixed by the
+frequencies, so that what would be replaced is known before anything is computed.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from designer.base.arrays import Array
 from designer.base.atomic_write import appearing
 from designer.base.errors import InputError
 from designer.base.figure_style import (
@@ -33,7 +34,9 @@ from designer.base.figure_style import (
 from designer.base.si_unit import Unit
 from designer.base.units import told_apart
 from designer.check.simulation import Simulated
+from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.relative_motion import RelativeMotion
 from designer.model.si_units import NO_UNITS
 from designer.report.si_axes import si_x, si_y
 
@@ -116,66 +119,93 @@ def write(
 
 @styled
 def portrait(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
-    """The orbit and its twin in the plane (x1, x1'); triangles where an impact begins."""
-    figure = new_figure(4.2, 4.0)
-    axes = figure.subplots()
-    gaps = _gaps(response)
+    """The orbit and its twin in the plane (x1, x1'), and likewise in each further clearance;
+    triangles where an impact begins."""
+    count = len(response.motions)
+    figure = new_figure(4.2 * count, 4.0)
+    panels = figure.subplots(1, count, squeeze=False)[0]
+    for number, axes in enumerate(panels):
+        _portrait(axes, response, number, units)
+    _finish(figure, panels[0], response, units)
+    return figure
+
+
+def _portrait(axes: Axes, response: Simulated, number: int, units: Mapping[str, Unit]) -> None:
+    """The plane of the motion in one clearance."""
+    motion = response.motions[number]
     period = 2.0 * np.pi / response.omega
     last = MOST_PORTRAIT * period * (1.0 + 1e-9)
-    curves = [t.states[t.time <= last, :2] for t in response.traces]
+    curves = [_curve(motion, response.omega, t, t.time <= last) for t in response.traces]
     every = np.concatenate(curves)
-    xlim, ylim = axis_limits(every[:, 0], gaps), axis_limits(every[:, 1], ())
-    shade_stops(axes, gaps, xlim)
+    xlim, ylim = axis_limits(every[:, 0], motion.gaps), axis_limits(every[:, 1], ())
+    shade_stops(axes, motion.stops, xlim)
     for orbit, curve, look in zip(_drawn(response), curves, _LOOKS, strict=False):
         axes.plot(curve[:, 0], curve[:, 1], **look, lw=_width(orbit))
-        for side in response.sides:
-            speeds = orbit.impact_velocities[orbit.impact_sides == side]
-            _impacts(axes, np.full(len(speeds), side * response.b), speeds, side, look)
+        for side, gap in motion.stops:
+            speeds = orbit.impact_velocities[_at_stop(orbit, number, side)]
+            _impacts(axes, np.full(len(speeds), gap), speeds, side, look)
     axes.set_xlim(*xlim)
     axes.set_ylim(*ylim)
-    axes.set_xlabel("x₁")
-    axes.set_ylabel("x₁′")
+    axes.set_xlabel(motion.label)
+    axes.set_ylabel(motion.rate)
     si_x(axes, units.get("x1"))
     si_y(axes, units.get("x1'"))
-    _finish(figure, axes, response, units)
-    return figure
+
+
+def _curve(motion: RelativeMotion, omega: float, trace: Trace, keep: Any) -> Array:
+    return motion.of(trace.time[keep], trace.states[keep], omega)
+
+
+def _at_stop(orbit: Orbit, clearance: int, side: int) -> Any:
+    """Which of the impacts are on one stop."""
+    return (orbit.impact_clearances == clearance) & (orbit.impact_sides == side)
 
 
 @styled
 def time_trace(response: Simulated, units: Mapping[str, Unit] = NO_UNITS) -> Figure:
-    """x1 over drive periods, orbit and twin; triangles where an impact begins."""
-    figure = new_figure(6.4, 3.0)
-    axes = figure.subplots()
-    gaps = _gaps(response)
+    """x1 over drive periods, orbit and twin, and likewise in each further clearance; triangles
+    where an impact begins."""
+    count = len(response.motions)
+    figure = new_figure(6.4, 3.0 + 2.0 * (count - 1))
+    panels = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
+    for number, axes in enumerate(panels):
+        _time_panel(axes, response, number, units)
+    panels[-1].set_xlabel("drive periods t / T")
+    _finish(figure, panels[0], response, units)
+    return figure
+
+
+def _time_panel(axes: Axes, response: Simulated, number: int, units: Mapping[str, Unit]) -> None:
+    """The displacement in one clearance over time."""
+    motion = response.motions[number]
     period = 2.0 * np.pi / response.omega
     n = response.orbit.n if response.orbit.status is OrbitStatus.PERIODIC else 0
     span = max(n, LEAST_PERIODS) if n else MOST_PERIODS
     shown = []
     for orbit, trace, look in zip(_drawn(response), response.traces, _LOOKS, strict=False):
-        cycles, x = trace.time / period, trace.states[:, 0]
-        times, sides = orbit.impact_times / period, orbit.impact_sides
+        cycles = trace.time / period
+        x = motion.of(trace.time, trace.states, response.omega)[:, 0]
+        own = {side: _at_stop(orbit, number, side) for side, _ in motion.stops}
+        times = {side: orbit.impact_times[at] / period for side, at in own.items()}
         if 0 < n < span:  # again, to fill what is shown
             laps = -(-span // n)
             cycles = np.concatenate([cycles + k * n for k in range(laps)])
             x = np.tile(x, laps)
-            times = np.concatenate([times + k * n for k in range(laps)])
-            sides = np.tile(sides, laps)
+            again = n * np.arange(laps)[:, None]
+            times = {side: (at + again).ravel() for side, at in times.items()}
         keep = cycles <= span * (1.0 + 1e-9)
         axes.plot(cycles[keep], x[keep], **look, lw=1.3 if n else 0.9)
         shown.append(x[keep])
-        for side in response.sides:
-            own = times[(sides == side) & (times <= span)]
-            _impacts(axes, own, np.full(len(own), side * response.b), side, look)
-    limits = axis_limits(np.concatenate(shown), gaps)
-    shade_stops(axes, gaps, limits, across=True)
+        for side, gap in motion.stops:
+            at = times[side][times[side] <= span]
+            _impacts(axes, at, np.full(len(at), gap), side, look)
+    limits = axis_limits(np.concatenate(shown), motion.gaps)
+    shade_stops(axes, motion.stops, limits, across=True)
     axes.set_xlim(0.0, span)
     axes.set_ylim(limits)
     axes.xaxis.set_major_locator(MaxNLocator(8, integer=span > LEAST_PERIODS))
-    axes.set_xlabel("drive periods t / T")
-    axes.set_ylabel("x₁")
+    axes.set_ylabel(motion.label)
     si_y(axes, units.get("x1"))
-    _finish(figure, axes, response, units)
-    return figure
 
 
 KINDS: dict[str, Callable[[Simulated, Mapping[str, Unit]], Figure]] = {
@@ -195,10 +225,6 @@ def _file(stem: str, kind: str, form: str) -> str:
 def _drawn(response: Simulated) -> list[Orbit]:
     """The orbits of the traces: the one that was found, then its twin."""
     return [o for o in (response.orbit, response.twin) if o is not None]
-
-
-def _gaps(response: Simulated) -> tuple[float, ...]:
-    return tuple(side * response.b for side in response.sides)
 
 
 def _width(orbit: Orbit) -> float:
@@ -238,7 +264,7 @@ def _finish(figure: Figure, axes: Axes, response: Simulated, units: Mapping[str,
     labels = [response.orbit.response, "" if twin is None else f"{twin.response}, its mirror twin"]
     for orbit, look, label in zip(_drawn(response), _LOOKS, labels, strict=False):
         handles.append(Line2D([], [], **look, lw=max(_width(orbit), 1.0), label=label))
-    if response.sides:
+    if any(motion.stops for motion in response.motions):
         if len(response.orbit.impact_sides):
             mark: dict[str, Any] = {"mfc": "white", "mec": MUTED, "ms": 5.5}
             handles.append(Line2D([], [], ls="", marker="^", **mark, label="impact begins"))

@@ -117,13 +117,13 @@ def test_values_are_shown_in_the_unit_that_suits_them(value: float, unit: str, t
 
 
 def test_the_units_of_a_model_are_those_of_its_si_values() -> None:
-    units = units_of(mechanical())
+    units = units_of(mechanical(), parse_model_file(DRILL).model)
     assert units["omega"].scale == pytest.approx(1.0 / (2.0 * math.pi * TIME), rel=1e-14)
     assert units["b"].scale == units["x1"].scale == pytest.approx(LENGTH, rel=1e-14)
     assert units["x2'"].scale == pytest.approx(SPEED, rel=1e-14)
     assert units["b"].text(0.3) == "0.5 mm"
     assert {u.suffix for u in units.values()} == {"hz", "m", "m_s"}
-    assert units_of(None) == {}
+    assert units_of(None, parse_model_file(DRILL).model) == {}
 
 
 def test_natural_frequencies_are_those_of_the_two_linear_systems() -> None:

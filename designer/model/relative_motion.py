@@ -1,0 +1,100 @@
+"""What moves in each clearance, and what a displacement is called where people read it.
+
+The equations count displacements from the base (``mechanics``). People read the absolute ones: x of
+a mass, y of the base, and in a clearance the difference that the stops see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.model.mechanics import Clearance, MechanicalModel, SecondOrderSystem
+
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+@dataclass(frozen=True)
+class RelativeMotion:
+    """The displacement in one clearance; the first mass's where there is no clearance."""
+
+    symbol: str
+    """Such as "x₁", "x₁ − y" or "x₁ − x₂"."""
+    names: str
+    """The same by the names of the masses, such as "tool − ram"; "" where they have none."""
+    row: Array
+    """(masses,) coefficients of the displacements relative to the base."""
+    base: float
+    """Amplitude of the base's motion in it."""
+    stops: tuple[tuple[int, float], ...]
+    """(side, displacement) where contact begins, 1 upper and -1 lower."""
+
+    @property
+    def label(self) -> str:
+        """The symbol with the names behind it."""
+        return f"{self.symbol} ({self.names})" if self.names else self.symbol
+
+    @property
+    def rate(self) -> str:
+        """Symbol of the velocity, such as "x₁′ − x₂′"."""
+        return " − ".join(f"{part}′" for part in self.symbol.split(" − "))
+
+    @property
+    def gaps(self) -> tuple[float, ...]:
+        """Where the stops stand."""
+        return tuple(place for _, place in self.stops)
+
+    def of(self, time: Array, states: Array, omega: float) -> Array:
+        """(k, 2) displacement and velocity along a trace: time (k,), states (k, 2 masses)."""
+        phase = omega * time
+        base = self.base * np.stack([np.sin(phase), omega * np.cos(phase)], axis=1)
+        return np.stack([states[:, 0::2] @ self.row, states[:, 1::2] @ self.row], axis=1) + base
+
+
+def relative_motions(system: SecondOrderSystem) -> tuple[RelativeMotion, ...]:
+    """One for each clearance in their order; that of the first mass where there is none."""
+    if system.clearances:
+        return tuple(_of(system, stop) for stop in system.clearances)
+    row = np.eye(1, system.size)[0]
+    return (RelativeMotion("x₁", _names(system, [0]), row, system.base, ()),)
+
+
+def ground_of(model: MechanicalModel) -> Array:
+    """(states,) amplitude of the ground's displacement in each state: x = z + ground · sin ωt."""
+    system = model.second_order()
+    ground = np.zeros(2 * system.size)
+    ground[0::2] = system.base
+    return ground
+
+
+def _of(system: SecondOrderSystem, stop: Clearance) -> RelativeMotion:
+    masses = [stop.mass] if stop.other is None else [stop.mass, stop.other]
+    fixed = system.fixed_stops and stop.other is None
+    symbols = [subscripted(f"x{mass + 1}") for mass in masses]
+    if stop.other is None and system.base and not fixed:
+        symbols.append("y")
+    stops = tuple((side, side * spring.gap) for side, spring in stop.sides)
+    return RelativeMotion(
+        " − ".join(symbols),
+        _names(system, masses),
+        system.displacement(stop),
+        system.base if fixed else 0.0,
+        stops,
+    )
+
+
+def _names(system: SecondOrderSystem, masses: Sequence[int]) -> str:
+    return " − ".join(system.names[mass] for mass in masses) if system.names else ""
+
+
+def mass_label(system: SecondOrderSystem, mass: int) -> str:
+    """What the displacement of a mass is called: "x1", with its name where it has one."""
+    return f"x{mass + 1} ({system.names[mass]})" if system.names else f"x{mass + 1}"
+
+
+def subscripted(text: str) -> str:
+    """The text with its digits as subscripts."""
+    return text.translate(_SUBSCRIPTS)
