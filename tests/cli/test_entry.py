@@ -31,7 +31,7 @@ HOSTILE = "; .control shell touch planted .endc <script>alert(1)</script> =1+1 [
 BASE = f'format = 1\ntitle = "{HOSTILE}"\n{PAPER_TABLE}'
 WANTED = '[[response]]\nomega = 0.85\nexpect = "1-2-2"\n'
 SMALL = BASE + WANTED
-SAMPLES = 20
+SAMPLES = 12
 
 
 def _process(*arguments: str | Path, **more: Any) -> subprocess.Popen[str]:
@@ -86,7 +86,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def finished(home: Path) -> tuple[Path, subprocess.CompletedProcess[str]]:
     """A run with two workers that nobody disturbed, and what it printed."""
     out = home / "finished"
-    arguments = ["run", str(_model(home)), "--out", str(out), "--samples", str(SAMPLES)]
+    model = _model(home, SMALL + COARSE_CIRCUIT)
+    arguments = ["run", str(model), "--out", str(out), "--samples", str(SAMPLES)]
     process = _process(*arguments, "--jobs", "2", "--json")
     stdout, stderr = process.communicate(timeout=300)
     done = subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
@@ -135,7 +136,7 @@ def test_folder_holds_what_the_contract_says(
     board = "bom-kicad.csv bom-jlcpcb.csv board.md schematic.svg schematic.png"
     wanted = {*names.split(), *board.split(), "report.html", "report.md"}
     assert wanted <= set(manifest["files"])
-    assert (out / "model.toml").read_text() == SMALL
+    assert (out / "model.toml").read_text() == SMALL + COARSE_CIRCUIT
     for name in ("design.json", "tolerance.json"):
         value = _strict((out / name).read_text())
         assert value["format"] == 1

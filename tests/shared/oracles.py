@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from scipy.optimize import linprog
+from scipy.optimize import brentq, linprog
 
 Array = NDArray[np.float64]
 
@@ -180,6 +180,17 @@ def brute_flow(
         u = amplitude * at[n] + offset
         return [float(g.C @ at[:n] + g.D * u + g.e) for g in mode.guards]  # type: ignore[attr-defined]
 
+    def rise(mode: object, matrix: Array, j: int, left: float, z: Array) -> float:
+        """When guard j becomes positive: at once where it is positive and grows."""
+        if guards(mode, z)[j] > 0.0:
+            return 0.0
+        least = 4.0 * np.finfo(float).eps
+        return float(
+            brentq(
+                lambda t: guards(mode, expm(matrix * t) @ z)[j], 0.0, left, xtol=1e-300, rtol=least
+            )
+        )
+
     for lap in range(periods):
         t = 0.0
         for i in range(samples):
@@ -198,17 +209,7 @@ def brute_flow(
                 if not crossed:
                     z, t = after, end
                     break
-                roots = []
-                for j in crossed:
-                    low, high = 0.0, left
-                    for _ in range(70):
-                        middle = 0.5 * (low + high)
-                        if guards(mode, expm(matrix * middle) @ z)[j] > 0.0:
-                            high = middle
-                        else:
-                            low = middle
-                    roots.append((high, j))
-                when, j = min(roots)
+                when, j = min((rise(mode, matrix, j, left, z), j) for j in crossed)
                 z = expm(matrix * when) @ z
                 t += when
                 target = mode.guards[j].target  # type: ignore[attr-defined]

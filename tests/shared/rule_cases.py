@@ -44,6 +44,7 @@ dead_zone = "rectifier"
 """
 )
 Look = Callable[[], RuleOutcome]
+OF_THE_CIRCUIT = ("reduction", "operating", "stuck", "forces")
 
 
 @cache
@@ -76,7 +77,10 @@ def with_circuit(circuit: Circuit) -> RuleSubject:
 
 def with_components(change: Callable[[Component], Component]) -> RuleSubject:
     """The same design with every component changed."""
-    return RuleSubject(base().made, base().circuit, tuple(change(c) for c in base().components))
+    changed = RuleSubject(base().made, base().circuit, tuple(map(change, base().components)))
+    # The circuit is the same: what it does is not computed again.
+    changed.__dict__.update({n: v for n, v in vars(base()).items() if n in OF_THE_CIRCUIT})
+    return changed
 
 
 def with_figure(name: str, **bounds: float | None) -> RuleSubject:

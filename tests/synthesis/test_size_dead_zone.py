@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -56,19 +57,26 @@ def sized(
     return found
 
 
-CASES = [
-    pytest.param(E24, target(), id="E24"),
-    pytest.param(E96, target(), id="E96"),
-    pytest.param(BOTH, target(), id="both"),
-    pytest.param(E96, target(mu=1.0, gain=1.5), id="soft stop"),
-    pytest.param(E96, target(mu=49.0, gain=1.2), id="hard stop"),
-    pytest.param(E24, target(threshold=0.5), id="low threshold"),
-]
+@cache
+def stage_of(case: str) -> DeadZone:
+    """The stage of one of ``CASES``."""
+    resistors, wanted = CASES[case]
+    return sized(wanted, resistors)
 
 
-@pytest.mark.parametrize(("resistors", "wanted"), CASES)
-def test_sized_stage_is_what_it_says(resistors: Array, wanted: DeadZoneTarget) -> None:
-    found = sized(wanted, resistors)
+CASES: dict[str, tuple[Array, DeadZoneTarget]] = {
+    "E24": (E24, target()),
+    "E96": (E96, target()),
+    "both": (BOTH, target()),
+    "soft stop": (E96, target(mu=1.0, gain=1.5)),
+    "hard stop": (E96, target(mu=49.0, gain=1.2)),
+    "low threshold": (E24, target(threshold=0.5)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_sized_stage_is_what_it_says(case: str) -> None:
+    (resistors, wanted), found = CASES[case], stage_of(case)
     v = found.values
     assert set(v) == {"R50", *(f"R{i}" for i in range(200, 211))}
     assert all(value in resistors for value in v.values())
@@ -93,11 +101,9 @@ def test_sized_stage_is_what_it_says(resistors: Array, wanted: DeadZoneTarget) -
     assert at * v["R201"] / v["R200"] < 13.0
 
 
-@pytest.mark.parametrize(("resistors", "wanted"), CASES)
-def test_the_curve_is_flat_inside_and_steep_outside(
-    resistors: Array, wanted: DeadZoneTarget
-) -> None:
-    found = sized(wanted, resistors)
+@pytest.mark.parametrize("case", CASES)
+def test_the_curve_is_flat_inside_and_steep_outside(case: str) -> None:
+    (_, wanted), found = CASES[case], stage_of(case)
     rails = dict.fromkeys(("U3A", "U3B", "U3C", "U3D"), (-13.0, 13.0))
     steep, slope, _ = dead_zone_gains(found.values)
     b = 13.0 / steep
