@@ -40,6 +40,8 @@ LEAST_SERIES = 10e3
 """Least resistance [Ω] after the wiper, so that the trimmer's own does not count."""
 MOST_SERIES = 10e6
 """Most resistance [Ω] after the wiper: beyond it a board's own leakage counts."""
+PROBES = 10
+"""Probes that the numbers before the trim's leave room for; with more, the trim's moves on."""
 GENERATOR_MOST = 10.0
 """Most [V peak] that a usual function generator gives without a load."""
 
@@ -226,4 +228,5 @@ def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[F
     value = float(max((v for v in sold if v <= wanted), default=sold[0]))
     role = "DC trim"
     yield Trimmer("RV901", NEGATIVE, "trim", POSITIVE, TRIMMER, role, views)
-    yield Resistor("R911", "trim", node, value, role, views)
+    number = 901 + max(PROBES, len(circuit.outputs))
+    yield Resistor(f"R{number}", "trim", node, value, role, views)

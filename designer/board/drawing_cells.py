@@ -27,7 +27,7 @@ from designer.circuit.netlist import (
     Resistor,
     Section,
 )
-from designer.circuit.stage_title import section_stages
+from designer.circuit.stage_title import dead_zone_titles, section_stages, stage_names
 
 TwoPin = Resistor | Capacitor | Diode | Reference | SupplyCapacitor
 
@@ -122,7 +122,8 @@ def chains(parts: Iterable[TwoPin], shown: frozenset[str]) -> list[Chain]:
 
 
 def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
-    """Rows of cells: for each mass its velocity, displacement and inverses; then the dead zone."""
+    """Rows of cells: for each mass its velocity, displacement and inverses; then each dead zone,
+    and what several of them share."""
     pins = {net for s in circuit.sections for net in s.nets}
     rails = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
     shown = frozenset(pins | rails | {*circuit.stage_outputs})
@@ -131,14 +132,19 @@ def circuit_cells(circuit: Circuit) -> tuple[tuple[Cell, ...], ...]:
     stages = section_stages(circuit)
     cells = {s.name: _amplifier(circuit, s, stages[s.name], left) for s in circuit.sections}
     rows: list[tuple[Cell, ...]] = []
-    by_stage = {stages[name]: cell for name, cell in cells.items() if not cell.section.limits}
+    zones: dict[str, list[str]] = {title: [] for title in dead_zone_titles(circuit)}
+    for name in cells:
+        zones.get(stages[name], []).append(name)
+    by_stage = {stages[name]: cell for name, cell in cells.items() if stages[name] not in zones}
     for mass in range(len(circuit.state_nets) // 2):
         wanted = [f"{kind} {2 * mass + s}" for s in (2, 1) for kind in ("integrator", "inverter")]
         rows.append(tuple(by_stage.pop(name) for name in wanted if name in by_stage))
     rows.append(tuple(by_stage.values()))  # amplifiers of no known kind
-    zone = [cell for cell in cells.values() if cell.section.limits]
-    rest = tuple(CellRows(f"dead zone · {net}", tuple(group)) for net, group in _groups(left))
-    rows.append((*rest, *zone))
+    owners = stage_names(circuit)
+    groups = [(owners[group[0].parts[0].name], net, group) for net, group in _groups(left)]
+    for title in dict.fromkeys([*zones, *(stage for stage, _, _ in groups)]):
+        own = [CellRows(f"{stage} · {n}", tuple(g)) for stage, n, g in groups if stage == title]
+        rows.append((*own, *(cells[name] for name in zones.get(title, ()))))
     return tuple(row for row in rows if row)
 
 

@@ -11,8 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from designer.base.natural_sort import natural_key
 from designer.board.kicad_names import POWER
 from designer.board.kicad_symbols import GRID, REACH, ShapePin, SymbolShape, power
+from designer.circuit.stage_title import DEAD_ZONE, INTERFACE, REFERENCES, SUPPLY
 
 Point = tuple[int, int]
 
@@ -247,11 +249,14 @@ def _amplifiers(items: Sequence[Item]) -> list[LayoutCell]:
     return [cell for stage in order for cell in cells.get(stage, [])]
 
 
-def _rank(stage: str) -> tuple[int, str]:
-    """The way of the signal: integrators, inverters, the dead zone, other amplifiers, the rest."""
-    kinds = ("integrator", "inverter", "dead zone", "amplifier", "interface", "supply")
+def _rank(stage: str) -> tuple[int, tuple[object, ...]]:
+    """The way of the signal: integrators, inverters, dead zones, other amplifiers, the rest."""
+    kinds = ("integrator", "inverter", DEAD_ZONE)
+    last = (REFERENCES, INTERFACE, SUPPLY)
     place = next((i for i, kind in enumerate(kinds) if stage.startswith(kind)), len(kinds))
-    return place, stage
+    if stage in last:
+        place += 1 + last.index(stage)
+    return place, natural_key(stage)
 
 
 def _of(item: Item) -> tuple[str, ...]:

@@ -8,8 +8,9 @@ downwards.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from designer.board.component import Component
 from designer.board.footprints import FootprintShape, footprint
@@ -24,6 +25,8 @@ ROOM = 0.4
 """Between cells [mm]."""
 EDGE = 3.0
 """From the outermost part to the board's edge [mm]."""
+PER_COLUMN = 12
+"""Amplifiers whose packages stand below one another: those of the paper's circuit."""
 ORIGIN = (25.0, 25.0)
 """The board's upper left corner on the sheet."""
 
@@ -113,18 +116,26 @@ def place(circuit: Circuit, components: Sequence[Component]) -> Placement:
             if section in package.parts
         }
         blocks.append(_block(spots.pop(package.reference), near, mine))
-    middle = _stack(blocks)
-    height = _bounds(middle).height if middle else 40.0
+    middle = [_stack(column) for column in _columns(blocks, len(circuit.sections))]
+    height = max((_bounds(column).height for column in middle), default=40.0)
     incoming, outgoing = _sides(circuit, spots.values())
-    left, right = _strip(incoming, height), _strip(outgoing, height)
-    columns = [column for column in (left, middle, right) if column]
+    columns = [_strip(incoming, height), *middle, _strip(outgoing, height)]
     out: list[PlacedComponent] = []
     x = 0.0
-    for column in columns:
+    for column in filter(None, columns):
         box = _bounds(column)
         out += [s.moved(x - box.left, -box.top) for s in column]
         x += box.width + 2.0 * ROOM
     return _on_board(out)
+
+
+def _columns(
+    blocks: Sequence[list[PlacedComponent]], amplifiers: int
+) -> Iterator[Sequence[list[PlacedComponent]]]:
+    """The blocks in their order, shared out evenly among as many columns as the amplifiers take."""
+    count = max(1, math.ceil(amplifiers / PER_COLUMN))
+    ends = [len(blocks) * i // count for i in range(count + 1)]
+    yield from (blocks[start:end] for start, end in pairwise(ends))
 
 
 def _on_board(spots: Sequence[PlacedComponent]) -> Placement:

@@ -94,8 +94,11 @@ from .scale_fit import (
     minimax as minimax,
 )
 from .stage_title import (
+    DEAD_ZONE as DEAD_ZONE,
     INTERFACE as INTERFACE,
+    REFERENCES as REFERENCES,
     SUPPLY as SUPPLY,
+    dead_zone_titles as dead_zone_titles,
     section_stages as section_stages,
     stage_names as stage_names,
 )

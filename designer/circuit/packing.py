@@ -1,8 +1,8 @@
 """Amplifiers into op-amp packages: which section of which package each one is.
 
-The sections of the paper's circuit come with the paper's names, which are those of quads. For any
-other op-amp or circuit they are put into as few packages as hold them, stages that belong together
-first: an integrator with its inverter, the two halves of each path of the dead zone.
+The paper's circuit keeps the paper's names in quads. Any other circuit, and any other op-amp, fills
+as few packages as hold the amplifiers, stages that belong together first: those of one mass, or an
+integrator with its inverter where a package has no room for a mass; those of one dead zone.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from dataclasses import replace
 
 from designer.catalog.entries import OpAmp
 from designer.circuit.netlist import Circuit, Contact, Section
+from designer.circuit.stage_title import dead_zone_titles, section_stages
 
 QUAD = "ABCD"
 """Sections of the packages that the paper's names speak of."""
-PAPER_PACKAGES = frozenset({"U1", "U2", "U3"})
-PAPER_STATES = 4
+OF_A_MASS = 4
+"""Amplifiers of one mass: two integrators, each with its inverter."""
 
 
 def packed(circuit: Circuit, opamp: OpAmp) -> Circuit:
@@ -46,19 +47,17 @@ def packed(circuit: Circuit, opamp: OpAmp) -> Circuit:
 
 
 def assignment(circuit: Circuit, opamp: OpAmp) -> dict[str, str]:
-    """The name of each amplifier by the name that it has in the paper's packages.
+    """The name of each amplifier by the name that ``build`` gives it.
 
-    The amplifiers of the paper's circuit stay in its quads. With s sections a package, N amplifiers
-    go into ceil(N / s) packages: each group of related amplifiers fills as many whole packages as
-    it can, and what is left over of all groups fills further ones in turn. Packages are numbered in
-    the order of the states, the dead zones last.
+    A quad's amplifiers stay in the paper's packages where those have all of them. Else, with s
+    sections a package, N amplifiers go into ceil(N / s) packages: each group of related amplifiers
+    fills as many whole packages as it can, and what is left over of all groups fills further ones
+    in turn. Packages are numbered in the order of the states, the dead zones last.
     """
     letters = sorted(pin.name for pin in opamp.pins)
-    papers = len(circuit.states) == PAPER_STATES
-    papers = papers and PAPER_PACKAGES.issuperset(s.package for s in circuit.sections)
-    if papers and len(letters) == len(QUAD):
+    if len(letters) == len(QUAD) and _is_papers(circuit):
         return {s.name: s.package + letters[QUAD.index(s.name[-1])] for s in circuit.sections}
-    groups = list(_related(circuit))
+    groups = _related(circuit, len(letters))
     order = [name for group in groups for name in group]
     whole = [len(group) - len(group) % len(letters) for group in groups]
     packages = [
@@ -76,12 +75,28 @@ def assignment(circuit: Circuit, opamp: OpAmp) -> dict[str, str]:
     }
 
 
-def _related(circuit: Circuit) -> Iterator[list[str]]:
-    """Names of the amplifiers that belong together: of each state, then of the dead zone."""
-    for net in circuit.state_nets:
-        yield [s.name for s in circuit.sections if s.output in (net, f"{net}n")]
-    driven = {name for net in circuit.state_nets for name in (net, f"{net}n")}
-    yield [s.name for s in circuit.sections if s.output not in driven]
+def _is_papers(circuit: Circuit) -> bool:
+    """Whether the paper's packages have every amplifier of a circuit of two masses."""
+    return len(circuit.states) == 4 and set(circuit.packages) <= {"U1", "U2", "U3"}
+
+
+def _related(circuit: Circuit, size: int) -> list[list[str]]:
+    """Names of the amplifiers that belong together, in packages of ``size``: of each mass, or of
+    each state where they are too many for a package; of each dead zone; all others."""
+    stages = section_stages(circuit)
+    place = {
+        f"{kind} {state + 1}": state // 2 if size >= OF_A_MASS else state
+        for state in range(len(circuit.states))
+        for kind in ("integrator", "inverter")
+    }
+    zones = dead_zone_titles(circuit)
+    groups: dict[object, list[str]] = {key: [] for key in (*place.values(), *zones, None)}
+    for stage in (*place, *zones):
+        key = place.get(stage, stage)
+        groups[key] += [name for name, title in stages.items() if title == stage]
+    known = {name for group in groups.values() for name in group}
+    groups[None] = [name for name in stages if name not in known]
+    return [group for group in groups.values() if group]
 
 
 def _chunks(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:

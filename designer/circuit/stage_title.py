@@ -4,15 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Fitting, Section
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Fitting, Section, Stop
 
-SUPPLY, INTERFACE, DEAD_ZONE = "supply", "interface", "dead zone"
-"""Stages that are no amplifier's own: supply and decoupling; connectors, probes; the dead zone."""
+SUPPLY, INTERFACE = "supply", "interface"
+"""Stages that are no amplifier's own: supply and decoupling; connectors, probes."""
+REFERENCES = "references"
+"""Stage of the references that serve more than one dead zone."""
+DEAD_ZONE = "dead zone"
+"""Stage of the dead zone; where there are several, the clearance's name follows."""
 
 
 def section_stages(circuit: Circuit) -> dict[str, str]:
     """The stage of each section: "integrator 1" drives v1, "inverter 1" makes -v1."""
-    return {s.name: _stage(circuit, s) for s in circuit.sections}
+    known = {net: f"integrator {i}" for i, net in enumerate(circuit.state_nets, start=1)}
+    known |= {f"{net}n": f"inverter {i}" for i, net in enumerate(circuit.state_nets, start=1)}
+    out = {s.name: known.get(s.output, s.role or f"amplifier {s.name}") for s in circuit.sections}
+    for title, stop in zip(dead_zone_titles(circuit), circuit.stops, strict=True):
+        inner = _inside(circuit, stop)
+        out |= {s.name: title for s in circuit.sections if s.inverting in inner}
+    return out
+
+
+def dead_zone_titles(circuit: Circuit) -> tuple[str, ...]:
+    """The stage of each stop's dead zone, in the order of the stops."""
+    if len(circuit.stops) == 1:
+        return (DEAD_ZONE,)
+    return tuple(f"{DEAD_ZONE} {stop.clearance}" for stop in circuit.stops)
 
 
 def stage_names(circuit: Circuit) -> dict[str, str]:
@@ -31,26 +48,36 @@ def stage_names(circuit: Circuit) -> dict[str, str]:
         if isinstance(part, Section) or set(part.nets) <= {POSITIVE, NEGATIVE, GROUND}:
             out[part.name] = SUPPLY
             continue
-        owned = [owner[net] for net in part.nets if net in owner]
+        owned = [stage for net, stage in owner.items() if net in part.nets]
         out[part.name] = owned[0] if owned else _between(circuit, part, sections)
     return out
 
 
-def _stage(circuit: Circuit, section: Section) -> str:
-    if section.limits:
-        return DEAD_ZONE
-    nets = circuit.state_nets
-    if section.output in nets:
-        return f"integrator {nets.index(section.output) + 1}"
-    source = next((i for i, net in enumerate(nets) if section.output == f"{net}n"), None)
-    return f"amplifier {section.name}" if source is None else f"inverter {source + 1}"
+def _inside(circuit: Circuit, stop: Stop) -> set[str]:
+    """The nets of a stop's dead zone: what is joined to its output without passing a state, its
+    negative, a state's summing node, a reference, a supply or the generator."""
+    states = {s for c in circuit.capacitors if c.name in circuit.states for s in c.nets}
+    border = states | {f"{net}n" for net in circuit.state_nets} | _rails(circuit)
+    border |= {GROUND, POSITIVE, NEGATIVE, circuit.generator.net}
+    inside, grown = {stop.output}, True
+    while grown:
+        near = {net for p in circuit.parts if inside & set(p.nets) for net in p.nets} - border
+        grown = not near <= inside
+        inside |= near
+    return inside
+
+
+def _rails(circuit: Circuit) -> set[str]:
+    """The nets that references hold."""
+    return {net for reference in circuit.references for net in reference.nets} - {GROUND}
 
 
 def _owners(circuit: Circuit) -> dict[str, str]:
-    """The stage that each inner net belongs to, from the summing nodes outwards."""
-    sections = section_stages(circuit)
+    """The stage that each inner net belongs to, from the summing nodes outwards; last those of the
+    references."""
+    sections, rails = section_stages(circuit), _rails(circuit)
     shared = {GROUND, POSITIVE, NEGATIVE, circuit.generator.net, *circuit.stage_outputs}
-    shared |= {s.output for s in circuit.sections}
+    shared |= rails | {s.output for s in circuit.sections}
     owner = {s.inverting: sections[s.name] for s in circuit.sections}
     parts = [p for p in circuit.parts if not isinstance(p, Section)]
     grown = True
@@ -61,6 +88,9 @@ def _owners(circuit: Circuit) -> dict[str, str]:
                 known = [owner[n] for n in part.nets if n in owner]
                 if known and net not in owner and net not in shared:
                     owner[net], grown = known[0], True
+    for rail in sorted(rails):
+        served = {owner[n] for p in parts if rail in p.nets for n in p.nets if n in owner}
+        owner[rail] = served.pop() if len(served) == 1 else REFERENCES
     return owner
 
 

@@ -25,6 +25,7 @@ from designer.spice.opamp_model import Rung
 from designer.spice.worker import open_simulator
 from designer.spread.spread import Spread, draw
 from tests.circuit.test_reduction import EXACT
+from tests.shared.chains import chain, chain_circuit, table
 from tests.shared.quick_folders import quick_folder
 from tests.shared.stages import CATALOG, bought, one_sided, rectifier, stage
 
@@ -109,6 +110,24 @@ def test_integrators_without_an_inverter_share_a_package() -> None:
     assert (names["v2"], names["v4"]) == ("U2A", "U2B")
     assert names["v3"] == "U3A"
     assert names["v3n"] == "U3B"
+
+
+def test_the_amplifiers_of_a_mass_share_a_quad() -> None:
+    """Three masses and a rectifier's two halves: U1 to U3 have a mass each, U4 the dead zone."""
+    stops = table("clearance", name="A", between=("m1", "ground"), upper=1, lower=1, stiffness=9)
+    names = by_output(chain_circuit(chain(3, stops), "rectifier"))
+    of_mass = [("v1", "v1n", "v2", "v2n"), ("v3", "v3n", "v4", "v4n"), ("v5", "v5n", "v6", "v6n")]
+    wanted = {
+        net: f"U{number}{letter}"
+        for number, nets in enumerate([*of_mass, ("w1", "w2")], start=1)
+        for net, letter in zip(nets, "ABCD", strict=False)
+    }
+    assert names == wanted
+
+
+def test_one_mass_without_a_clearance_is_one_quad() -> None:
+    names = by_output(chain_circuit(chain(1)))
+    assert names == {"v1": "U1A", "v2": "U1B", "v2n": "U1C"}
 
 
 @pytest.mark.parametrize("name", SHAPES)
