@@ -29,8 +29,9 @@ from designer.model.model import Dimensionless
 from designer.model.model_file import ModelFile
 from designer.model.response_table import Response
 from designer.synthesis.kernel_linear import Rules, Values
-from designer.synthesis.linear_block import ANY, PARTS, Bounds, Targets, catalogue, rules_of
-from designer.synthesis.linear_search import LinearBlock, best
+from designer.synthesis.linear_block import PARTS, catalogue, rules_of
+from designer.synthesis.linear_search import best
+from designer.synthesis.linear_terms import ANY, Bounds, LinearBlock, Targets
 
 TARGETS, SEED = 20, 2026
 SERIES = {"E24": ("E24",), "E96": ("E96",), "E192": ("E192",), "E24 ∪ E96": ("E24", "E96")}

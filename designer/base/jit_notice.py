@@ -18,7 +18,9 @@ from typing import Any
 
 CALLS_BACK = "llvmlite.binding.executionengine"
 PARTS = {
+    "kernel_completions": "search for parts",
     "kernel_linear": "search for parts",
+    "kernel_terms": "search for parts",
     "kernel_nodal": "equations of boards",
     "kernel_boards": "circuits",
     "kernel_four_state": "circuits",

@@ -91,6 +91,7 @@ from .resistors import (
     effective as effective,
 )
 from .scale_fit import (
+    least_largest as least_largest,
     minimax as minimax,
 )
 from .stage_title import (
@@ -107,6 +108,8 @@ from .swept_board import (
 )
 from .terms import (
     Term as Term,
+    drive_resistor as drive_resistor,
+    entry_resistor as entry_resistor,
 )
 from .working_modes import (
     at_rest as at_rest,

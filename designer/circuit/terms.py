@@ -4,7 +4,8 @@ One inverting integrator per state, one inverter where a sign is needed, one res
 coefficient; a term that is zero gets no part. For n masses, mass i (from 1) takes the numbers
 (2n + 2)(i - 1) + 1 … (2n + 2) i: the displacement integrator's resistor, n velocities, n
 displacements, the force. With n = 2 these are the paper's R1 … R12; with the capacitors C1 … C2n in
-the order of the states they realise its Eq. (14) as corrected in docs/errata.md.
+the order of the states they realise its Eq. (14) as corrected in docs/errata.md. From five masses
+on 1000 is added: the numbers would meet those of the stops.
 """
 
 from __future__ import annotations
@@ -35,6 +36,27 @@ class Term:
     """The coefficient that it realises."""
 
 
+MOST_PLAIN = 4
+"""Masses whose resistors are numbered from 1; of more, from 1001."""
+
+
+def term_resistor(masses: int, mass: int, place: int) -> str:
+    """Name of a resistor of the linear block. place : 0 the displacement integrator, 1 … n the
+    velocities, n + 1 … 2n the displacements, 2n + 1 the force."""
+    return f"R{(2 * masses + 2) * mass + 1 + place + (1000 if masses > MOST_PLAIN else 0)}"
+
+
+def entry_resistor(masses: int, state: int, source: int) -> str:
+    """Name of the resistor of one entry of the state matrix (x1, x1', x2, …)."""
+    place = 1 + source // 2 + (0 if source % 2 else masses) if state % 2 else 0
+    return term_resistor(masses, state // 2, place)
+
+
+def drive_resistor(masses: int, mass: int) -> str:
+    """Name of the resistor from the generator to a mass."""
+    return term_resistor(masses, mass, 2 * masses + 1)
+
+
 def _sign(value: Any) -> int:
     return int(np.sign(float(value)))
 
@@ -55,18 +77,19 @@ def terms(
     n = len(force)
     out: list[Term] = []
     for i in range(n):
-        first, velocity = (2 * n + 2) * i + 1, 2 * i + 1
-        out.append(Term(f"R{first}", 2 * i, velocity, True, ("mass", i, i)))
+        velocity = 2 * i + 1
+        out.append(Term(term_resistor(n, i, 0), 2 * i, velocity, True, ("mass", i, i)))
         for j in range(n):
             if s := sign(damping[i][j]):
                 quantity: Quantity = ("damping", i, j)
-                out.append(Term(f"R{first + 1 + j}", velocity, 2 * j + 1, s < 0, quantity))
+                out.append(Term(term_resistor(n, i, 1 + j), velocity, 2 * j + 1, s < 0, quantity))
         for j in range(n):
             if s := sign(stiffness[i][j]):
                 quantity = ("stiffness", i, j)
-                out.append(Term(f"R{first + 1 + n + j}", velocity, 2 * j, s < 0, quantity))
+                name = term_resistor(n, i, 1 + n + j)
+                out.append(Term(name, velocity, 2 * j, s < 0, quantity))
         if s := sign(force[i]):
-            out.append(Term(f"R{first + 2 * n + 1}", velocity, None, s < 0, ("force", i, 0)))
+            out.append(Term(drive_resistor(n, i), velocity, None, s < 0, ("force", i, 0)))
     return tuple(out)
 
 

@@ -25,8 +25,7 @@ from designer.model.mechanics import MechanicalModel
 from designer.synthesis import linear_search, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZone, target_of
 from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLimits
-from designer.synthesis.linear_block import Targets
-from designer.synthesis.linear_search import LinearBlock
+from designer.synthesis.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.part_checks import (
     DRIVE,
     buyable,
@@ -34,7 +33,6 @@ from designer.synthesis.part_checks import (
     nearest,
     unit_circuit,
 )
-from designer.synthesis.tie_break import Shortfall
 
 BASE = 1e4
 """Resistors that only set a level (inverters, inputs of the gain stages) [ohm]."""

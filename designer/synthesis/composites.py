@@ -23,7 +23,7 @@ from designer.circuit.coefficients import EXACT, CoefficientErrors
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.synthesis.attempt import Attempt, Order
-from designer.synthesis.milp import SOLVER
+from designer.synthesis.milp import NODES, SOLVER
 from designer.synthesis.part_checks import matching_resistors
 
 REACH = 3.0
@@ -32,8 +32,6 @@ MOST_PAIRS = 48
 """Pairs in each table."""
 ROUNDING = 1e-12
 """Of a logarithm: pairs as near as this to one part are no composites."""
-NODES = 3000
-"""Branch-and-bound nodes of a program: a limit by count, so that answers do not depend on time."""
 FEW = (1, 2, 3)
 """Numbers of composites that are tried before any number is allowed."""
 STEP = 1e-3

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
-from designer.base.arrays import Array
 from designer.catalog.diode_curve import diode_model
 from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
 from designer.circuit.scale_fit import minimax
 from designer.model.find_responses import Peaks
 from designer.model.mechanics import MechanicalModel, Sides
 from designer.synthesis.limits import ConditionLimits, depth
-from designer.synthesis.linear_block import PARTS, Targets, residuals_of
+from designer.synthesis.linear_block import errors_of
+from designer.synthesis.linear_terms import Targets
 
 LEAST_GAIN = 1.25
 """Of the saturating path, so that it does saturate where the clearance is never closed."""
@@ -147,11 +147,13 @@ def target_of(
     """
     system = model.second_order()
     stop = system.clearances[0]
+    own, wanted = 2 * stop.mass, stop.first.stiffness / float(system.mass[stop.mass])
     targets, mu = Targets.from_state_matrix(system.state_matrix()), system.relative_stiffness(stop)
-    _, p, q1, q3 = minimax(*_residuals(values, targets))
-    relative = np.exp([0.0, -q1, -q1 + p + q3, -q1 + p])  # volts of each state over those of x1
-    top = limits.swing / float((peaks.states * relative).max())  # volts per unit of x1
-    peak = float(peaks.states[0])
+    errors = errors_of(values, targets)
+    relative = np.exp(errors.volts @ minimax(errors.offsets, errors.columns))
+    relative = relative / relative[own]  # volts of each state over those of the stop's displacement
+    top = limits.swing / float((peaks.states * relative).max())  # volts per unit of length
+    peak = float(peaks.states[own])
     drop, reference, current = 0.0, 5.0, (0.0, float("inf"))
     if stage.diode is not None and stage.reference is not None:
         drop, reference = diode_model(stage.diode).drop, stage.reference.voltage
@@ -161,7 +163,7 @@ def target_of(
     more = 1.0 if "swing" in limits.conditions else saturation / limits.swing
     return DeadZoneTarget(
         mu=mu,
-        slope=slope_interval(values, targets, mu),
+        slope=slope_interval(values, targets, wanted, stop.mass),
         saturation=saturation,
         threshold=min(stop.first.gap * top, saturation / LEAST_GAIN),
         linear_gain=more * (limits.swing / (top * peak)),
@@ -178,36 +180,35 @@ def target_of(
     )
 
 
-def slope_interval(values: Mapping[str, float], targets: Targets, mu: float) -> tuple[float, float]:
-    """Least and largest (fv slope)/R50 [1/ohm] that make the stop's slope right while no error of
+def slope_interval(
+    values: Mapping[str, float], targets: Targets, wanted: float, mass: int = 0
+) -> tuple[float, float]:
+    """Least and largest (fv slope)/R50 [1/ohm] that make a stop's slope right while no error of
     the linear block exceeds its least largest one.
 
-    The slope's error is ln(fv slope/R50) + alpha + q1 - ln mu, so the extremes of alpha + q1 over
-    all scales with |h + D s| <= error are two linear programs of four variables.
+    wanted : the stop's stiffness over the mass, in the state matrix. mass : that carries the stop.
+    The slope's error is ln(fv slope/R50) + rate - ln wanted, with the mass's rate of
+    ``LinearErrors``; so the extremes of the rate over all scales with |errors| <= error are two
+    linear programs.
     """
-    h, D = _residuals(values, targets)
+    errors = errors_of(values, targets)
+    h, D, rate = errors.offsets, errors.columns, errors.rates[mass]
     best = minimax(h, D)
     error = float(np.abs(h + D @ best).max())
     limit = np.concatenate([error - h, error + h]) + 1e-12
     ends = []
     for sign in (1.0, -1.0):
         found = linprog(
-            np.array([sign, 0.0, sign, 0.0]),
+            sign * rate,
             A_ub=np.concatenate([D, -D]),
             b_ub=limit,
-            bounds=[(None, None)] * 4,
+            bounds=[(None, None)] * len(rate),
             method="highs",
         )
         # HiGHS' own tolerance can make a point of the interval empty: then the point itself.
         scales = best if found.x is None else found.x
-        ends.append(float(scales[0] + scales[2]))
-    middle = float(best[0] + best[2])
+        ends.append(float(rate @ scales))
+    middle = float(rate @ best)
     low, high = min(*ends, middle), max(*ends, middle)
-    return float(mu * np.exp(-high)), float(mu * np.exp(-low))
-
-
-def _residuals(values: Mapping[str, float], t: Targets) -> tuple[Array, Array]:
-    """(10,) offsets and (10, 4) scales (alpha, p, q1, q3) of the linear block's errors."""
-    logs = np.log([values[name] for name in PARTS])
-    h, D = residuals_of(logs[None, :10], logs[None, 10:], t.logs)
-    return h[0], D
+    offset = float(errors.rate_offsets[mass])
+    return float(wanted * np.exp(-high - offset)), float(wanted * np.exp(-low - offset))

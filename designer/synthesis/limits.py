@@ -15,7 +15,7 @@ from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
-from designer.synthesis.linear_block import Bounds
+from designer.synthesis.linear_terms import Bounds
 
 SWING_SHARE = 0.85
 """Of the op-amp's limit: what the peaks of an output may use; the rest is for spread."""

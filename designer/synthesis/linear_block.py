@@ -24,7 +24,7 @@ lower bound of the whole.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -33,6 +33,15 @@ import numpy as np
 from designer.base.arrays import Array, Index, Mask
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.kernel_linear import Rules, Values, join
+from designer.synthesis.linear_terms import (
+    Bounds,
+    LinearErrors,
+    Targets,
+    equal_values,
+    errors_of_terms,
+    preferred_logs,
+    sums,
+)
 
 PARTS = ("R1", "R2", "R3", "R4", "R5", "R7", "R8", "R9", "R10", "R11", "C1", "C2", "C3", "C4")
 """The parts of the linear block, in the order of the compiled loops."""
@@ -43,47 +52,10 @@ SCALES = np.array(
     ]
 )  # fmt: skip
 """(10, 2) coefficients of alpha and p."""
-ANY = CircuitSpec()
-"""What asks for no equal parts and prefers no values."""
 SLICE = 50_000
 """Rows that are joined at a time."""
 SAME = 1e-12
 """Logarithms of ratios closer than this are one ratio: the rest is rounding."""
-
-
-@dataclass(frozen=True)
-class Targets:
-    """The eight terms that the linear block has to realise."""
-
-    logs: Array
-    """(8,) ln |wanted| of the terms of R2, R3, R4, R5, R8, R9, R10, R11."""
-
-    @classmethod
-    def from_state_matrix(cls, A: Array) -> Targets:
-        """From the dimensionless (4, 4) state matrix."""
-        w = np.log(np.abs(np.where(A == 0.0, 1.0, A)))
-        return cls(w[[1, 3]][:, [1, 3, 0, 2]].ravel())
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Side conditions of the linear block; infinite or zero where switched off."""
-
-    seconds: tuple[float, float]
-    """Range of the time scale."""
-    level: float
-    """Largest ratio between the peaks of the state voltages of one mass, and between the two
-    velocities."""
-    share: float
-    """How much larger than x1's the peak voltage of another state may be."""
-    stop: float
-    """Least R4 [ohm] that leaves room for the stop's resistor."""
-    peaks: Array
-    """(4,) peaks of x1, x1', x2, x2' in model units."""
-    signal: tuple[float, float] = (0.0, np.inf)
-    """Range of the linear block's resistors [ohm]."""
-    stop_most: float = np.inf
-    """Largest R4 that is looked at [ohm]."""
 
 
 def residuals_of(r: Array, c: Array, w: Array) -> tuple[Array, Array]:
@@ -104,6 +76,22 @@ def residuals_of(r: Array, c: Array, w: Array) -> tuple[Array, Array]:
         (1, -1, 1, 0), (1, 1, 0, 1), (1, 0, 0, 1), (1, 0, -1, 0), (1, 0, 0, -1),
     ]  # fmt: skip
     return np.stack(offsets, axis=1), np.array(scales, dtype=float)
+
+
+def errors_of(values: Mapping[str, float], targets: Targets) -> LinearErrors:
+    """The errors of these parts, by name [ohm, F]: with the scales alpha, p, q1, q3 for two masses
+    with all terms."""
+    if not targets.fully_coupled_pair:
+        return errors_of_terms(values, targets)
+    logs = np.log([values[name] for name in PARTS])
+    h, D = residuals_of(logs[None, :10], logs[None, 10:], targets.logs)
+    return LinearErrors(
+        offsets=h[0],
+        columns=D,
+        volts=np.array([(0, 0, 0, 0), (0, 0, -1, 0), (0, 1, -1, 1), (0, 1, -1, 0)], dtype=float),
+        rates=np.array([(1, 0, 1, 0), (1, 0, 0, 1)], dtype=float),
+        rate_offsets=np.array([0.0, logs[11] - logs[13]]),
+    )
 
 
 def elementary(D: Array) -> tuple[Index, Array]:
@@ -130,8 +118,7 @@ def catalogue(resistors: Array, capacitors: Array) -> Values:
     i, j = _pairs(n, n)
     ratios, first, order = _grouped(r[i] - r[j])
     upper, lower = i[order], j[order]
-    i, j = _pairs(n, m)
-    by_sum = np.argsort(r[i] + c[j], kind="stable")
+    by_sum, sum_r, sum_c = sums(r, c)
     c2, c4 = _pairs(m, m)
     deltas, delta_first, order = _grouped(c[c4] - c[c2])
     near = np.argsort(np.abs(deltas), kind="stable")
@@ -144,9 +131,9 @@ def catalogue(resistors: Array, capacitors: Array) -> Values:
         first=first,
         upper=upper,
         lower=lower,
-        sums=(r[i] + c[j])[by_sum],
-        sum_r=i[by_sum],
-        sum_c=j[by_sum],
+        sums=by_sum,
+        sum_r=sum_r,
+        sum_c=sum_c,
         deltas=deltas[near],
         delta_first=np.cumsum([0, *(len(span) for span in spans)]).astype(np.int64),
         delta_c2=c2[chosen],
@@ -183,11 +170,7 @@ def rules_of(values: Values, t: Targets, bounds: Bounds, spec: CircuitSpec) -> R
     def uses(*numbers: int) -> Mask:
         return np.asarray((np.isin(places, numbers) & (entries != 0.0)).any(axis=1))
 
-    def among(logs: Array) -> Mask:
-        return np.asarray((np.abs(logs[:, None] - preferred[None, :]) < 1e-9).any(axis=1))
-
     one, two = uses(6, 7), uses(8, 9)
-    preferred = np.log(np.array(sorted(v for v in spec.preferred if v > 0.0), dtype=float))
     return Rules(
         w=t.logs,
         seconds=np.log(np.maximum(bounds.seconds, 1e-300)),
@@ -195,26 +178,15 @@ def rules_of(values: Values, t: Targets, bounds: Bounds, spec: CircuitSpec) -> R
         share=float(np.log(bounds.share)),
         stop=np.log(np.array([max(bounds.stop, 1e-300), bounds.stop_most])),
         peaks=np.log(bounds.peaks),
-        ties=_equal_parts(spec.matched),
-        free_r=among(values.r),
-        free_c=among(values.c),
+        ties=equal_values(PARTS, spec.matched),
+        free_r=preferred_logs(values.r, spec.preferred),
+        free_c=preferred_logs(values.c, spec.preferred),
         most=min(len(PARTS) if spec.most_values is None else spec.most_values, len(PARTS)),
         six=vectors(~one & ~two),
         one=vectors(one & ~two),
         two=vectors(two & ~one),
         both=vectors(one & two),
     )
-
-
-def _equal_parts(groups: Sequence[Sequence[str]]) -> Mask:
-    """(14, 14) which parts of the linear block must be equal; other names are not its business."""
-    equal = np.eye(len(PARTS), dtype=bool)
-    for group in groups:
-        own = [PARTS.index(name) for name in group if name in PARTS]
-        equal[np.ix_(own, own)] = True
-    for _ in PARTS:  # equal to equal is equal
-        equal = (equal.astype(int) @ equal.astype(int)) > 0
-    return np.asarray(equal & ~np.eye(len(PARTS), dtype=bool))
 
 
 @dataclass(frozen=True)

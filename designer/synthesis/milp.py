@@ -18,6 +18,9 @@ SOLVER: dict[str, float | int] = {
     "threads": 1,
 }
 """HiGHS options; they stand in the provenance. No time limit: it would make answers differ."""
+NODES = 3000
+"""Branch-and-bound nodes of a program that is not expected to end: a limit by count, so that
+answers do not depend on time."""
 PRICE_WEIGHT = 1e-3
 """Of one price class against one distinct value: price only breaks ties."""
 

@@ -27,9 +27,8 @@ from designer.model.mechanics import MechanicalModel
 from designer.synthesis import composites, output_loads, side_conditions
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
-from designer.synthesis.linear_search import FIRST_LEVEL, LinearBlock
+from designer.synthesis.linear_terms import LinearBlock, Shortfall
 from designer.synthesis.part_checks import check_choices
-from designer.synthesis.tie_break import Shortfall
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
@@ -332,9 +331,8 @@ def best_beside(
         ):
             break
         between = left.popleft()
-        level = max(linear.least, FIRST_LEVEL)
         with part(f"beside the first linear block ({number + 1} of at most {BESIDE})"):
-            other = linear_block(order, within, between=between, level=level)
+            other = linear_block(order, within, between=between, level=linear.least)
             if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
                 continue
             left.extend(_beside(other, between))

@@ -15,7 +15,7 @@ from designer.model.circuit_table import CircuitSpec
 from designer.synthesis import rectifier_stage, saturating_search
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
 from designer.synthesis.equal_parts import equal_parts
-from designer.synthesis.linear_block import ANY
+from designer.synthesis.linear_terms import ANY
 from designer.synthesis.value_program import Ranking
 
 

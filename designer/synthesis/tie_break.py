@@ -17,7 +17,8 @@ import numpy as np
 from designer.base.arrays import Array, Index
 from designer.base.progress import doing
 from designer.circuit.scale_fit import minimax
-from designer.synthesis.kernel_linear import Rules, Values, gather
+from designer.synthesis.kernel_completions import gather
+from designer.synthesis.kernel_linear import Rules, Values
 from designer.synthesis.linear_block import PARTS, residuals_of, slice_from
 from designer.synthesis.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 
@@ -32,16 +33,6 @@ OWN = [PARTS.index(name) for name in ("R2", "R9", "R3", "R8", "C2", "C4")]
 FIRST = [PARTS.index(name) for name in ("R4", "R10", "R1", "C1")]
 SECOND = [PARTS.index(name) for name in ("R5", "R11", "R7", "C3")]
 """Columns of a group's own parts, and of those that a completion of each mass brings."""
-
-
-@dataclass(frozen=True)
-class Shortfall:
-    """There is no choice."""
-
-    what: str
-    """What leaves no choice."""
-    whole: bool
-    """Whether every choice was looked at."""
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from designer.model.model_file import read_model_file
 from designer.synthesis import parts_choice
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import limits
+from designer.synthesis.linear_terms import Shortfall
 from designer.synthesis.parts_choice import _beside, best_beside
-from designer.synthesis.tie_break import Shortfall
 
 # What each side condition costs is asked where a test is about it: it doubles the time.
 synthesise = partial(parts_choice.synthesise, binding=False)

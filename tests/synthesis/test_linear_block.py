@@ -14,16 +14,14 @@ from designer.model.model import Dimensionless
 from designer.synthesis import linear_block
 from designer.synthesis.kernel_linear import Rules, Values
 from designer.synthesis.linear_block import (
-    ANY,
     PARTS,
     SCALES,
-    Bounds,
-    Targets,
     catalogue,
     elementary,
     rules_of,
     slice_from,
 )
+from designer.synthesis.linear_terms import ANY, Bounds, Targets
 from designer.synthesis.tie_break import error_of, residuals
 from tests.shared import oracles
 from tests.shared.linear_enumeration import CAPACITOR

@@ -14,9 +14,8 @@ from designer.circuit.coefficients import EXACT
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
 from designer.synthesis import linear_search
-from designer.synthesis.linear_block import ANY, Bounds, Targets
-from designer.synthesis.linear_search import LinearBlock, best
-from designer.synthesis.tie_break import Shortfall
+from designer.synthesis.linear_search import best
+from designer.synthesis.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
 from tests.shared.linear_enumeration import Choices, Conditions, every_choice
 from tests.shared.oracles import LINEAR_NAMES
 from tests.synthesis.test_linear_block import OPEN, random_model, targets_of, wanted_of

@@ -20,7 +20,7 @@ from designer.model.model import Dimensionless
 from designer.synthesis import linear_search, rectifier_stage, saturating_search, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZoneTarget, slope_interval, target_of
 from designer.synthesis.limits import limits
-from designer.synthesis.linear_block import Targets
+from designer.synthesis.linear_terms import Targets
 from designer.synthesis.parts_choice import FREES
 from designer.synthesis.size_dead_zone import size
 from tests.shared.oracles import Plain, coefficient_error

@@ -1,0 +1,228 @@
+"""Any number of masses and any pattern of terms: levels of error searched by a tree of choices.
+
+At each level the compiled loops (``synthesis.kernel_terms``) go through every choice that can reach
+it; the error of what they return is computed afresh by linear programming. The side conditions hold
+on nominal scales, which need no solver: the least squares of the errors. At error eps those are
+within a fixed multiple of eps of any scales with that error, and by so much the loops are wider.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from designer.base.arrays import Array, Index, Mask
+from designer.base.progress import doing
+from designer.circuit.coefficients import EXACT
+from designer.circuit.scale_fit import least_largest
+from designer.synthesis.kernel_terms import TermRules, choices
+from designer.synthesis.linear_terms import (
+    Levels,
+    LinearQuestion,
+    equal_values,
+    preferred_logs,
+    scale_columns,
+    sums,
+)
+from designer.synthesis.term_conditions import TermConditions
+from designer.synthesis.term_order import TermOrder, order_of
+from designer.synthesis.term_program import TermProgram
+
+CANDIDATE = 40
+"""Steps of a search that one candidate of the compiled loops counts for."""
+ROOM = 64
+"""Choices that the loops return at a time, at first."""
+TINY = 1e-9
+"""Allowance for rounding of logarithms and for the accuracy of linear programming."""
+
+
+@dataclass(frozen=True)
+class TermSearch:
+    """The choices of a linear block with any pattern of terms."""
+
+    question: LinearQuestion
+    """What is searched."""
+    first: float = EXACT
+    """The first level of error: one up to this is none."""
+    growth: float = 1.3
+    """From level to level."""
+
+    def level(self, level: float, patience: int) -> Levels:
+        """The least error of about ``level``; what is found narrows the rest of the search."""
+        rules, (terms, states) = self._rules(level), self._size
+        best, parts = np.inf, np.full(terms + states, -1)
+        known, t, steps, room = set[bytes](), -np.inf, 0, ROOM
+        most = self.question.spec.most_values
+        kinds = terms + states if most is None else most
+        while t < np.inf and best > EXACT and steps * CANDIDATE < patience:
+            self._tell(level, rules, t)
+            rows = np.zeros((room, terms + states), dtype=np.int64)
+            left = patience // CANDIDATE - steps
+            t, count, taken = choices(rules, min(level, best), t, left, kinds, np.inf, rows)
+            steps, room = steps + taken, room * 4 if count == room else ROOM
+            for row in rows[:count][:, self._by_name]:
+                if row.tobytes() in known:
+                    continue
+                known.add(row.tobytes())
+                error = self.error(row)
+                if error < best and self._conditions.hold(self._offsets(row)):
+                    best, parts = error, row
+        reached = 0 if known else -1
+        return Levels(best, parts, 0.0, t == np.inf, reached, len(known), steps * CANDIDATE)
+
+    def fewest(self, parts: Index, limit: float, patience: int) -> tuple[Index, str]:
+        """The choice of fewest values, least price, of those up to the limit.
+
+        The loops go on from one to a better one; the mixed-integer program mixes the values of all
+        that were met.
+        """
+        limit = max(limit, EXACT)
+        rules, (terms, states) = self._rules(limit), self._size
+        best, met, t, steps, room = parts, [parts], -np.inf, 0, 8
+        while t < np.inf and steps * CANDIDATE < patience:
+            self._tell(limit, rules, t)
+            rows = np.zeros((room, terms + states), dtype=np.int64)
+            left = patience // CANDIDATE - steps
+            t, count, taken = choices(rules, limit, t, left, *self.cost(best), rows)
+            before = best
+            for row in rows[:count][:, self._by_name]:
+                if self.cost(row) < self.cost(best) and self._good(row, limit):
+                    best = row
+                    met.append(row)
+            room = room * 4 if count == room and best is before else 8
+            steps += taken
+        doing(f"linear block, fewest values of {len(met)} choices")
+        word, chosen = self._program(np.array(met)).solve(limit, self.cost(best)[0])
+        # The solver is not believed: its choice stands only if it is as good as the one known.
+        if chosen is None or self.cost(chosen) > self.cost(best) or not self._good(chosen, limit):
+            chosen = best
+        return chosen, f"HiGHS: {word}"
+
+    def error(self, parts: Index) -> float:
+        """The least largest error of one choice, by linear programming from its values alone."""
+        return least_largest(self._offsets(parts), self._columns)
+
+    def cost(self, parts: Index) -> tuple[int, float]:
+        """Distinct values of one choice, without the preferred, and the price of its
+        capacitors."""
+        r, c = parts[: self._size[0]], parts[self._size[0] :]
+        kinds = len(set(r[~self._free[0][r]].tolist())) + len(set(c[~self._free[1][c]].tolist()))
+        return kinds, float(self.question.prices[c].sum())
+
+    @cached_property
+    def _size(self) -> tuple[int, int]:
+        targets = self.question.targets
+        return len(targets.entries), len(targets.coefficients)
+
+    @cached_property
+    def _logs(self) -> tuple[Array, Array]:
+        return np.log(self.question.resistors), np.log(self.question.capacitors)
+
+    @cached_property
+    def _free(self) -> tuple[Mask, Mask]:
+        r, c = self._logs
+        preferred = self.question.spec.preferred
+        return preferred_logs(r, preferred), preferred_logs(c, preferred)
+
+    @cached_property
+    def _columns(self) -> Array:
+        return scale_columns(self.question.targets)
+
+    def _offsets(self, parts: Index) -> Array:
+        terms, (r, c) = self._size[0], self._logs
+        states = [a for a, _ in self.question.targets.entries]
+        return -(r[parts[:terms]] + c[parts[terms:]][states] + self.question.targets.wanted)
+
+    def _tell(self, level: float, rules: TermRules, t: float) -> None:
+        low, high = rules.seconds
+        share = min(max(t - low, 0.0) / (high - low + TINY), 1.0)
+        doing(f"linear block, errors up to {level:.2g}: {share:.0%} of the time scales")
+
+    @cached_property
+    def _conditions(self) -> TermConditions:
+        return TermConditions(self.question.targets, self.question.bounds)
+
+    @cached_property
+    def _equal(self) -> Index:
+        """(j, 2) places among the parts that must be equal."""
+        equal = equal_values(self.question.targets.parts, self.question.spec.matched)
+        return np.argwhere(equal)
+
+    def _good(self, parts: Index, limit: float) -> bool:
+        tied = all(parts[i] == parts[j] for i, j in self._equal)
+        allowed = tied and self._conditions.hold(self._offsets(parts))
+        return allowed and self.error(parts) <= limit + TINY
+
+    def _program(self, met: Index) -> TermProgram:
+        free = np.concatenate(self._free)
+        return TermProgram(
+            met, self._logs, free, self.question.prices, self.question.targets, self._conditions,
+            self._equal,
+        )  # fmt: skip
+
+    @cached_property
+    def _order(self) -> TermOrder:
+        many = len(self.question.resistors), len(self.question.capacitors)
+        return order_of(self.question.targets.entries, self._size[1], *many)
+
+    @cached_property
+    def _by_name(self) -> list[int]:
+        """Columns of the loops' rows in the order of ``Targets.parts``."""
+        terms, states = self._size
+        names = self.question.targets.entries
+        columns = [self._order.entries.index(entry) for entry in names]
+        return [*columns, *range(terms, terms + states)]
+
+    def _rules(self, level: float) -> TermRules:
+        """The rules with the room that nominal scales need at a level."""
+        r, c = self._logs
+        entries, targets = self._order.entries, self.question.targets
+        target = np.array([a for a, _ in entries])
+        every, sum_r, sum_c = sums(r, c)
+        w = np.log([targets.coefficients[entry] for entry in entries])
+        # A time scale is a mean of what terms round a loop are made to be.
+        reach = every[0] + w.min() - level, every[-1] + w.max() + level
+        return TermRules(
+            target=target,
+            source=np.array([b for _, b in entries]),
+            wanted=w,
+            first=np.array([a not in target[:i] for i, a in enumerate(target)]),
+            probes=self._order.probes,
+            r=r,
+            c=c,
+            sums=every,
+            sum_r=sum_r,
+            sum_c=sum_c,
+            allowed=self._range_of_resistors(),
+            apart=self._conditions.apart(level),
+            seconds=np.clip(self._conditions.seconds(level), *reach),
+            like=self._like(),
+            free_r=self._free[0],
+            free_c=self._free[1],
+            prices=self.question.prices.astype(float),
+        )
+
+    def _range_of_resistors(self) -> Array:
+        """(terms, 2) range of ln of each resistor: that of the stop's mass is limited."""
+        bounds = self.question.bounds
+        out = np.tile([-np.inf, np.inf], (self._size[0], 1))
+        own = (2 * bounds.mass + 1, 2 * bounds.mass)
+        if own in self._order.entries:
+            limits = max(bounds.stop, 1e-300), bounds.stop_most
+            out[self._order.entries.index(own)] = np.log(limits)
+        return out
+
+    def _like(self) -> Index:
+        """(terms + states,) an earlier part that each must equal, in the order of the loops."""
+        terms, states = self._size
+        rows = [a for a, _ in self._order.entries]
+        chosen = [rows.index(state) for state in range(states)]
+        when = [*range(terms), *chosen]
+        out = np.full(terms + states, -1)
+        for i, j in self._equal:
+            here, there = self._by_name[i], self._by_name[j]
+            if when[there] < when[here] or (when[there] == when[here] and there < here):
+                out[here] = there
+        return out
