@@ -20,7 +20,7 @@ from numba.core.types.misc import unliteral
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 PACKAGE = Path(__file__).resolve().parents[1]
-KERNELS = ("*/kernel_*.py", "fidelity/runge_kutta.py")
+KERNELS = ("*/kernel_*.py", "fidelity/*runge_kutta.py")
 """Files with compiled functions, below the package."""
 
 

@@ -12,8 +12,9 @@ setting it is said whether it passes the gate (`passes`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.flow import Flow
 from designer.dynamics.kernel_boards import POINTS
 from designer.dynamics.orbit import Orbit, OrbitStatus
-from designer.fidelity import runge_kutta
+from designer.fidelity import runge_kutta, system_runge_kutta
 from designer.fidelity.cpu_clock import Entrant, SpiceClock, here, rounds
 from designer.model.driven import model_flow
 from designer.model.find_responses import ModelResponse
@@ -153,19 +154,18 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
     r, model, omega = asked.response, asked.model, asked.response.omega
     flow = model_flow(model, omega)
     start = r.orbit.start
+    stepper = _stepper(model)
     for step in STEPS:
-        if not isinstance(model, Dimensionless):
-            break  # the paper's way is written for its two masses
         steps = max(1, round(flow.drive.period / step / POINTS)) * POINTS
         answer = RungAnswer(
             RK4,
             f"Δt = {step:g}",
             {"steps_a_period": steps},
-            *_runge_kutta(model, r, steps),
+            *_runge_kutta(flow, r, stepper, steps),
         )
         yield (
             answer,
-            here(RK4, lambda n, s=steps: runge_kutta.run(model, omega, start, n, s), BASELINE),  # type: ignore[misc]
+            here(RK4, lambda n, s=steps: stepper.run(omega, start, n, s), BASELINE),  # type: ignore[misc]
         )
     yield (
         RungAnswer(MODEL, "exact", {}, r.orbit, _drawn(flow, r.orbit, 1.0)),
@@ -186,21 +186,44 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
     )
 
 
-def _runge_kutta(model: Dimensionless, r: ModelResponse, steps: int) -> tuple[Orbit, Array]:
+@dataclass(frozen=True)
+class _Stepper:
+    """Runge-Kutta for one model."""
+
+    run: Callable[[float, Array, int, int], Array]
+    trace: Callable[[float, Array, int, int, int], Array]
+
+
+def _stepper(model: MechanicalModel) -> _Stepper:
+    """The paper's two masses have one in numbers, any other system one in arrays."""
+    if isinstance(model, Dimensionless):
+        return _Stepper(partial(runge_kutta.run, model), partial(runge_kutta.trace, model))
+    any_of = system_runge_kutta
+    return _Stepper(partial(any_of.run, model), partial(any_of.trace, model))
+
+
+def _runge_kutta(
+    flow: Flow, r: ModelResponse, stepper: _Stepper, steps: int
+) -> tuple[Orbit, Array]:
     """The orbit that Runge-Kutta settles on, read off as ngspice's are, and its displacement."""
-    n = r.orbit.n or MAX_PERIOD
-    x = runge_kutta.run(model, r.omega, r.orbit.start, SETTLED * n, steps)
-    states = runge_kutta.trace(model, r.omega, x, 4 * n, steps, steps)
+    n, system = r.orbit.n or MAX_PERIOD, flow.system
+    x = stepper.run(r.omega, r.orbit.start, SETTLED * n, steps)
+    states = stepper.trace(r.omega, x, 4 * n, steps, steps)
     period = 2.0 * np.pi / r.omega
     time = np.arange(len(states)) * period / steps
-    names = tuple(f"x{i}" for i in range(4))
-    signals = dict(zip(names, states.T, strict=True)) | {"u": np.sin(r.omega * time)}
-    positions = {p for stop in model.second_order().clearances for p in stop.positions}
-
-    def row(side: int) -> Array | None:
-        return np.array([side, 0.0, 0.0, 0.0, 0.0, -model.b]) if side in positions else None
-
-    reading = Reading(period, 0, names, np.zeros(4), row(1), row(-1), "u", 0, keep=True)
+    signals = dict(zip(system.states, states.T, strict=True)) | {"u": np.sin(r.omega * time)}
+    rows = system.contact_rows(0) if system.clearances else {}
+    reading = Reading(
+        period,
+        0,
+        system.states,
+        np.zeros(system.size),
+        rows.get(1),
+        rows.get(-1),
+        "u",
+        0,
+        keep=True,
+    )
     found = read(Waveforms(time, signals, "", 0.0), reading)
     return found.orbit, _traced(found, 1.0)
 

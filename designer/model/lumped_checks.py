@@ -15,7 +15,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.schema import did_you_mean
 from designer.model.lumped_elements import GROUND, Elements, Gap
 
-RESERVED = (GROUND, "base", "b", "omega")
+RESERVED = (GROUND, "base")
 """Names that mean something else."""
 MOST_MASSES = 12
 """Beyond it nothing was tried."""

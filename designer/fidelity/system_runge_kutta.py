@@ -1,0 +1,135 @@
+"""Classical Runge-Kutta with equal steps, blind to the stops, for any mechanical system.
+
+``fidelity.runge_kutta`` has the same for the paper's two masses, in numbers instead of arrays.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from designer.base.arrays import Array
+from designer.base.jit import callee, compiled
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem
+
+Float = NDArray[np.float64]
+
+
+class SystemRates(NamedTuple):
+    """The numbers of y' = A y + B sin ωt + d - Σ springs, y = x1, x1', x2, …, for s springs."""
+
+    A: Float
+    """(2n, 2n) of the open system."""
+    B: Float
+    """(2n,) of the drive."""
+    d: Float
+    """(2n,) of the constant forces."""
+    row: Float
+    """(s, 2n + 1) depth in a spring over y and the drive, but for its place."""
+    place: Float
+    """(s,) depth at which it is met."""
+    push: Float
+    """(s, 2n) change of y' for a unit of depth."""
+    drag: Float
+    """(s, 2n, 2n) change of y' for a unit of y while it is met: the damping of its stop."""
+
+
+def rates_of(system: SecondOrderSystem, omega: float) -> SystemRates:
+    """The numbers of a system at a drive frequency."""
+    size = 2 * system.size
+    B, d = np.zeros(size), np.zeros(size)
+    B[1::2], d[1::2] = system.drive_force(omega) / system.mass, system.constant / system.mass
+    rows, places, pushes, drags = [], [], [], []
+    for stop in system.clearances:
+        along = system.displacement(stop)
+        force = np.zeros(size)
+        force[1::2] = along / system.mass
+        moves = system.base if system.fixed_stops and stop.other is None else 0.0
+        rate = np.zeros(size)
+        rate[1::2] = along
+        for side, spring in stop.sides:
+            for number, (place, stiffness) in enumerate(spring.springs):
+                row = np.zeros(size + 1)
+                row[0:size:2], row[size] = side * along, side * moves
+                rows.append(row)
+                places.append(place)
+                pushes.append(side * stiffness * force)
+                drags.append((0.0 if number else stop.damping) * np.outer(force, rate))
+    count = len(rows)
+    return SystemRates(
+        system.state_matrix(),
+        B,
+        d,
+        np.array(rows).reshape(count, size + 1),
+        np.array(places, dtype=float),
+        np.array(pushes).reshape(count, size),
+        np.array(drags).reshape(count, size, size),
+    )
+
+
+@callee
+def _slope(y: Float, wave: float, rates: SystemRates, out: Float) -> None:
+    """out ← y'."""
+    size = y.shape[0]
+    for i in range(size):
+        total = rates.B[i] * wave + rates.d[i]
+        for j in range(size):
+            total += rates.A[i, j] * y[j]
+        out[i] = total
+    for s in range(rates.place.shape[0]):
+        depth = rates.row[s, size] * wave - rates.place[s]
+        for j in range(size):
+            depth += rates.row[s, j] * y[j]
+        if depth > 0.0:
+            for i in range(size):
+                total = rates.push[s, i] * depth
+                for j in range(size):
+                    total += rates.drag[s, i, j] * y[j]
+                out[i] -= total
+
+
+@compiled
+def carry(y: Float, rates: SystemRates, omega: float, steps: int, first: int, count: int) -> None:
+    """y (2n,) ← the state after ``count`` steps of ``steps`` a drive period, from number first."""
+    h = 2.0 * np.pi / omega / steps
+    size = y.shape[0]
+    k, total, at = np.empty(size), np.empty(size), np.empty(size)
+    for i in range(first, first + count):
+        phase = (i % steps) * h  # from the period's begin: it does not drift
+        _slope(y, np.sin(omega * phase), rates, k)
+        for j in range(size):
+            total[j], at[j] = k[j], y[j] + 0.5 * h * k[j]
+        half = np.sin(omega * (phase + 0.5 * h))
+        _slope(at, half, rates, k)
+        for j in range(size):
+            total[j] += 2.0 * k[j]
+            at[j] = y[j] + 0.5 * h * k[j]
+        _slope(at, half, rates, k)
+        for j in range(size):
+            total[j] += 2.0 * k[j]
+            at[j] = y[j] + h * k[j]
+        _slope(at, np.sin(omega * (phase + h)), rates, k)
+        for j in range(size):
+            y[j] += h / 6.0 * (total[j] + k[j])
+
+
+def run(model: MechanicalModel, omega: float, start: Array, periods: int, steps: int) -> Array:
+    """(2n,) the state after these drive periods from ``start`` (2n,) at phase 0."""
+    y = np.array(start, dtype=float)
+    carry(y, rates_of(model.second_order(), omega), omega, steps, 0, periods * steps)
+    return y
+
+
+def trace(
+    model: MechanicalModel, omega: float, start: Array, periods: int, points: int, steps: int
+) -> Array:
+    """(periods · points + 1, 2n) states, ``points`` to a drive period; steps : a multiple of it."""
+    rates, each = rates_of(model.second_order(), omega), steps // points
+    out = np.empty((periods * points + 1, len(start)))
+    out[0] = start
+    for i in range(periods * points):
+        out[i + 1] = out[i]
+        carry(out[i + 1], rates, omega, steps, each * (i % points), each)
+    return out
