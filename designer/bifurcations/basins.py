@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from designer.base.arrays import Array
+from designer.base.arrays import Array, Mask
 from designer.base.threads import parallel
 from designer.bifurcations.parameter_map import COURSE, CellStore, MapCell, cell_of
 from designer.bifurcations.subject import Subject
@@ -117,7 +117,7 @@ def run(
 
 def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basins:
     """Number the attractors: one orbit, whichever of its strobes a start came to."""
-    flow = setting.flow()
+    flow, weights = setting.flow(), plan.subject.weights
     known: list[tuple[str, bool | None, Array]] = []
     numbers = np.empty(len(cells), dtype=int)
     for k, cell in enumerate(cells):
@@ -126,7 +126,7 @@ def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basi
         for number, (response, symmetric, laps) in enumerate(known):
             if (response, symmetric) != label:
                 continue
-            near = np.abs(laps - x).max(axis=1) <= SAME * np.abs(laps).max()
+            near = _near(laps, x, weights)
             if cell.status is not OrbitStatus.PERIODIC or near.any():
                 numbers[k] = number
                 break
@@ -139,7 +139,7 @@ def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basi
     order = np.argsort(-counted, kind="stable")
     rank = np.empty(len(known), dtype=int)
     rank[order] = np.arange(len(known))
-    twins = {int(rank[k]): _twin(flow, known, k) for k in range(len(known))}
+    twins = {int(rank[k]): _twin(flow, known, k, weights) for k in range(len(known))}
     attractors = tuple(
         Attractor(
             number,
@@ -157,7 +157,15 @@ def _named(plan: BasinPlan, setting: DrivenSystem, cells: list[MapCell]) -> Basi
     return Basins(plan, named, attractors)
 
 
-def _twin(flow: Flow, known: list[tuple[str, bool | None, Array]], k: int) -> int | None:
+def _near(laps: Array, x: Array, weights: Array) -> Mask:
+    """(n,) which strobes of an orbit a state is. weights : as ``Subject`` has them."""
+    away = np.abs(weights * (laps - x)).max(axis=1)
+    return np.asarray(away <= SAME * np.abs(weights * laps).max())
+
+
+def _twin(
+    flow: Flow, known: list[tuple[str, bool | None, Array]], k: int, weights: Array
+) -> int | None:
     """Index of the mirror twin of attractor k among those that are known."""
     _, symmetric, laps = known[k]
     if flow.system.mirror is None or symmetric is not False:
@@ -165,7 +173,6 @@ def _twin(flow: Flow, known: list[tuple[str, bool | None, Array]], k: int) -> in
     n = len(laps)
     image = flow.run(laps[0], n, points=2).strobes[1:-1:2] @ flow.system.mirror.T
     for other, (_, _, strobes) in enumerate(known):
-        near = len(strobes) == n and other != k
-        if near and (np.abs(strobes - image[0]).max(axis=1) <= SAME * np.abs(laps).max()).any():
+        if len(strobes) == n and other != k and _near(strobes, image[0], weights).any():
             return other
     return None

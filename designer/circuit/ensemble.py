@@ -245,7 +245,6 @@ class Ensemble:
             impact_times=answers.when[e, :met][once],
             impact_velocities=answers.speed[e, :met][once],
             impact_sides=answers.stop[e, :met][once].astype(float),
-            impact_clearances=np.zeros(int(once.sum()), dtype=np.int64),
             asymmetry=float(real[30]),
             multipliers=multipliers,
             lyapunov=float(np.log(radius) / (n * period)) if radius > 0.0 else -np.inf,

@@ -79,7 +79,7 @@ class Orbit(Motion):
     impact_sides: Array = field(default_factory=lambda: np.zeros(0))
     """(k,) side of each impact: 1 upper, -1 lower."""
     impact_clearances: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """(k,) index of the clearance of each impact."""
+    """(k,) index of the clearance of each impact; the first where it is not given."""
     asymmetry: float = float("nan")
     """Max |x(t + nT/2) - x*(t)| over the peak of each state, worst state (n odd; else nan), with x*
     the mirror image of x: -x but for a system with another mirror."""
@@ -97,6 +97,11 @@ class Orbit(Motion):
     """Drive periods that the search cost."""
     more: Pairs = ()
     """Impacts on the upper and the lower stop of each further clearance in n drive periods."""
+
+    def __post_init__(self) -> None:
+        if not len(self.impact_clearances):
+            first = np.zeros(len(self.impact_sides), dtype=np.int64)
+            object.__setattr__(self, "impact_clearances", first)
 
     @property
     def symmetric(self) -> bool | None:

@@ -117,11 +117,11 @@ def difference(first: Orbit, second: Orbit) -> float:
     if first.status is not OrbitStatus.PERIODIC or second.status is not OrbitStatus.PERIODIC:
         return math.nan
     best = math.nan
+    stops = [(k, side) for k in range(len(first.counts.impacts)) for side in (1.0, -1.0)]
     for turn in (1.0, -1.0):
         worst = 0.0
-        for side in (1.0, -1.0):
-            a = np.sort(np.abs(first.impact_velocities[first.impact_sides == side]))
-            b = np.sort(np.abs(second.impact_velocities[second.impact_sides == turn * side]))
+        for k, side in stops:
+            a, b = _speeds(first, k, side), _speeds(second, k, turn * side)
             if len(a) != len(b):
                 worst = math.nan
                 break
@@ -129,6 +129,12 @@ def difference(first: Orbit, second: Orbit) -> float:
                 worst = max(worst, float((np.abs(a - b) / b.max()).max()))
         best = worst if math.isnan(best) else min(best, worst) if worst == worst else best
     return best
+
+
+def _speeds(orbit: Orbit, clearance: int, side: float) -> Array:
+    """Of the impacts on a stop, ascending."""
+    there = (orbit.impact_clearances == clearance) & (orbit.impact_sides == side)
+    return np.sort(np.abs(orbit.impact_velocities[there]))
 
 
 def alike(first: Orbit, second: Orbit) -> bool:

@@ -132,7 +132,6 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         impact_times=np.array(times)[order],
         impact_velocities=np.array(velocities)[order],
         impact_sides=np.array(sides, dtype=float)[order],
-        impact_clearances=np.zeros(len(sides), dtype=np.int64),
         asymmetry=_asymmetry(t, y, marks[-1], n, reading.period, peak),
         penetration=float(depth),
         miss=float(miss),
