@@ -13,6 +13,9 @@ from . import (
 from .design_files import (
     load as load,
 )
+from .export_job import (
+    export as export,
+)
 from .job_outcome import (
     JobOutcome as JobOutcome,
 )
@@ -22,9 +25,15 @@ from .options import (
 from .origin import (
     provenance as provenance,
 )
+from .rules_job import (
+    rules as rules,
+)
 from .search_job import (
     search_into as search_into,
 )
 from .study_folder import (
     FolderStores as FolderStores,
+)
+from .study_job import (
+    run as run,
 )

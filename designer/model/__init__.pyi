@@ -98,6 +98,7 @@ from .spread_table import (
 )
 from .swept_model import (
     ModelSubject as ModelSubject,
+    of_model as of_model,
 )
 from .template import (
     new as new,

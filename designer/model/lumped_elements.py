@@ -93,6 +93,9 @@ class Gap(FileTable):
     """Stiffness of the lower stop, where it has its own."""
     damping: Annotated[float, physical("N s/m", zero=True)] = 0.0
     """Of the stops, in contact only."""
+    preload: Annotated[float, physical("N", zero=True)] = 0.0
+    """Force with which the stops push as soon as they are touched: that of a spring that is held
+    short."""
     law: Annotated[Literal["linear", "hertz"], choice("linear", "hertz")] = "linear"
     """Force of a stop over its depth: straight, or constant · depth^1.5."""
     constant: Annotated[float | None, number("", "a number > 0", lambda k: k > 0.0)] = None
@@ -119,9 +122,9 @@ class Gap(FileTable):
             if gap is None:
                 return None
             if hertz is not None:
-                return Side(gap, hertz.stiffness, hertz.further)
+                return Side(gap, hertz.stiffness, hertz.further, self.preload)
             assert stiffness is not None
-            return Side(gap, stiffness)
+            return Side(gap, stiffness, (), self.preload)
 
         return side(self.upper, self.upper_stiffness), side(self.lower, self.lower_stiffness)
 

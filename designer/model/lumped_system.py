@@ -30,6 +30,7 @@ LEAST: dict[str, dict[str, float]] = {
         "upper_stiffness": SMALLEST,
         "lower_stiffness": SMALLEST,
         "damping": 0.0,
+        "preload": 0.0,
     },
     "forces": {"amplitude": -GREATEST, "constant": -GREATEST},
     "base": {"amplitude": SMALLEST},

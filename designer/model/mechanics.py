@@ -36,6 +36,8 @@ class Side:
     further: tuple[tuple[float, float], ...] = ()
     """(depth, stiffness) of springs that join in deeper, by rising depth: a stop that stiffens in
     steps."""
+    preload: float = 0.0
+    """Force with which it pushes as soon as it is touched: that of a spring that is held short."""
 
     @property
     def springs(self) -> tuple[tuple[float, float], ...]:
@@ -91,14 +93,19 @@ class Clearance:
         """The upper stop, or the only one."""
         return self.sides[0][1]
 
+    @property
+    def jumps(self) -> bool:
+        """Whether the force of a stop begins with a jump: a damper or a preload makes one."""
+        return bool(self.damping) or any(stop.preload for _, stop in self.sides)
+
     def scaled(self, factor: float) -> Clearance:
-        """The same with every length ``factor`` times as large."""
+        """The same with every length and preload ``factor`` times as large."""
 
         def longer(stop: Side | None) -> Side | None:
             if stop is None:
                 return None
             further = tuple((factor * depth, stiffness) for depth, stiffness in stop.further)
-            return Side(factor * stop.gap, stop.stiffness, further)
+            return Side(factor * stop.gap, stop.stiffness, further, factor * stop.preload)
 
         return Clearance(
             self.name, self.mass, self.other, longer(self.upper), longer(self.lower), self.damping
@@ -219,7 +226,7 @@ class SecondOrderSystem:
             displacement=tuple(np.append(c.row, [c.on_drive, 0.0]) for c in contacts),
             velocity=tuple(np.append(c.rate, c.on_drive) for c in contacts),
             mirror=-np.eye(2 * n) if even and not self.constant.any() else None,
-            continuous=not any(stop.damping for stop in self.clearances),
+            continuous=not any(stop.jumps for stop in self.clearances),
         )
 
 
@@ -242,10 +249,12 @@ class _Contact:
         """Add the force of so many springs to the equations."""
         if not met:
             return
-        for place, stiffness in self._springs(met)[: abs(met)]:
+        side = int(np.sign(met))
+        d -= side * self._stop(side).preload * self.push_back
+        for place, stiffness in self._stop(side).springs[: abs(met)]:
             A -= stiffness * np.outer(self.push_back, self.row)
             B -= stiffness * self.on_drive * self.push_back
-            d += stiffness * np.sign(met) * place * self.push_back
+            d += stiffness * side * place * self.push_back
         A -= self.clearance.damping * np.outer(self.push_back, self.rate)
 
     def guards(self, index: int, key: ModeKey) -> list[Guard]:
@@ -254,20 +263,17 @@ class _Contact:
         out = []
         if met:
             side = int(np.sign(met))
-            place = self._springs(met)[abs(met) - 1][0]
-            out.append(self._guard(-side, place, met - side, index, key))
-            if abs(met) < len(self._springs(met)):
-                out.append(
-                    self._guard(side, -self._springs(met)[abs(met)][0], met + side, index, key)
-                )
+            springs = self._stop(side).springs
+            out.append(self._guard(-side, springs[abs(met) - 1][0], met - side, index, key))
+            if abs(met) < len(springs):
+                out.append(self._guard(side, -springs[abs(met)][0], met + side, index, key))
             return out
         return [
             self._guard(side, -stop.gap, side, index, key) for side, stop in self.clearance.sides
         ]
 
-    def _springs(self, met: int) -> tuple[tuple[float, float], ...]:
-        stop = dict(self.clearance.sides)[1 if met > 0 else -1]
-        return stop.springs
+    def _stop(self, side: int) -> Side:
+        return dict(self.clearance.sides)[side]
 
     def _guard(self, sign: int, constant: float, met: int, index: int, key: ModeKey) -> Guard:
         target = (*key[:index], met, *key[index + 1 :])

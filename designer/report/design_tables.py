@@ -139,13 +139,10 @@ def error_table(design: Design) -> Table | None:
 
 
 def scale_table(design: Design, si: SiScales | None) -> Table | None:
-    scales, own = design.errors.scales, design.model.second_order().own_frequency
+    scales = design.errors.scales
     rows = [
         ("one unit of model time", words.quantity(scales.seconds, "s")),
-        (
-            f"generator frequency at ω = {words.number(own)}",
-            words.quantity(scales.frequency(own), "Hz"),
-        ),
+        ("generator frequency at ω = 1", words.quantity(scales.frequency(1.0), "Hz")),
     ]
     if si is not None:
         slow = si.time_scale / scales.seconds

@@ -2,12 +2,13 @@
 
 Every element there is: springs, dampers, constant forces, a moving ground with stops that move with
 it or not, gaps to ground and between masses, unequal and preloaded sides, stops that stiffen in
-steps, dampers in contact.
+steps, dampers and preloads in contact.
 """
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,7 +47,8 @@ def gaps(draw: st.DrawFn, masses: int) -> Gap:
     damping = draw(st.sampled_from([0.0, 0.3]))
     upper = () if sides == "lower" else first
     lower = {"both": second, "upper": (), "lower": first}[sides]
-    return Gap(a, b, upper, lower, damping)
+    preload = draw(st.sampled_from([0.0, 0.2]))
+    return Gap(a, b, upper, lower, damping, preload)
 
 
 @st.composite
@@ -56,7 +58,7 @@ def mechanisms(draw: st.DrawFn) -> Mechanism:
     fixed = draw(st.booleans())
     few = draw(st.lists(gaps(n), max_size=2))
     if fixed:  # the damper's other end would move
-        few = [g if g.other != GROUND else Gap(g.mass, g.other, g.upper, g.lower) for g in few]
+        few = [g if g.other != GROUND else replace(g, damping=0.0) for g in few]
     assume(_apart(few))
     return Mechanism(
         masses=[0.5 + draw(number) for _ in range(n)],

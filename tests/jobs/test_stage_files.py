@@ -29,7 +29,6 @@ from designer.verdicts.cross_check import ask_random
 from designer.verdicts.ngspice_runs import cross_checks
 from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study, plan_study
-from tests.shared.quick_folders import without_starts
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
 
@@ -67,10 +66,7 @@ def design_of(modelfile: ModelFile, circuit: Circuit) -> Design:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_files_are_read_back_as_the_same_design(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without_starts(monkeypatch)
+def test_files_are_read_back_as_the_same_design(name: str, tmp_path: Path) -> None:
     first = made(name, tmp_path)
     texts = design_files.texts(first)
     folder = Folder(tmp_path / "out")
@@ -90,10 +86,7 @@ def test_files_are_read_back_as_the_same_design(
 
 
 @pytest.mark.parametrize("name", ["rectifier", "saturation, upper"])
-def test_the_deck_runs_in_plain_ngspice(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without_starts(monkeypatch)
+def test_the_deck_runs_in_plain_ngspice(name: str, tmp_path: Path) -> None:
     deck = tmp_path / "circuit.cir"
     deck.write_text(design_files.texts(made(name, tmp_path))["circuit.cir"])
     done = subprocess.run(

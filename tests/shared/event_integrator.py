@@ -22,13 +22,15 @@ GROUND = -1
 
 @dataclass(frozen=True)
 class Gap:
-    """A clearance: (gap, stiffness) of each spring of its upper and of its lower stop."""
+    """A clearance: (gap, stiffness) of each spring of its upper and of its lower stop; damping and
+    preload act as soon as a stop is touched."""
 
     mass: int
     other: int = GROUND
     upper: tuple[tuple[float, float], ...] = ()
     lower: tuple[tuple[float, float], ...] = ()
     damping: float = 0.0
+    preload: float = 0.0
 
     @property
     def thresholds(self) -> list[tuple[int, int, float, float]]:
@@ -87,7 +89,7 @@ class Mechanism:
             ):
                 if touched:
                     force -= stiffness * (d - side * distance)
-                    force -= gap.damping * v if number == 0 else 0.0
+                    force -= gap.damping * v + side * gap.preload if number == 0 else 0.0
             push[gap.mass] += force
             push[gap.other] -= force
         return np.concatenate([y[n:], push[:n] / self.masses])

@@ -29,6 +29,7 @@ ORDER = (
     "report",
     "jobs",
     "paper",
+    "examples",
     "cli",
 )
 """A package may use those before it. The picture in docs/architecture.md is drawn from this."""

@@ -39,7 +39,8 @@ def _clearance(number: int, gap: Gap) -> Clearance:
         if not springs:
             return None
         (first, stiffness), *further = springs
-        return Side(first, stiffness, tuple((place - first, k) for place, k in further))
+        deeper = tuple((place - first, k) for place, k in further)
+        return Side(first, stiffness, deeper, gap.preload)
 
     other = None if gap.other == GROUND else gap.other
     return Clearance(

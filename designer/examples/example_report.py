@@ -1,0 +1,144 @@
+"""The report on one model file of ``examples/``: what it shows, and what becomes of it on a board.
+
+    python -m designer.examples.example_report examples/aberdeen.toml reports/examples/aberdeen
+
+The first part holds what the tool computes against closed forms. The second is the design folder
+``design`` beside the page, as the verbs ``run``, ``export`` and ``rules`` make it. A file that this
+module does not know by its name gets the parts that every system has.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from markupsafe import Markup
+
+from designer.base.defaults import cores
+from designer.base.errors import DesignerError
+from designer.base.page import Page, PageSection
+from designer.base.progress import Progress, progress_for
+from designer.catalog.catalog import load_catalog
+from designer.examples import (
+    backbone,
+    bilinear,
+    chain_modes,
+    grazing_map,
+    persistence,
+    rattle,
+    weight,
+)
+from designer.examples.board_part import board_part
+from designer.examples.evidence import Evidence, Show
+from designer.examples.frequency_sweep import frequency_sweep
+from designer.jobs.origin import provenance
+from designer.model.model_file import ModelFile, read_model_file
+from designer.paper.report_files import write_files
+
+FORMAT = 1
+SAMPLES, SEED = 1000, 71
+DATA = "example.json"
+SHOWS: Mapping[str, Show] = {
+    "aberdeen": persistence.evidence,
+    "preloaded": grazing_map.evidence,
+    "shaw-holmes": bilinear.evidence,
+    "duffing-gap": backbone.evidence,
+    "backlash": rattle.evidence,
+    "three-masses": chain_modes.evidence,
+    "hammer-base": weight.evidence,
+}
+"""What is shown of each model file, by its name."""
+
+
+def report(
+    model: Path,
+    out: Path,
+    *,
+    samples: int = SAMPLES,
+    seed: int = SEED,
+    jobs: int | None = None,
+    circuit: bool = True,
+    progress: Progress | None = None,
+) -> None:
+    """Make the report in the folder ``out``.
+
+    samples : boards of the tolerance study. circuit : whether there is a part about a board.
+
+    Raises
+    ------
+    InputError, Unreachable, EnvironmentMissing : as the verbs ``run``, ``export`` and ``rules``.
+    """
+    progress = Progress() if progress is None else progress
+    jobs = cores() if jobs is None else jobs
+    file = read_model_file(model)
+    parts = evidence(file, model.stem, jobs, progress)
+    numbers = {"samples": samples, "seed": seed, "circuit": circuit}
+    if circuit:
+        parts.append(board_part(model, out, samples, seed, jobs, progress))
+    out.mkdir(parents=True, exist_ok=True)
+    document = {
+        "format": FORMAT,
+        "title": file.title,
+        "parts": [part.as_dict() for part in parts],
+        "provenance": provenance(file, load_catalog().hash, seed=seed, settings=numbers),
+    }
+    figures = {name: figure for part in parts for name, figure in part.figures.items()}
+    write_files(out, (DATA, document), _page(file, model, out, numbers, parts), figures)
+
+
+def evidence(file: ModelFile, name: str, jobs: int, progress: Progress) -> list[Evidence]:
+    """What is shown of the model; ``name`` of the file, without ending."""
+    progress.stage("what the system shows", None)
+    special = SHOWS[name](file) if name in SHOWS else []
+    return [*special, frequency_sweep(file, jobs)]
+
+
+def _page(
+    file: ModelFile,
+    model: Path,
+    out: Path,
+    numbers: Mapping[str, object],
+    parts: Sequence[Evidence],
+) -> Page:
+    command = f"python -m designer.examples.example_report {model} {out}"
+    command += f" --samples {numbers['samples']} --seed {numbers['seed']}"
+    head = [
+        Markup(f"Made by `{command}` from `{model}`; the numbers are in `{DATA}`."),
+        _opening(file),
+    ]
+    return Page(file.title, head, [PageSection(part.title, part.blocks) for part in parts])
+
+
+def _opening(file: ModelFile) -> str:
+    """The comment at the top of the model file."""
+    lines = []
+    for line in file.text.splitlines():
+        if not line.startswith("#"):
+            break
+        lines.append(line.removeprefix("#").strip())
+    return " ".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make the report that the command line asks for; the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m designer.examples.example_report")
+    parser.add_argument("model", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--samples", type=int, default=SAMPLES)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--jobs", type=int)
+    parser.add_argument("--no-circuit", action="store_false", dest="circuit")
+    asked = parser.parse_args(arguments)
+    try:
+        with progress_for(False) as progress:
+            report(progress=progress, **vars(asked))
+    except DesignerError as error:
+        print(f"example_report: {error}", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

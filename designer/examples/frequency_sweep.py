@@ -1,0 +1,62 @@
+"""What a model shows over the drive frequency, the attractor followed down and up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from designer.base.page import Table, table
+from designer.bifurcations import sweep
+from designer.bifurcations.sweep import DOWN, UP, SweepPlan, Window
+from designer.dynamics.steady_state import Course
+from designer.examples.evidence import Evidence, figure_block
+from designer.model.mechanics import MechanicalModel
+from designer.model.model_file import ModelFile
+from designer.model.swept_model import ModelSubject
+from designer.report import bifurcation_plots
+
+STEPS = 240
+COURSE = Course(settle=240, keep=16)
+"""Less than a diagram on the screen asks for: the windows named here are wide."""
+NAMED = 12
+"""Windows in the table, the widest."""
+
+
+def frequency_sweep(file: ModelFile, jobs: int) -> Evidence:
+    """The part of a report about what is reached at each frequency."""
+    low, high = _range(file.model)
+    plan = SweepPlan(
+        ModelSubject(file.model),
+        "omega",
+        np.linspace(low, high, STEPS),
+        course=COURSE,
+        **sweep.follow(DOWN, UP),
+    )
+    result = sweep.run(plan, jobs)
+    widest = sorted(result.windows, key=lambda w: w.low - w.high)[:NAMED]
+    text = (
+        f"{STEPS} frequencies from {low:.4g} to {high:.4g}, the attractor followed down and up. "
+        f"The table has the {NAMED} widest windows."
+    )
+    name = "frequency-sweep"
+    blocks = [text, _table(widest), figure_block(name, "Over the drive frequency.")]
+    figure = bifurcation_plots.diagram(result, name=file.title)
+    return Evidence("Over the drive frequency", blocks, {name: figure})
+
+
+def _range(model: MechanicalModel) -> tuple[float, float]:
+    """From well below the first mode to above the last one, with the stops half the time met."""
+    system = model.second_order()
+    off, on = system.natural_frequencies(), system.natural_frequencies(closed=True)
+    return 0.4 * float(off[0]), 1.4 * float((2.0 * off * on / (off + on))[-1])
+
+
+def _table(windows: list[Window]) -> Table | None:
+    rows = [
+        (w.response, _symmetry(w), f"{w.low:.4g}", f"{w.high:.4g}", w.track)
+        for w in sorted(windows, key=lambda w: (w.track, w.low))
+    ]
+    return table(("response", "kind", "from ω", "to ω", "followed"), rows, numeric=(2, 3))
+
+
+def _symmetry(window: Window) -> str:
+    return {True: "symmetric", False: "not symmetric", None: ""}[window.symmetric]

@@ -1,0 +1,115 @@
+"""What the reports on the examples show, against closed forms and integrals of their own."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from designer.base.progress import Progress
+from designer.examples import example_report, frequency_sweep, grazing_map, persistence, rattle
+from designer.examples.backbone import backbone
+from designer.examples.bilinear import bilinear_frequency
+from designer.examples.chain_modes import chain_frequencies
+from designer.examples.first_touch import first_touches
+from designer.model.lumped_system import LumpedSystem
+from designer.model.model_file import read_model_file
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def system(name: str) -> LumpedSystem:
+    model = read_model_file(EXAMPLES / f"{name}.toml").model
+    assert isinstance(model, LumpedSystem)
+    return model
+
+
+@pytest.mark.parametrize("stop", grazing_map.STOPS, ids=lambda stop: stop.name)
+def test_near_grazing_map_trace_and_determinant_follow_the_theory(
+    stop: grazing_map.StopKind,
+) -> None:
+    measured = grazing_map.grazing_map(system("preloaded"), 0.8, stop)
+    power = 0.5 if stop.preload else 1.5
+    assert measured.kick_power == pytest.approx(power, abs=2e-3)
+    assert measured.trace_power == pytest.approx(power - 1.0, abs=2e-3)
+    for shown, expected in zip(
+        (measured.kicks, measured.traces, measured.determinants), measured.expected.T, strict=True
+    ):
+        assert shown[:2] == pytest.approx(expected[:2], rel=1e-3)
+
+
+@pytest.mark.parametrize(("m", "lives"), [(2.5, False), (3.0, True)])
+def test_period_1_lives_through_grazing_where_m_is_whole(
+    m: float, lives: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(persistence, "BEYOND", np.geomspace(1e-3, 0.1, 5))
+    passage = persistence.passage(system("aberdeen"), m)
+    assert passage.persists == (0.1 if lives else 0.0)
+
+
+def test_the_grazing_amplitude_of_the_aberdeen_rig() -> None:
+    model = system("aberdeen")
+    assert persistence.grazing_amplitude(model, 0.8) == pytest.approx(0.709, abs=5e-4)
+    (touch,) = first_touches(model, 0.8)
+    assert persistence.grazing_amplitude(model, 0.8) == pytest.approx(1.0 / touch.b, rel=1e-12)
+
+
+@pytest.mark.parametrize("amplitude", [0.51, 0.7, 3.0])
+def test_the_backbone_is_the_time_that_energy_takes(amplitude: float) -> None:
+    """T/4 = ∫ dx/v with v²/2 the energy that is left."""
+    model = system("duffing-gap")
+    gap, k, stop = 0.5, 1.0, 19.0
+
+    def potential(x: float) -> float:
+        return 0.5 * k * x * x + 0.5 * stop * max(x - gap, 0.0) ** 2
+
+    def slowness(phase: float) -> float:
+        x = amplitude * math.sin(phase)
+        left = 2.0 * (potential(amplitude) - potential(x))
+        return amplitude * math.cos(phase) / math.sqrt(left)
+
+    corner = math.asin(gap / amplitude)
+    quarter = sum(quad(slowness, *ends)[0] for ends in ((0.0, corner), (corner, 0.5 * math.pi)))
+    assert backbone(model, amplitude) == pytest.approx(0.5 * math.pi / quarter, rel=1e-7)
+
+
+def test_the_bilinear_frequency_is_that_of_two_half_swings() -> None:
+    half = 0.5 * (2.0 * math.pi / 1.0 + 2.0 * math.pi / 3.0)
+    assert bilinear_frequency(system("shaw-holmes")) == pytest.approx(2.0 * math.pi / half)
+
+
+def test_a_force_shared_as_the_masses_does_not_rattle() -> None:
+    model = system("backlash")
+    quiet = rattle.quiet_share(model)
+    assert quiet == pytest.approx(2.0 / 3.0)
+    for omega in (0.5, 1.0, 1.7):
+        shared = model.changed({"driver.amplitude": 1.0 - quiet, "load.amplitude": quiet})
+        assert first_touches(shared, omega)[0].b < 1e-12
+
+
+def test_the_modes_of_a_chain() -> None:
+    modes = system("three-masses").second_order().natural_frequencies()
+    assert modes == pytest.approx(chain_frequencies(3, 1.0, 1.0), rel=1e-12)
+
+
+def test_a_report_without_a_board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(frequency_sweep, "STEPS", 12)
+    out = tmp_path / "new" / "three-masses"
+    example_report.report(
+        EXAMPLES / "three-masses.toml", out, circuit=False, jobs=1, progress=Progress()
+    )
+    page = (out / "README.md").read_text("utf-8")
+    assert "2√(K/M) sin((2k − 1)π/14)" in page
+    assert page.startswith("# Three masses and two unequal clearances")
+    for name in ("example.json", "first-touches.png", "frequency-sweep.png"):
+        assert (out / name).stat().st_size > 1000
+        assert name in page
+
+
+def test_bad_input_ends_in_a_message(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert example_report.main([str(tmp_path / "none.toml"), str(tmp_path / "out")]) == 2
+    assert "none.toml" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

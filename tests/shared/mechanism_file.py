@@ -1,0 +1,78 @@
+"""Model files of format 2 for the independent integrator, by a reader of their own."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tests.shared.event_integrator import GROUND, Gap, Mechanism
+
+PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3}
+TEXT = re.compile(r"(-?[\d.]+) ([km]?)(?:kg|N/m|N s/m|m|N|Hz)")
+
+
+def value_of(value: float | str) -> float:
+    """A number, or one with a unit; a mass is in kg."""
+    if isinstance(value, str):
+        match = TEXT.fullmatch(value)
+        assert match is not None, value
+        kilo = "" if value.endswith("kg") else match[2]
+        return float(match[1]) * PREFIXES[kilo]
+    return float(value)
+
+
+def omega_of(response: Mapping[str, Any]) -> float:
+    """Drive frequency of a table [[response]]."""
+    if "omega" in response:
+        return float(response["omega"])
+    return 2.0 * math.pi * value_of(response["frequency"])
+
+
+def mechanism_of(path: Path, omega: float) -> tuple[Mechanism, list[Mapping[str, Any]]]:
+    """The system of a file at a drive frequency, and the file's responses. Each force and each
+    spring or damper to ground names its mass first."""
+    data = tomllib.loads(path.read_text("utf-8"))
+    names = [mass["name"] for mass in data["mass"]]
+
+    def place(name: str) -> int:
+        return GROUND if name == "ground" else names.index(name)
+
+    def links(kind: str, key: str) -> list[tuple[int, int, float]]:
+        return [(*map(place, t["between"]), value_of(t[key])) for t in data.get(kind, [])]  # type: ignore[misc]
+
+    forces, constants = [0.0] * len(names), [0.0] * len(names)
+    for force in data.get("force", []):
+        forces[place(force["on"])] += value_of(force.get("amplitude", 0.0))
+        constants[place(force["on"])] += value_of(force.get("constant", 0.0))
+    base = data.get("base", {})
+    mechanism = Mechanism(
+        masses=[value_of(mass["mass"]) for mass in data["mass"]],
+        springs=links("spring", "stiffness"),
+        dampers=links("damper", "damping"),
+        forces=forces,
+        omega=omega,
+        gaps=[_gap(table, *map(place, table["between"])) for table in data["clearance"]],
+        constants=constants,
+        base=value_of(base.get("amplitude", 0.0)),
+        fixed_stops=base.get("stops") == "fixed",
+    )
+    return mechanism, data["response"]
+
+
+def _gap(table: Mapping[str, Any], mass: int, other: int) -> Gap:
+    def springs(side: str) -> tuple[tuple[float, float], ...]:
+        stiffness = table.get(f"{side}_stiffness", table.get("stiffness"))
+        return ((value_of(table[side]), value_of(stiffness)),) if side in table else ()
+
+    return Gap(
+        mass,
+        other,
+        springs("upper"),
+        springs("lower"),
+        value_of(table.get("damping", 0.0)),
+        value_of(table.get("preload", 0.0)),
+    )
