@@ -32,6 +32,8 @@ TURN = 0.97
 """Cosine of the most that the tangent may turn in one step."""
 JUMP = 0.15
 """Most that ln(1 + |multiplier|) of the leading multiplier may change in one step."""
+KINK = 1e-6
+"""Longest step over a kink: a damper begins or ceases to act in contact at the strobe itself."""
 NEAREST = 1e-9
 """Arclength to which a grazing point is closed in on."""
 FINEST = 2e-5
@@ -267,6 +269,8 @@ def _step(curve: Curve, here: Solved, tangent: Array, step: float) -> Solved | N
     if solved is None:
         return None
     off = float(np.linalg.norm((solved.y - guess) / curve.scale))
+    if step < KINK and not curve.family.flow(here.value).system.continuous:
+        return solved if off < 2.0 * step and tangent @ solved.tangent > 0.0 else None
     return solved if off < 0.5 * step and tangent @ solved.tangent > TURN else None
 
 

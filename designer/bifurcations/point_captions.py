@@ -28,7 +28,7 @@ def caption(point: Bifurcation, parameter: str = "", unit: str = "") -> str:
     place = f" at {parameter} = {point.value:.9g}{' ' + unit if unit else ''}" if parameter else ""
     whose = f" of {label(point.response, point.symmetric)}"
     if point.kind is PointKind.GRAZING:
-        whose = f" at the {point.stops}" if point.stops else ""
+        whose = f" at {point.stops}" if point.stops else ""
     return f"{NAMES[point.kind]}{whose}{place}: {_what(point)}"
 
 

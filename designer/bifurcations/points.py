@@ -107,7 +107,8 @@ class Bifurcation:
     born: Birth | None = None
     """What leaves the branch here, where that was looked for (``branch_switch.birth``)."""
     stops: str = ""
-    """The stops that are grazed, "upper stop of A", where there are more clearances than one."""
+    """The stops that are grazed, "the upper stop of A" or "both stops of A", where there are more
+    clearances than one."""
 
     @property
     def response(self) -> str:
@@ -231,14 +232,14 @@ def _changed(a: BranchPoint, b: BranchPoint) -> list[tuple[int, int]]:
 
 
 def _stops(curve: Curve, a: BranchPoint, b: BranchPoint) -> str:
-    """The stops that are grazed between two points, "upper stop of A", where there are more
+    """The stops that are grazed between two points, "the upper stop of A", where there are more
     clearances than one."""
     names = curve.family.flow(a.value).system.clearances
     changed = _changed(a, b)
     words = []
     for k in sorted({k for k, _ in changed}):
         sides = [("upper", "lower")[i] for j, i in changed if j == k]
-        stops = f"{sides[0]} stop" if len(sides) == 1 else "both stops"
+        stops = f"the {sides[0]} stop" if len(sides) == 1 else "both stops"
         words.append(f"{stops} of {names[k]}")
     return " and ".join(words) if len(names) > 1 else ""
 

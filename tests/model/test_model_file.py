@@ -252,11 +252,6 @@ def test_a_response_accepts_its_twin_unless_it_is_to_be_exact() -> None:
     assert not Response(1.0, one).accepts(Counts.parse("1-2-1"))
 
 
-def test_a_response_of_two_clearances_is_read() -> None:
-    text = PAPER.replace('expect = "1-2-2"', 'expect = "1-2-2;0-1"')
-    assert Counts(1, ((2, 2), (0, 1))) in [r.expect for r in parse_model_file(text).responses]
-
-
 # What is wrong, one thing at a time: (old, new, field, found, part of what was expected).
 
 WRONG = [
