@@ -5,7 +5,7 @@ Nothing is verified and nothing repeated here; ``synthesis.parts_choice`` does b
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,16 +19,18 @@ from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
 from designer.circuit.dead_zone_reading import CutShort
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
+from designer.circuit.terms import entry_resistor
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
 from designer.model.mechanics import MechanicalModel
 from designer.synthesis import linear_search, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZone, target_of
+from designer.synthesis.equal_parts import equal_parts
 from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLimits
 from designer.synthesis.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.part_checks import (
-    DRIVE,
     buyable,
+    drive_resistors,
     inverter_resistors,
     nearest,
     unit_circuit,
@@ -66,6 +68,8 @@ class Order:
     """Price class by resistance."""
     inverters: frozenset[str]
     """Names of the inverters' resistors."""
+    drive: tuple[str, ...]
+    """Names of the resistors from the generator, one for each driven mass."""
     largest: float
     """Largest of the generator's amplitudes, over that at the model's clearance."""
     aims: Aims = NO_AIMS
@@ -89,7 +93,7 @@ class Order:
         InputError : an unknown part of the catalogue.
         Unreachable : no value of the series can be bought.
         """
-        opamp = catalog.opamp(spec.opamp)
+        opamp, unit = catalog.opamp(spec.opamp), unit_circuit(model, spec, catalog)
         resistors = buyable("resistor", spec, catalog)
         capacitors = buyable("capacitor", spec, catalog)
 
@@ -111,10 +115,18 @@ class Order:
             resistor_prices={
                 v: price("resistor", v, spec.resistor_grade) for v in resistors.tolist()
             },
-            inverters=inverter_resistors(unit_circuit(model, spec, catalog)),
+            inverters=inverter_resistors(unit),
+            drive=drive_resistors(unit),
             largest=largest,
             aims=aims,
         )
+
+    @property
+    def stiffness(self) -> str:
+        """Name of the resistor of the stiffness of the first stop's mass by itself (R4)."""
+        system = self.model.second_order()
+        mass = system.clearances[0].mass if system.clearances else 0
+        return entry_resistor(system.size, 2 * mass + 1, 2 * mass)
 
     def build(
         self, values: Mapping[str, float], composites: Mapping[str, Composite] | None = None
@@ -172,14 +184,15 @@ def linear_block(
 ) -> LinearBlock | Shortfall:
     """The linear block within these limits, or what leaves none.
 
-    most_values : its share of the limit on distinct values. between : range of R4 [ohm]. level :
-    the one level of error to search, if not all.
+    most_values : its share of the limit on distinct values. between : range of the resistor of
+    ``Order.stiffness`` [ohm]. level : the one level of error to search, if not all.
     """
     system = order.model.second_order()
     mu = max((system.relative_stiffness(stop) for stop in system.clearances), default=0.0)
-    bounds = limits.bounds(mu, order.peaks, order.resistors)
+    mass = system.clearances[0].mass if system.clearances else 0
+    bounds = limits.bounds(mu, order.peaks, order.resistors, mass)
     return linear_search.best(
-        Targets.from_state_matrix(system.state_matrix()),
+        Targets.of(order.model),
         order.resistors,
         order.capacitors,
         order.prices,
@@ -277,54 +290,65 @@ def _inverters(
 def _drive(
     order: Order, limits: ConditionLimits, values: Mapping[str, float], thrifty: bool
 ) -> dict[str, float] | Shortfall:
-    """R6 and R12, which make the force with the generator's amplitude: f20 as exact as can be, the
-    amplitude up to what a generator gives."""
-    lists = dict.fromkeys(DRIVE, order.resistors)
-    equal = False
+    """The resistors that make the forces with the generator's amplitude: the forces' ratios as
+    exact as can be, the amplitude up to what a generator gives."""
+    names = order.drive
+    if not names:
+        return {}
+    equal = equal_parts(names, order.spec.matched, values)
+    if equal is None:
+        return Shortfall("matched parts", True)
     volts = _volts_per_ohm(order, limits, values)
-    for group in order.spec.matched:
-        own = [name for name in DRIVE if name in group]
-        given = {values[name] for name in group if name in values}
-        if own and len(given) > 1:
-            return Shortfall("matched parts", True)
-        equal |= len(own) == 2
-        for name in own:
-            lists[name] = np.array(sorted(given)) if given else lists[name]
+    roots = [equal.of(name) for name in names]
+    lists = {
+        root: np.array([equal.value[root]]) if root in equal.value else order.resistors
+        for root in roots
+    }
     aim = GENERATOR_PEAK / order.largest
-    if (volts > 0.0).all():
-        return _both_driven(volts, lists, aim, equal)
-    index = int(np.flatnonzero(volts > 0.0)[0])
-    own_list = lists[DRIVE[index]]
-    within = own_list[volts[index] * own_list <= aim]
-    top = float(within[-1]) if len(within) else float(own_list[0])
+    if len(names) > 1:
+        return dict(zip(names, _in_ratio(volts, roots, lists, aim), strict=True))
+    own = lists[roots[0]]
+    within = own[volts[0] * own <= aim]
+    top = float(within[-1]) if len(within) else float(own[0])
     # A value that the circuit has already is taken where the amplitude stays large enough.
     least = LEAST_SHARE if thrifty else 0.5
-    known = [v for n, v in values.items() if n.startswith("R") and v in own_list]
-    return {DRIVE[index]: max((v for v in known if least * top <= v <= top), default=top)}
+    known = [v for n, v in values.items() if n.startswith("R") and v in own]
+    return {names[0]: max((v for v in known if least * top <= v <= top), default=top)}
 
 
 def _volts_per_ohm(order: Order, limits: ConditionLimits, values: Mapping[str, float]) -> Array:
-    """(2,) generator volts [V peak] that R6 and R12 need for each ohm; 0 where not driven."""
-    # R6 and R12 do not enter the coefficients, so any value will do to find what they need.
+    """(driven,) generator volts [V peak] that each driven mass needs for each ohm."""
+    # They do not enter the coefficients, so any value will do to find what they need.
     placeholder = float(order.resistors[-1])
-    trial = order.build({**values, **dict.fromkeys(DRIVE, placeholder)})
+    trial = order.build({**values, **dict.fromkeys(order.drive, placeholder)})
     errors = order.errors(trial, limits.swing)
     system = order.model.second_order()
     wanted = system.drive_force(system.own_frequency)
-    gain = np.where(wanted > 0.0, errors.drive_gain * placeholder, 1.0)
-    return np.asarray(np.where(wanted > 0.0, wanted / gain, 0.0))
+    driven = wanted != 0.0
+    return np.asarray(wanted[driven] / (errors.drive_gain[driven] * placeholder))
 
 
-def _both_driven(
-    volts: Array, lists: Mapping[str, Array], aim: float, equal: bool
-) -> dict[str, float]:
-    r6, r12 = (a.ravel() for a in np.meshgrid(lists["R6"], lists["R12"]))
-    if equal and (r6 == r12).any():
-        r6, r12 = r6[r6 == r12], r12[r6 == r12]
-    first, second = volts[0] * r6, volts[1] * r12
-    off = np.abs(np.log(first / second))
-    amplitude = np.sqrt(first * second)  # as ``Design.amplitude`` sets it
+def _in_ratio(
+    volts: Array, roots: Sequence[str], lists: Mapping[str, Array], aim: float
+) -> list[float]:
+    """The resistors whose volts differ least in ratio, of those the largest amplitude to ``aim``.
+
+    volts : that each needs for each ohm. roots : resistors with the same are equal. For every
+    largest volt that a choice can have, the others come as near below it as they can.
+    """
+    own = {root: np.log(volts[[r == root for r in roots]]) for root in lists}
+    largest = np.unique(np.concatenate([np.log(lists[r]) + own[r].max() for r in lists]))
+    place = {
+        root: np.searchsorted(np.log(lists[root]) + own[root].max(), largest + 1e-12, "right") - 1
+        for root in lists
+    }
+    possible = np.all([place[root] >= 0 for root in lists], axis=0)
+    largest = largest[possible]
+    chosen = {root: lists[root][place[root][possible]] for root in lists}
+    needed = np.log(volts)[:, None] + np.log([chosen[root] for root in roots])
+    off = largest - needed.min(axis=0)
+    amplitude = np.exp(needed.mean(axis=0))  # as ``Design.amplitude`` sets it
     good = (amplitude <= aim) & (amplitude >= LEAST_SHARE * aim)
     good = good if good.any() else np.ones(len(off), dtype=bool)
     best = np.flatnonzero(good)[np.lexsort((-amplitude[good], np.round(off[good], 9)))[0]]
-    return {"R6": float(r6[best]), "R12": float(r12[best])}
+    return [float(chosen[root][best]) for root in roots]

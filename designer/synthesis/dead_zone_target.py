@@ -148,7 +148,7 @@ def target_of(
     system = model.second_order()
     stop = system.clearances[0]
     own, wanted = 2 * stop.mass, stop.first.stiffness / float(system.mass[stop.mass])
-    targets, mu = Targets.from_state_matrix(system.state_matrix()), system.relative_stiffness(stop)
+    targets, mu = Targets.of(model), system.relative_stiffness(stop)
     errors = errors_of(values, targets)
     relative = np.exp(errors.volts @ minimax(errors.offsets, errors.columns))
     relative = relative / relative[own]  # volts of each state over those of the stop's displacement
@@ -167,7 +167,7 @@ def target_of(
         saturation=saturation,
         threshold=min(stop.first.gap * top, saturation / LEAST_GAIN),
         linear_gain=more * (limits.swing / (top * peak)),
-        output_gain=more * ((limits.swing - drop) / (top * depth(peaks))),
+        output_gain=more * ((limits.swing - drop) / (top * depth(peaks, stop.mass))),
         load=limits.load,
         noise_gain=limits.noise_gain,
         strict=bool(limits.conditions),

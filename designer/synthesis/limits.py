@@ -15,7 +15,7 @@ from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
-from designer.synthesis.linear_terms import Bounds
+from designer.synthesis.linear_terms import Bounds, Targets
 
 SWING_SHARE = 0.85
 """Of the op-amp's limit: what the peaks of an output may use; the rest is for spread."""
@@ -33,8 +33,6 @@ BANDWIDTH_SHARE = 0.05
 """Of the gain-bandwidth: noise gain times frequency of the highest harmonic that matters, so that
 the phase error of a stage there, where a velocity has a thousandth of its largest harmonic, stays
 below 0.05 rad."""
-SIGNAL_RESISTORS = frozenset(f"R{i}" for i in (1, 2, 3, 4, 5, 7, 8, 9, 10, 11))
-"""Resistors of the linear block, by the paper's names for two masses."""
 GENERATOR_PEAK = 5.0
 """Largest amplitude asked of a generator [V]: 10 V peak to peak, what common ones give."""
 INVERTER_GAIN = 2.0
@@ -80,16 +78,18 @@ class ConditionLimits:
     noise_gain: float
     """Largest noise gain of a ratio stage."""
 
-    def bounds(self, mu: float, peaks: Peaks, resistors: Array) -> Bounds:
-        """What the linear block has to keep. mu : stop stiffness over K1; 0 without a stop."""
+    def bounds(self, mu: float, peaks: Peaks, resistors: Array, mass: int = 0) -> Bounds:
+        """What the linear block has to keep. mu : stop stiffness over that of the mass's springs
+        (K1); 0 without a stop. mass : index of the one at the first stop."""
         least = max(self.load, float(resistors.min()))
         return Bounds(
             seconds=self.seconds,
             level=self.level,
             share=self.share,
-            stop=least * mu / output_gain(peaks),
+            stop=least * mu / output_gain(peaks, mass),
             peaks=peaks.states,
             signal=self.signal,
+            mass=mass,
         )
 
     def tightened(
@@ -128,7 +128,8 @@ class ConditionLimits:
         loads = [r for r in design.circuit.resistors if outputs & set(r.nets)]
         heaviest = min(loads, key=lambda r: r.value)
         floor = values.get(heaviest.name, heaviest.value) * (1.0 + MARGIN)
-        low = max(floor, self.signal[0]) if heaviest.name in SIGNAL_RESISTORS else self.signal[0]
+        own = heaviest.name in Targets.of(design.model).resistors
+        low = max(floor, self.signal[0]) if own else self.signal[0]
         return replace(self, load=max(floor, self.load), signal=(low, self.signal[1]))
 
 
@@ -174,11 +175,12 @@ def guaranteed(figure: Figure) -> float:
     return figure.min if figure.min is not None else figure.nominal
 
 
-def output_gain(peaks: Peaks) -> float:
-    """Largest slope of fv: x1 fills the swing, fv at the deepest penetration of a stop too."""
-    return float(peaks.states[0] / depth(peaks))
+def output_gain(peaks: Peaks, mass: int = 0) -> float:
+    """Largest slope of fv: the displacement of the stop's mass fills the swing, fv at the deepest
+    penetration of a stop too."""
+    return float(peaks.states[2 * mass] / depth(peaks, mass))
 
 
-def depth(peaks: Peaks) -> float:
+def depth(peaks: Peaks, mass: int = 0) -> float:
     """Deepest penetration of a stop, in model units; a stop that is hardly met counts a little."""
-    return max(peaks.penetration, 0.02 * float(peaks.states[0]))
+    return max(peaks.penetration, 0.02 * float(peaks.states[2 * mass]))

@@ -80,7 +80,7 @@ def best(
         found = search.level(max(level, search.first), MOST_STEPS)
         if found.nothing:
             return Shortfall("coefficients", found.whole)
-    if found.nothing and not found.whole and not targets.fully_coupled_pair:
+    if found.nothing and not found.whole and not question.by_joins:
         found = _wider(found, question)
     if found.nothing and not found.whole:
         found = _thinned(found, question)
@@ -90,8 +90,7 @@ def best(
 
 
 def _search(question: LinearQuestion) -> LevelSearch:
-    pair = question.targets.fully_coupled_pair
-    return PairSearch(question) if pair else TermSearch(question)
+    return PairSearch(question) if question.by_joins else TermSearch(question)
 
 
 def _linear_block(found: Levels, question: LinearQuestion) -> LinearBlock:
@@ -203,7 +202,7 @@ def _relaxations(
 def _proof(found: Levels, question: LinearQuestion) -> str:
     """How the bound is known, in words."""
     resistors, capacitors = len(question.resistors), len(question.capacitors)
-    pair = question.targets.fully_coupled_pair
+    pair = question.by_joins
     way, choice = ("joins", "joined choice") if pair else ("tree of choices", "choice")
     did, those = ("completed", "joined") if pair else ("looked at", "looked at")
     scope = f"all {resistors} resistor and {capacitors} capacitor values"

@@ -21,6 +21,7 @@ import numpy as np
 from designer.base.arrays import Array, Index, Mask
 from designer.circuit.terms import entry_resistor
 from designer.model.circuit_table import CircuitSpec
+from designer.model.mechanics import MechanicalModel
 
 ANY = CircuitSpec()
 """What asks for no equal parts and prefers no values."""
@@ -37,6 +38,11 @@ class Targets:
     def from_state_matrix(cls, A: Array) -> Targets:
         """From the (2n, 2n) state matrix of a model in its own units."""
         return cls(np.abs(A))
+
+    @classmethod
+    def of(cls, model: MechanicalModel) -> Targets:
+        """Those of a model."""
+        return cls.from_state_matrix(model.second_order().state_matrix())
 
     @cached_property
     def entries(self) -> tuple[tuple[int, int], ...]:
@@ -214,6 +220,11 @@ class LinearQuestion:
     """The side conditions."""
     spec: CircuitSpec
     """Its matched, preferred, most_values and slack count."""
+
+    @property
+    def by_joins(self) -> bool:
+        """Whether the joins for two masses with all terms and the first stop on the first hold."""
+        return self.targets.fully_coupled_pair and self.bounds.mass == 0
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,12 @@ from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
 from designer.circuit import build
 from designer.circuit.dead_zone_parts import dead_zone_stage
 from designer.circuit.netlist import Circuit
+from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec
 from designer.model.mechanics import MechanicalModel
 
-DRIVE = ("R6", "R12")
-"""Resistors from the generator to the driven masses."""
+GENERATOR_INVERTER = ("R190", "R191")
+"""Resistors of the generator's inverter, for forces in antiphase."""
 _SECTION = re.compile("[A-OQ-Z]")
 """Names that sections may have: U1P is the supply of U1."""
 Refusal = InputError | None
@@ -98,9 +99,22 @@ def unit_circuit(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) ->
     )
 
 
+def inverter_pair(state: int) -> tuple[str, str]:
+    """Names of the resistors of a state's inverter."""
+    return f"R{100 + 2 * state}", f"R{101 + 2 * state}"
+
+
 def inverter_resistors(circuit: Circuit) -> frozenset[str]:
-    """Resistors of the inverters, which only set a level."""
-    return frozenset(n for n in circuit.values if n[:2] == "R1" and len(n) == 4)
+    """Resistors of the inverters, which only set a level: of the states', of the generator's."""
+    own = {name for state in range(len(circuit.states)) for name in inverter_pair(state)}
+    return frozenset((own | set(GENERATOR_INVERTER)) & set(circuit.values))
+
+
+def drive_resistors(circuit: Circuit) -> tuple[str, ...]:
+    """Resistors from the generator, or its inverse, to the driven masses, in the masses' order."""
+    masses = len(circuit.states) // 2
+    names = (drive_resistor(masses, mass) for mass in range(masses))
+    return tuple(name for name in names if name in circuit.values)
 
 
 def matching_resistors(circuit: Circuit) -> tuple[str, ...]:
@@ -108,7 +122,7 @@ def matching_resistors(circuit: Circuit) -> tuple[str, ...]:
     a supply to a reference. Only these can gain from a second part."""
     held = {net for ref in circuit.references for net in ref.nets}
     rails = {supply.net for supply in circuit.supplies}
-    others = inverter_resistors(circuit) | set(DRIVE)
+    others = inverter_resistors(circuit) | set(drive_resistors(circuit))
     return tuple(
         r.name
         for r in circuit.resistors

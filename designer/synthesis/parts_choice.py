@@ -322,7 +322,7 @@ def best_beside(
     what counts.
     """
     best = first
-    left = deque(_beside(linear, (0.0, float("inf"))))
+    left = deque(_beside(linear, (0.0, float("inf")), order.stiffness))
     for number in range(BESIDE):
         if (
             not left
@@ -335,17 +335,19 @@ def best_beside(
             other = linear_block(order, within, between=between, level=linear.least)
             if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
                 continue
-            left.extend(_beside(other, between))
+            left.extend(_beside(other, between, order.stiffness))
             made = attempt(order, within, other)
         if isinstance(made, Attempt) and _error(made) < _error(best) - EXACT:
             best = made
     return best
 
 
-def _beside(linear: LinearBlock, between: tuple[float, float]) -> list[tuple[float, float]]:
-    """What this block's R4 leaves of an interval, the part above it first."""
-    r4, (low, high) = linear.values["R4"], between
-    return [(r4 * (1.0 + ASIDE), high), (low, r4 * (1.0 - ASIDE))]
+def _beside(
+    linear: LinearBlock, between: tuple[float, float], name: str
+) -> list[tuple[float, float]]:
+    """What this block's resistor of this name leaves of an interval, the part above it first."""
+    value, (low, high) = linear.values[name], between
+    return [(value * (1.0 + ASIDE), high), (low, value * (1.0 - ASIDE))]
 
 
 def _error(made: Attempt | Shortfall) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -21,11 +22,11 @@ from designer.synthesis.limits import (
     NOISE_GAIN,
     SHARE,
     SIGNAL,
-    SIGNAL_RESISTORS,
     SWING_SHARE,
     bandwidth_limit,
     guaranteed,
 )
+from designer.synthesis.linear_terms import Targets
 from designer.synthesis.output_loads import Load, Loads
 
 
@@ -54,7 +55,7 @@ def verify(
         limit = guaranteed(opamp.output_current)
         checks.append(ConditionCheck("load", "output_current_a", limit, most.current, most.section))
     values = effective(design.circuit.values, design.composites)
-    signal = {name: value for name, value in values.items() if name in SIGNAL_RESISTORS}
+    signal = {name: values[name] for name in Targets.of(design.model).resistors}
     low, high = min(signal, key=signal.__getitem__), max(signal, key=signal.__getitem__)
     in_low, in_high = "signal_resistor_low_ohm", "signal_resistor_high_ohm"
     amplitude = max(amplitudes, default=0.0)
@@ -100,14 +101,17 @@ def saturating(circuit: Circuit) -> frozenset[str]:
 
 def _level(design: Design, opamp: OpAmp, peaks: Peaks) -> list[ConditionCheck]:
     volts = design.errors.scales.volts * peaks.states
-    pairs = [(0, 1), (2, 3), (1, 3)]
-    ratio = max(float(max(volts[i] / volts[j], volts[j] / volts[i])) for i, j in pairs)
-    share = float(volts.max() / volts[0])
-    offset = float(volts[0]) / opamp.offset_limit
+    clearances = design.model.second_order().clearances
+    own = 2 * clearances[0].mass if clearances else 0
+    pairs = [*zip(volts[0::2], volts[1::2], strict=True), *combinations(volts[1::2], 2)]
+    ratio = max(float(max(one / other, other / one)) for one, other in pairs)
+    share = float(volts.max() / volts[own])
+    offset = float(volts[own]) / opamp.offset_limit
+    net = design.circuit.state_nets[own]
     return [
         ConditionCheck("level", "signal_level_ratio", LEVEL_RATIO, ratio),
         ConditionCheck("level", "signal_share_ratio", SHARE, share),
-        ConditionCheck("level", "signal_offset_ratio", LEAST_SIGNAL, offset, "v1", least=True),
+        ConditionCheck("level", "signal_offset_ratio", LEAST_SIGNAL, offset, net, least=True),
     ]
 
 

@@ -36,7 +36,7 @@ def test_what_an_interval_leaves_has_no_gap_and_no_overlap() -> None:
     within = limits(RECTIFIER, RECTIFIER.kept, wanted.opamp, 13.0, PEAKS.fastest)
     block = linear_block(wanted, within)
     assert not isinstance(block, Shortfall)
-    (above, top), (bottom, below) = _beside(block, (1e3, 1e6))
+    (above, top), (bottom, below) = _beside(block, (1e3, 1e6), "R4")
     others = wanted.resistors[(wanted.resistors >= 1e3) & (wanted.resistors <= 1e6)]
     covered = [(above <= v <= top) + (bottom <= v <= below) for v in others]
     assert covered == [int(v != block.values["R4"]) for v in others]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from scipy.optimize import linprog
 
 from designer.base.arrays import Array
 from designer.base.eseries import series_values
@@ -15,6 +17,8 @@ from designer.circuit.scale_fit import minimax
 from designer.circuit.terms import terms
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis import linear_search
+from designer.synthesis.attempt import _in_ratio
+from designer.synthesis.dead_zone_target import slope_interval
 from designer.synthesis.linear_block import errors_of
 from designer.synthesis.linear_search import best
 from designer.synthesis.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
@@ -258,3 +262,64 @@ def test_three_masses_carry_a_bound_and_a_gap(monkeypatch: pytest.MonkeyPatch) -
     errors = errors_of(answer.values, Targets.from_state_matrix(A))
     fresh = errors.offsets + errors.columns @ minimax(errors.offsets, errors.columns)
     assert np.abs(fresh).max() == pytest.approx(answer.error, abs=CLOSE)
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 10**6), tied=st.booleans())
+def test_the_drive_of_three_masses_is_the_nearest_in_ratio(seed: int, tied: bool) -> None:
+    """Against every choice; two of the resistors are equal, or none."""
+    rng = np.random.default_rng(seed)
+    volts, values = rng.uniform(1e-4, 3e-4, 3), series_values(["E12"], 1e4, 1e5)
+    roots = ["R8", "R8", "R24"] if tied else ["R8", "R16", "R24"]
+    lists = dict.fromkeys(roots, values)
+    chosen = np.array(_in_ratio(volts, roots, lists, 8.0))
+    every = np.array(list(itertools.product(values, repeat=3)))
+    every = every[every[:, 0] == every[:, 1]] if tied else every
+    needed = np.log(volts * every)
+    spread = np.ptp(needed, axis=1)
+    amplitude = np.exp(needed.mean(axis=1))
+    spread = spread[(amplitude <= 8.0) & (amplitude >= 0.2 * 8.0)]
+    assert np.ptp(np.log(volts * chosen)) == pytest.approx(spread.min(), abs=1e-9)
+    assert np.exp(np.log(volts * chosen).mean()) <= 8.0 * (1.0 + 1e-9)
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 10**6), mass=st.integers(0, 2))
+def test_the_freedom_of_a_stop_on_any_mass(seed: int, mass: int) -> None:
+    """A gain at an end of the interval fits with no larger error; one beyond it does not."""
+    rng = np.random.default_rng(seed)
+    A = CHAIN * np.exp(rng.uniform(-0.5, 0.5, (6, 6)))
+    A[0::2] = CHAIN[0::2]
+    targets = Targets.from_state_matrix(A)
+    values = {name: float(np.exp(rng.normal(0.0, 0.05))) for name in targets.parts}
+    low, high = slope_interval(values, targets, 3.0, mass)
+    own = (2 * mass + 1, 2 * mass)
+
+    def least(gain: float) -> float:
+        """The least error with the stop's own: gain/C tau v_x/v_v over the wanted 3.0."""
+        rows = [*targets.entries, own]
+        h = [-np.log(values[r] * values[f"C{a + 1}"] * abs(A[a, b])) for r, (a, b) in
+             zip(targets.resistors, targets.entries, strict=True)]  # fmt: skip
+        h.append(np.log(gain / values[f"C{own[0] + 1}"] / 3.0))
+        D = np.zeros((len(rows), 7))
+        for row, (a, b) in zip(D, rows, strict=True):
+            row[0] = 1.0
+            row[1 + b] += 1.0
+            row[1 + a] -= 1.0
+        D = np.delete(D, 1, axis=1)
+        slack = np.r_[np.ones(len(rows) - 1), 0.0]  # the stop's error is none
+        found = linprog(
+            np.r_[np.zeros(6), 1.0],
+            A_ub=np.block([[D, -slack[:, None]], [-D, -slack[:, None]]]),
+            b_ub=np.concatenate([-np.array(h), h]),
+            bounds=[(None, None)] * 7,
+        )
+        assert found.fun is not None
+        return float(found.fun)
+
+    errors = errors_of(values, targets)
+    scales = minimax(errors.offsets, errors.columns)
+    best_error = np.abs(errors.offsets + errors.columns @ scales).max()
+    for end, beyond in ((low, 0.999), (high, 1.001)):
+        assert least(end) == pytest.approx(best_error, abs=1e-8)
+        assert least(end * beyond) > best_error + 1e-6
