@@ -6,7 +6,6 @@ import gc
 import os
 import signal
 from collections.abc import Generator, Iterator
-from typing import Any
 
 # Before anything imports matplotlib.pyplot: tests run without a display.
 os.environ["MPLBACKEND"] = "Agg"
@@ -14,6 +13,7 @@ os.environ["MPLBACKEND"] = "Agg"
 import pytest
 from hypothesis import settings
 
+from tests.shared.blank_figures import blank_figures
 from tests.shared.compile_kernels import compile_kernels
 
 # What a script starts in the background is deaf to Ctrl-C, and so is all that it starts: the tests
@@ -85,22 +85,9 @@ def pytest_make_collect_report(
     return report
 
 
-_SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="1pt" height="1pt" viewBox="0 0 1 1"></svg>'
-
-
 @pytest.fixture(scope="module")
 def figures_are_blank() -> Iterator[None]:
-    """Figures are composed but not rendered: half the time of a small study. For modules that ask
-    nothing of pictures; ``tests/report`` and ``tests/board`` look at them."""
-    from matplotlib.figure import Figure
-    from PIL import Image
-
-    def blank(_: Figure, target: Any, *, format: str = "png", **__: object) -> None:
-        if format == "svg":
-            target.write(_SVG)
-        else:
-            Image.new("RGB", (1, 1)).save(target, "png")
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Figure, "savefig", blank)
+    """For modules that ask nothing of pictures; ``tests/report`` and ``tests/board`` look at
+    them."""
+    with blank_figures():
         yield

@@ -124,6 +124,7 @@ from .natural_sort import (
     natural_key as natural_key,
 )
 from .netlist_guard import (
+    RefusedNetlist as RefusedNetlist,
     check_netlist as check_netlist,
 )
 from .page import (

@@ -32,6 +32,18 @@ _MODEL = re.compile(r"\.model\s+[^\s(]+\s+([A-Za-z_]\w*)\s*(?:[\s(]|$)", re.IGNO
 _HARMFUL = '\\`"$;'  # joins lines, runs commands, names files, expands variables, hides text
 
 
+class RefusedNetlist(ValueError):
+    """A deck that is not given to ngspice.
+
+    reason : why. line, text : number of the offending line from 1 and the line, if it is one.
+    """
+
+    def __init__(self, reason: str, line: int | None = None, text: str = "") -> None:
+        self.reason = reason
+        where = reason if line is None else f"line {line} is refused ({reason}): {text[:80]!r}"
+        super().__init__(f"netlist: {where}")
+
+
 def check_netlist(netlist: str) -> None:
     """Refuse a deck that holds anything but elements, comments and the harmless dot cards.
 
@@ -40,26 +52,26 @@ def check_netlist(netlist: str) -> None:
 
     Raises
     ------
-    ValueError : with the number of the first offending line.
+    RefusedNetlist : with the number of the first offending line.
     """
     statements: list[tuple[int, str]] = []
     ended = 0
     for number, raw in enumerate(netlist.split("\n"), start=1):
         line = raw.strip(" \t")
         if not line.replace("\t", " ").isprintable():
-            raise _refusal(number, line, "a control character")
+            raise RefusedNetlist("a control character", number, line)
         if number == 1:
             # The first line is the title, unless it makes ngspice take the deck for a script.
             if not line or line[0] in ".+" or _is_command(line):
-                raise _refusal(number, line, "not a title")
+                raise RefusedNetlist("not a title", number, line)
         elif ended and line:
-            raise _refusal(number, line, f"text after .end (line {ended})")
+            raise RefusedNetlist(f"text after .end (line {ended})", number, line)
         elif line.startswith("*"):
             if _is_command(line):
-                raise _refusal(number, line, "a comment that ngspice would execute")
+                raise RefusedNetlist("a comment that ngspice would execute", number, line)
         elif line.startswith("+"):
             if not statements:
-                raise _refusal(number, line, "a continuation of nothing")
+                raise RefusedNetlist("a continuation of nothing", number, line)
             first, text = statements[-1]
             _check_characters(number, line)
             statements[-1] = (first, f"{text} {line[1:]}")  # ngspice puts a blank there too
@@ -69,7 +81,7 @@ def check_netlist(netlist: str) -> None:
             if line.lower() == ".end":
                 ended = number
     if not ended:
-        raise ValueError("netlist: no .end line")
+        raise RefusedNetlist("no .end line")
     for number, text in statements:
         _check_statement(number, text)
 
@@ -80,25 +92,21 @@ def _is_command(comment: str) -> bool:
 
 def _check_characters(number: int, line: str) -> None:
     if not line.isascii():
-        raise _refusal(number, line, "a character outside ASCII")
+        raise RefusedNetlist("a character outside ASCII", number, line)
     for character in _HARMFUL:
         if character in line:
-            raise _refusal(number, line, f"the character {character}")
+            raise RefusedNetlist(f"the character {character}", number, line)
 
 
 def _check_statement(number: int, text: str) -> None:
     if not text.startswith("."):
         if not _ELEMENT.match(text):
-            raise _refusal(number, text, "not an element line")
+            raise RefusedNetlist("not an element line", number, text)
         return
     card = text.split(maxsplit=1)[0].lower()
     if card not in CARDS:
-        raise _refusal(number, text, f"the card {card}")
+        raise RefusedNetlist(f"the card {card}", number, text)
     if card == ".model":
         kind = _MODEL.match(text)
         if kind is None or kind[1].lower() not in MODEL_TYPES:
-            raise _refusal(number, text, "a model of a type that is not allowed")
-
-
-def _refusal(number: int, line: str, what: str) -> ValueError:
-    return ValueError(f"netlist: line {number} is refused ({what}): {line[:80]!r}")
+            raise RefusedNetlist("a model of a type that is not allowed", number, text)

@@ -5,7 +5,7 @@ A catalogue entry names a file beside it, the subcircuit in it and the order of 
     spice = { file = "part.lib", subckt = "PART", pins = ["inp", "inn", "vcc", "vee", "out"] }
 
 The file may hold ``.subckt .ends .model .param .func`` and element lines of the letters in
-``ELEMENTS``, and what `spice.simulator.check_netlist` allows of those; anything else is refused
+``ELEMENTS``, and what `base.netlist_guard.check_netlist` allows of those; anything else is refused
 with the number of its line. Comments are dropped. What stands outside a subcircuit is copied into
 each, and every subcircuit gets a prefix, so that nothing in the file can change or replace what
 else is in a deck.
@@ -22,7 +22,7 @@ from typing import Annotated
 
 from designer.base.errors import InputError, problems_in
 from designer.base.guarded_reading import inside, read_bytes
-from designer.base.netlist_guard import check_netlist
+from designer.base.netlist_guard import RefusedNetlist, check_netlist
 from designer.base.schema import Accepts, FieldProblems, FileTable, line, lines, validated
 
 PINS = ("inp", "inn", "out", "vcc", "vee")
@@ -196,9 +196,8 @@ def _check(s: _Statement, path: Path) -> None:
         raise _refused(path, s.line, s.text, "a file")
     try:
         check_netlist(f"* one statement of a model\n{s.text}\n.end\n")
-    except ValueError as error:
-        why = re.search(r"is refused \((.*?)\): ", str(error))
-        raise _refused(path, s.line, s.text, why[1] if why else str(error)) from None
+    except RefusedNetlist as error:
+        raise _refused(path, s.line, s.text, error.reason) from None
 
 
 def _blocks(statements: Sequence[_Statement], path: Path) -> dict[str, _Block]:

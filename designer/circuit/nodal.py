@@ -114,7 +114,7 @@ class NodalEquations:
         """Every way out of a mode, those of contacts scaled to displacement."""
         n = len(self.circuit.states)
         sides = self.sides(key)
-        found: list[Exit] = []
+        ways: list[Exit] = []
         switches: tuple[Section | Diode, ...] = (*self._sections, *self._diodes)
         for i, (switch, position) in enumerate(zip(switches, key, strict=True)):
             for row, to in self._leaving(switch, position, solved):
@@ -129,8 +129,8 @@ class NodalEquations:
                     else:  # amperes beside volts: bring both to states
                         scale = np.where(largest > 0.0, largest, 1.0)
                     row = row / scale[..., None]
-                found.append(Exit(row, target, j))
-        return found
+                ways.append(Exit(row, target, j))
+        return ways
 
     def sides(self, key: ModeKey) -> tuple[int, ...]:
         """For each stop 1, 0 or -1: in contact with its upper side, open, with its lower."""

@@ -64,7 +64,7 @@ class BatchNgspice:
 
         Raises
         ------
-        ValueError : `check_netlist` refuses the deck.
+        RefusedNetlist : `check_netlist` refuses the deck.
         SimulationFailed : the log holds an `offending_line`, or there is no plot.
         """
         plots, log, status = self._plots(netlist)

@@ -260,10 +260,3 @@ class RunResult:
 
     def _repr_html_(self) -> str:
         return table_html(self.modelfile.title, self.study.yield_rows())
-
-    @property
-    def satisfied(self) -> bool:
-        """Whether every wanted response was found, every engine shows it and can be trusted there,
-        and the netlist computes the model's equation."""
-        right = self.equations is None or self.equations.passed
-        return right and all(c.model.found and c.agrees and c.trusted for c in self.checked)

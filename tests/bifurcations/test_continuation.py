@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,14 +48,19 @@ def monodromy(p: Plain, omega: float, x: Array, n: int) -> Array:
     return np.array(columns).T
 
 
+@cache
+def linear_branch() -> Branch:
+    """Over ω, of the paper's model with a clearance that is never reached."""
+    return branch_of(replace(PAPER, b=50.0), 1.0, "omega", 0.5, 2.0)
+
+
 def test_linear_branch_has_the_linear_amplitude_and_multipliers() -> None:
-    model = replace(PAPER, b=50.0)
-    branch = branch_of(model, 1.0, "omega", 0.5, 2.0)
+    model, branch = replace(PAPER, b=50.0), linear_branch()
     assert branch.ends == (End.LIMIT, End.LIMIT)
     assert branch.values.min() == 0.5
     assert branch.values.max() == 2.0
     A = model.second_order().state_matrix()
-    for point in branch.points:
+    for point in branch.points[::5]:
         wanted = np.abs(response_amplitude(replace(PLAIN, b=50.0), point.value))
         assert point.orbit.extremes[[0, 2], 1] == pytest.approx(wanted, rel=1e-9)
         exact = np.linalg.eigvals(expm(A * 2.0 * np.pi / point.value))

@@ -26,7 +26,7 @@ from designer.dynamics.piecewise_linear import Drive
 from designer.dynamics.turning_points import heights
 from designer.model import swept_model
 from designer.model.mechanics import SecondOrderSystem
-from tests.bifurcations.test_continuation import PAPER, PLAIN, branch_of, monodromy
+from tests.bifurcations.test_continuation import PAPER, PLAIN, branch_of, linear_branch, monodromy
 from tests.shared.oracles import Plain, integrate, response_amplitude
 from tests.shared.paper_cases import subject
 
@@ -79,8 +79,7 @@ def test_grazing_over_the_clearance(omega: float) -> None:
 
 
 def test_a_linear_oscillator_has_no_bifurcations() -> None:
-    branch = branch_of(replace(PAPER, b=50.0), 1.0, "omega", 0.3, 3.0)
-    assert locate(branch) == []
+    assert locate(linear_branch()) == []
 
 
 class Stalling(Curve):

@@ -32,6 +32,7 @@ from designer.verdicts.ngspice_runs import cross_checks
 from designer.verdicts.verdict import Verdict
 from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study, plan_study
+from tests.shared.blank_figures import blank_figures
 from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed
@@ -65,6 +66,12 @@ def whole(catalog: Catalog) -> ReportData:
 @pytest.fixture(scope="session")
 def html(whole: ReportData) -> str:
     return render_html(whole)
+
+
+def words_of(data: ReportData) -> Page:
+    """The page of these data for who asks nothing of its pictures."""
+    with blank_figures():
+        return Page(render_html(data))
 
 
 class Page(HTMLParser):
@@ -219,7 +226,7 @@ def test_what_is_wide_scrolls_in_a_box_of_its_own(html: str) -> None:
 def test_the_model_is_drawn_with_its_equations(whole: ReportData, sides: Sides) -> None:
     model = replace(dimensionless(whole.design.model), sides=sides)
     data = changed(whole, design=replace(whole.design, model=model))
-    page, markdown = Page(render_html(data)), render_markdown(data)
+    page, markdown = words_of(data), render_markdown(data)
     (label,) = [text for text in page.pictures() if text.startswith("The model: ground")]
     assert ("both sides" in label) == (sides == "both")
     law = {"both": "19 (x − clip(x, −0.25, 0.25))", "upper": "19 max(x − 0.25, 0)"}[sides]
@@ -315,7 +322,7 @@ def test_a_response_that_is_left_out_of_the_study(whole: ReportData) -> None:
 
 def test_what_went_wrong_is_said_with_its_reason(whole: ReportData) -> None:
     data = _broken(whole)
-    page = Page(render_html(data))
+    page = words_of(data)
     for wanted in (
         "0 of 3 responses were found",
         "ngspice gave no answer: timestep too small <at> 1 ms",
@@ -356,7 +363,7 @@ def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
         replace(a, verdict=Verdict.FAILED, reason="no mode holds") for a in whole.study.answers
     ]
     data = changed(whole, answers=tuple(answers))
-    text = Page(render_html(data)).text
+    text = words_of(data).text
     assert "failed: no mode holds (4)" in text
     assert "4 simulated boards: not one gave an answer" in text
     assert not re.search(r"\b(nan|inf)\b", text)
@@ -369,7 +376,7 @@ def test_boards_that_failed_do_not_count(whole: ReportData) -> None:
 
 def test_results_of_a_script_have_no_command(whole: ReportData) -> None:
     nameless = replace(whole, command="")
-    for text in (Page(render_html(nameless)).text, render_markdown(nameless)):
+    for text in (words_of(nameless).text, render_markdown(nameless)):
         assert "To make these results again" not in text
 
 
@@ -389,15 +396,15 @@ def test_where_no_board_was_lost_nothing_is_told_of_losses(whole: ReportData) ->
     assert "why without answer" not in text
 
 
-def test_an_exact_match_does_not_read_as_an_error(whole: ReportData) -> None:
-    page = Page(render_html(whole))
+def test_an_exact_match_does_not_read_as_an_error(html: str) -> None:
+    page = Page(html)
     assert "exactevery coefficient of the equations" in page.text
     assert "largest coefficient error" not in page.text
 
 
 def test_without_ngspice(whole: ReportData) -> None:
     checked = tuple(replace(c, gate=None) for c in whole.checked)
-    text = Page(render_html(changed(whole, checked=checked, cross_checks=()))).text
+    text = words_of(changed(whole, checked=checked, cross_checks=())).text
     assert "the model and the exact circuit (ngspice was not asked) agree on each" in text
     assert "ngspice was not asked about any board." in text
     assert "steps per period" not in text
@@ -426,7 +433,7 @@ def test_boards_without_a_decision_are_not_counted_as_different(whole: ReportDat
 def test_without_responses(whole: ReportData) -> None:
     plan = replace(whole.plan, questions=())
     data = changed(whole, checked=(), answers=(), cross_checks=(), asked=(), plan=plan)
-    for text in (Page(render_html(data)).text, render_markdown(data)):
+    for text in (words_of(data).text, render_markdown(data)):
         assert "no response is named" in text
         assert "None was asked for." in text
 
@@ -434,7 +441,7 @@ def test_without_responses(whole: ReportData) -> None:
 def test_engine_that_has_no_orbit_at_all(whole: ReportData) -> None:
     first = whole.checked[0]
     broken = replace(first, model=replace(first.model, orbit=failed("diverged"), found=False))
-    text = Page(render_html(changed(whole, checked=(broken, *whole.checked[1:])))).text
+    text = words_of(changed(whole, checked=(broken, *whole.checked[1:]))).text
     assert "the model shows failed (diverged) instead" in text
 
 
@@ -443,7 +450,7 @@ def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) 
     larger = replace(whole.design.errors, errors=errors, max_error=0.0123)
     certificate = replace(whole.design.certificate, status="bound", lower_bound=0.004)
     design = replace(whole.design, errors=larger, certificate=certificate)
-    page = Page(render_html(changed(whole, design=design)))
+    page = words_of(changed(whole, design=design))
     assert len(page.pictures()) == 2 * len(whole.checked) + 6
     assert "this design reaches 1.23 %" in page.text
     assert "stays below 0.4 %" in page.text
@@ -477,7 +484,7 @@ def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
     data = ReportData(
         RunResult(modelfile, catalog, found, design, checked, study), "designer run x"
     )
-    page = Page(render_html(data))
+    page = words_of(data)
     assert "The response was found" in page.text
     assert "1 of 1response found, ngspice was not asked" in page.text
     assert "contact begins" not in page.text
