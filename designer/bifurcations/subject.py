@@ -43,6 +43,12 @@ class Subject(Protocol):
         ...
 
     @property
+    def labels(self) -> Mapping[str, str]:
+        """What axes call a state, "displacement" and "velocity" in the first clearance, and the
+        "stop" whose impacts a diagram shows, where they have names of their own."""
+        ...
+
+    @property
     def si(self) -> Mapping[str, Unit]:
         """SI units of the dimensionless quantities that have one, by name."""
         ...

@@ -47,7 +47,9 @@ def title(name: str, plan: SweepPlan | MapPlan | BasinPlan, width: int = 100) ->
         what += f"{_name(plan.y)}, other states 0"
         changed = plan.changes
     lines = [name, what, "held: " + ", ".join(_held(plan.subject, changed))]
-    return "\n".join(part for line in lines for part in textwrap.wrap(line, width))
+    return "\n".join(
+        part for line in lines for part in textwrap.wrap(line, width, break_on_hyphens=False)
+    )
 
 
 def _way(plan: SweepPlan) -> str:

@@ -45,6 +45,7 @@ class BoardSubject:
     parameters = ("frequency", "omega", "amplitude", "offset")
     """ω is the frequency by the design's time scale."""
     si: Mapping[str, Unit] = NO_UNITS
+    labels: Mapping[str, str] = {}
 
     def __init__(
         self,

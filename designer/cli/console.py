@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 
@@ -26,7 +26,8 @@ def grid(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], gap: i
     if not heads:
         say(f"\n{title}: none")
         return
-    shown = Table(*heads, title=f"\n{title}", title_justify="left", box=None)
+    say(f"\n{title}")
+    shown = Table(*(Column(Text(head)) for head in heads), box=None)
     shown.padding = (0, gap, 0, 0)
     for row in rows:
         shown.add_row(*(Text(cell) for cell in row))

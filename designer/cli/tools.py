@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import typer
 
+from designer.base.errors import InputError
 from designer.cli.app import Output, Session, option, verb
 
 
@@ -48,12 +49,21 @@ def new(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The file to write.")] = Path(
         "model.toml"
     ),
+    from_: Annotated[
+        Path | None,
+        option("--from", "OLD", "Rewrite this model file in format 2, its other tables as it is."),
+    ] = None,
+    format_: Annotated[
+        int | None, option("--format", "1|2", "Of the commented file: 2 for any system [1].")
+    ] = None,
     **_: Any,
 ) -> Output:
     """Write a commented model file to start from; an existing file is left alone."""
     from designer.model.template import new as write_model_file
 
-    write_model_file(path)
+    if format_ not in (None, 1, 2):
+        raise InputError(None, "--format", format_, "1 or 2")
+    write_model_file(path, from_, format=cast("Literal[1, 2] | None", format_))
     answer = {"format": 1, "files": [str(path)]}
     return Output(answer, lambda: print(f"written: {path}", file=sys.stderr))
 

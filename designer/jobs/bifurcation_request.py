@@ -106,8 +106,7 @@ def plan_of(request: Request, subject: Swept, modelfile: ModelFile) -> Plan:
     values = np.linspace(low, high, steps)
     if request.second is not None:
         course = _course(request, parameter_map.COURSE)
-        rest = np.zeros(len(subject.states))
-        return MapPlan(subject, over, values, name, ys, rest, course)
+        return MapPlan(subject, over, values, name, ys, course=course)
     if request.starts is not None:
         both_ends = [{over: low}, {over: high}]
         tracks = sweep.from_starts(subject, both_ends, request.starts)

@@ -75,8 +75,8 @@ from .model_file import (
 from .relative_motion import (
     RelativeMotion as RelativeMotion,
     ground_of as ground_of,
-    mass_label as mass_label,
     relative_motions as relative_motions,
+    state_labels as state_labels,
     subscripted as subscripted,
 )
 from .response_table import (
@@ -86,6 +86,7 @@ from .search_table import (
     SearchSpec as SearchSpec,
 )
 from .si_units import (
+    MECHANICAL_UNITS as MECHANICAL_UNITS,
     NO_UNITS as NO_UNITS,
     Reader as Reader,
     units_of as units_of,

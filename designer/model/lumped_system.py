@@ -48,6 +48,8 @@ UNITS = {
 }
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
 
+_MAY_BE_ZERO = ("damping", "amplitude", "constant")
+
 
 @dataclass(frozen=True)
 class LumpedSystem(Elements):
@@ -112,6 +114,13 @@ class LumpedSystem(Elements):
             name: amplitudes[group] if key == "amplitude" else UNITS[key]
             for name, (group, _, key) in self._places.items()
         }
+
+    @property
+    def idle(self) -> frozenset[str]:
+        """A factor of 1; dampers and forces of 0."""
+        names = {name for name in self._places if name.rpartition(".")[2] in _MAY_BE_ZERO}
+        idle = {name for name in names if self.parameter(name) == 0.0}
+        return frozenset(idle | ({"b"} if self.b == 1.0 else set()))
 
     @cached_property
     def _places(self) -> dict[str, tuple[str, int, str]]:

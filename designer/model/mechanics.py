@@ -302,6 +302,12 @@ class MechanicalModel(Hashable, Protocol):
         """SI unit of each of ``parameters`` that has one."""
         ...
 
+    @property
+    def idle(self) -> frozenset[str]:
+        """Those of ``parameters`` whose value is that of an element that is not there; a title
+        leaves them out."""
+        ...
+
     def parameter(self, name: str) -> float:
         """The value of one of ``parameters``."""
         ...

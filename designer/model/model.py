@@ -109,6 +109,11 @@ class Dimensionless(FileTable):
         """A length; the others are ratios."""
         return {"b": "m"}
 
+    @property
+    def idle(self) -> frozenset[str]:
+        """None: a title has every parameter of the paper."""
+        return frozenset()
+
     def parameter(self, name: str) -> float:
         """The value of one of ``parameters``."""
         return float(getattr(self, name))

@@ -90,9 +90,15 @@ def _names(system: SecondOrderSystem, masses: Sequence[int]) -> str:
     return " − ".join(system.names[mass] for mass in masses) if system.names else ""
 
 
-def mass_label(system: SecondOrderSystem, mass: int) -> str:
-    """What the displacement of a mass is called: "x1", with its name where it has one."""
-    return f"x{mass + 1} ({system.names[mass]})" if system.names else f"x{mass + 1}"
+def state_labels(system: SecondOrderSystem) -> list[str]:
+    """What the states are called, displacement and velocity of each mass from the base: "x₁ − y
+    (hammer)", "x₁′ − y′ (hammer)", …"""
+    labels = []
+    for mass, name in enumerate(system.names or [""] * system.size):
+        for prime in ("", "′"):
+            symbol = subscripted(f"x{mass + 1}") + prime + (f" − y{prime}" if system.base else "")
+            labels.append(f"{symbol} ({name})" if name else symbol)
+    return labels
 
 
 def subscripted(text: str) -> str:

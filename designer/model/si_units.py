@@ -16,6 +16,11 @@ from designer.base.units import parse_quantity
 from designer.model.mechanics import MechanicalModel, state_names
 from designer.model.model import SiScales
 
+MECHANICAL_UNITS = {
+    "M1": "kg", "M2": "kg", "C1": "N s/m", "C2": "N s/m", "K0": "N/m", "K1": "N/m", "K2": "N/m",
+    "B": "m", "P1": "N", "P2": "N",
+}  # fmt: skip
+"""Of the table ``[mechanical]``."""
 ANGULAR = "rad/s"
 FREQUENCIES = '"10 Hz" or "62.8 rad/s"'
 """How a frequency may be written."""

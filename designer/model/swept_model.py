@@ -20,6 +20,7 @@ from designer.model.driven import model_flow
 from designer.model.find_responses import scale_of
 from designer.model.mechanics import MechanicalModel, check_omega, frequency_range, state_names
 from designer.model.model import SiScales
+from designer.model.relative_motion import relative_motions, state_labels
 from designer.model.si_units import in_si, units_of
 from designer.model.swept_tables import ModalBatch
 
@@ -55,11 +56,25 @@ class ModelSubject:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Unit of plain numbers by parameter, and by "x", "v" and "λ" for the axes of a diagram;
-        none where they are no SI values."""
+        """Unit of plain numbers by parameter, and by "λ" for the axis of a diagram, whose lengths
+        and speeds are shown as ``si`` says; none where they are no SI values."""
         if not in_si(self.scales, self.model):
             return {}
-        return {"omega": "rad/s", **self.model.units, "x": "m", "v": "m/s", "λ": "1/s"}
+        return {"omega": "rad/s", **self.model.units, "λ": "1/s"}
+
+    @property
+    def labels(self) -> Mapping[str, str]:
+        """Those of a model whose masses have names."""
+        system = self.model.second_order()
+        if not system.names:
+            return {}
+        first, stops = relative_motions(system)[0], system.clearances
+        return {
+            **dict(zip(self.states, state_labels(system), strict=True)),
+            "displacement": first.label,
+            "velocity": first.rate,
+            "stop": f"the upper stop of {stops[0].name}" if stops else "a stop",
+        }
 
     @property
     def si(self) -> dict[str, Unit]:
@@ -107,10 +122,12 @@ class ModelSubject:
         return of_model(self.model, 1.0 if self.omega is None else self.omega, parameter)
 
     def held(self, swept: Mapping[str, float | None]) -> dict[str, float | None]:
-        """ω and the model's parameters, in the order in which a model file has them."""
+        """ω and the model's parameters, in the order in which a model file has them; those
+        that stand for nothing left out."""
         known = dict.fromkeys([*self.model.as_dict(), *self.model.parameters])
         names = [name for name in known if name in self.model.parameters]
-        return {"omega": self.omega, **{name: self.model.parameter(name) for name in names}}
+        values = {name: self.model.parameter(name) for name in names if name not in self.model.idle}
+        return {"omega": self.omega, **values}
 
     def remarks(self) -> tuple[str, ...]:
         """Which stop there is, where there is one only."""

@@ -1,15 +1,54 @@
-"""The model file that ``designer new`` writes."""
+"""The model files that ``designer new`` writes."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from designer.base.errors import InputError
 from designer.model.ascii_sketch import sketch
+from designer.model.model_file import read_model_file
+from designer.model.second_format import second_format
 
 _SKETCH = "\n".join(f"# {line}" for line in sketch().splitlines())
 
-TEXT = f"""\
+_CIRCUIT = """\
+[circuit]
+opamp = "TL074C"                # `designer catalog` lists what there is
+supply = 15.0                   # V, both rails
+saturation = 13.0               # V; without it the catalogue's figure for the op-amp
+resistors = "E96"               # a series, or several: ["E24", "E96"]
+capacitors = "E12"
+resistor_grade = 0.01           # 1 %
+capacitor_grade = 0.01
+# resistor_family = "Yageo RC0603FR-07" # bought from this family alone; or from a list of them
+# capacitor_family = ["!KEMET C0603 F 50 V"] # with "!" in front of each: from every other one
+resistor_range = ["1k", "1M"]
+capacitor_range = ["1nF", "1µF"]
+frequency = [50, 1000]          # Hz, where omega = 1 may lie
+dead_zone = "saturation"        # the stage that makes the clearance; or "rectifier"
+# diode = "1N4148"              # of the rectifier
+# reference = "LM4040C50"       # of the rectifier
+objective = "match"
+composites = false              # true or ["R50", …]: resistors of two parts, where that helps
+side_conditions = true          # false: the match alone; or a list of those to keep:
+# side_conditions = ["swing", "level", "load", "noise_gain", "bandwidth", "resistors", "generator"]
+# matched = [["R1", "R7"]]      # groups of parts with equal values
+# preferred = ["10k", "10n"]    # values that do not count among the distinct ones
+# most_values = 12              # at most so many distinct values
+# slack = 1e-4                  # how much the error may exceed its least for fewer distinct values
+
+# How the boards of a tolerance study differ; without it as the reference spread says. More keys:
+# docs/spread.md
+# [spread]
+# resistors = "normal"          # within their grade; or "uniform"
+# temperature = [10, 40]        # °C
+# supply = 0.02                 # each rail within ± 2 %
+# measured = "measured.csv"     # part,value[,tolerance][,board]
+"""
+
+TEXT = (
+    f"""\
 # A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
 # Numbers may carry units as text: "22.1k", "100nF", "1 kHz".
 
@@ -57,55 +96,125 @@ expect = "1-2-2"
 # twin = "exact"                # 1-1-2 only, not its mirror twin 1-2-1
 # b = 0.3                       # at a clearance of its own
 
-[circuit]
-opamp = "TL074C"                # `designer catalog` lists what there is
-supply = 15.0                   # V, both rails
-saturation = 13.0               # V; without it the catalogue's figure for the op-amp
-resistors = "E96"               # a series, or several: ["E24", "E96"]
-capacitors = "E12"
-resistor_grade = 0.01           # 1 %
-capacitor_grade = 0.01
-# resistor_family = "Yageo RC0603FR-07" # bought from this family alone; or from a list of them
-# capacitor_family = ["!KEMET C0603 F 50 V"] # with "!" in front of each: from every other one
-resistor_range = ["1k", "1M"]
-capacitor_range = ["1nF", "1µF"]
-frequency = [50, 1000]          # Hz, where omega = 1 may lie
-dead_zone = "saturation"        # the stage that makes the clearance; or "rectifier"
-# diode = "1N4148"              # of the rectifier
-# reference = "LM4040C50"       # of the rectifier
-objective = "match"
-composites = false              # true or ["R50", …]: resistors of two parts, where that helps
-side_conditions = true          # false: the match alone; or a list of those to keep:
-# side_conditions = ["swing", "level", "load", "noise_gain", "bandwidth", "resistors", "generator"]
-# matched = [["R1", "R7"]]      # groups of parts with equal values
-# preferred = ["10k", "10n"]    # values that do not count among the distinct ones
-# most_values = 12              # at most so many distinct values
-# slack = 1e-4                  # how much the error may exceed its least for fewer distinct values
-
-# How the boards of a tolerance study differ; without it as the reference spread says. More keys:
-# docs/spread.md
-# [spread]
-# resistors = "normal"          # within their grade; or "uniform"
-# temperature = [10, 40]        # °C
-# supply = 0.02                 # each rail within ± 2 %
-# measured = "measured.csv"     # part,value[,tolerance][,board]
 """
+    + _CIRCUIT
+)
+"""A file of format 1."""
+
+SECOND = (
+    """\
+# A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
+# Numbers may carry units as text: "22.1k", "100nF", "1 kHz". Texts with units become SI; plain
+# numbers are any consistent units, and omega is in them. docs/model-file.md has every key.
+
+format = 2
+title = "My model"
+
+# Any masses in a line; each moves along it.
+#
+# ground ---/\\/\\/\\--- casing ---/\\/\\/\\--- hammer --> force
+#        ----[=-----        ----[=-----    | lower stop | hammer | upper stop |
+[[mass]]
+name = "hammer"
+mass = "2 kg"
+
+[[mass]]
+name = "casing"
+mass = "3 kg"
+
+# Springs and dampers join two masses, or a mass and "ground". Springs hold every mass to ground.
+[[spring]]
+between = ["hammer", "casing"]
+stiffness = "60 kN/m"
+
+[[spring]]
+between = ["casing", "ground"]
+stiffness = "40 kN/m"
+
+[[damper]]
+between = ["hammer", "casing"]
+damping = "56 N s/m"
+
+[[damper]]
+between = ["casing", "ground"]
+damping = "24 N s/m"
+
+# Gaps to the stops of a mass, or between two masses. Leave upper or lower out where there is no
+# stop; a negative gap is a preloaded stop, in contact at rest.
+[[clearance]]
+name = "A"
+between = ["hammer", "ground"]
+upper = "0.5 mm"
+lower = "0.5 mm"
+stiffness = "540 kN/m"          # or upper_stiffness and lower_stiffness
+# damping = "10 N s/m"          # in contact only; simulated, no circuit of ours has it
+# law = "hertz"                 # constant * depth^1.5, in straight pieces, instead of a stiffness
+# constant = 3e10               # N/m^1.5
+# depth = "0.3 mm"              # down to which it holds
+# pieces = 4
+
+# amplitude * sin(omega t) + constant
+[[force]]
+on = "hammer"
+amplitude = "80 N"              # negative: in antiphase
+# constant = "-19.6 N"          # a weight or a preload
+
+# The ground moves by amplitude * sin(omega t).
+# [base]
+# amplitude = "0.1 mm"
+# stops = "base"                # stops to ground move with it; "fixed": they stay
+
+# The responses that the board shall show: n-p-q, with n periods of the force, p impacts on the
+# upper stop and q on the lower one in that time; of two clearances "1-2-2;0-1". Leave `expect` out
+# to take what comes. The frequency: frequency = "54 Hz", Omega = 340 (rad/s), or omega in the
+# file's own units.
+[[response]]
+frequency = "54 Hz"
+expect = "1-1-1"
+# symmetric = true              # only a symmetric orbit (false: only an asymmetric one) will do
+# twin = "exact"                # of 1-2-1 its mirror twin 1-1-2 will not do
+# b = 1.2                       # with every gap and constant force 1.2 times as large
+
+"""
+    + _CIRCUIT
+)
+"""A file of format 2."""
 
 
-def new(path: Path | str = "model.toml") -> Path:
+def new(
+    path: Path | str = "model.toml",
+    from_: Path | str | None = None,
+    *,
+    format: Literal[1, 2] | None = None,
+) -> Path:
     """The verb ``new``: write a commented model file to start from; its path.
+
+    from_ : a model file to begin with: one of format 1 is rewritten in format 2
+    (``second_format``), one of format 2 copied. format : of the commented file, 1 unless given.
 
     Raises
     ------
-    InputError : there is a file of this name, which is left alone, or none can be written there.
+    InputError : there is a file of this name, which is left alone, or none can be written there;
+        both ``from_`` and ``format``; a file that cannot be read or rewritten.
     """
+    text = _text(from_, format)
     place = Path(path)
     try:
         with place.open("x", encoding="utf-8") as stream:
-            stream.write(TEXT)
+            stream.write(text)
     except FileExistsError:
         raise InputError(place, "PATH", "a file", "a name that is free") from None
     except OSError as error:
         expected = "a file that can be written"
         raise InputError(place, "PATH", error.strerror or str(error), expected) from None
     return place
+
+
+def _text(from_: Path | str | None, format: Literal[1, 2] | None) -> str:
+    if from_ is None:
+        return SECOND if format == 2 else TEXT
+    if format is not None:
+        raise InputError(
+            None, "--format", format, "none beside --from, whose file becomes format 2"
+        )
+    return second_format(read_model_file(Path(from_)))

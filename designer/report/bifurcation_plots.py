@@ -107,8 +107,16 @@ def _diagram_axes(panels: Sequence[Axes], plan: SweepPlan) -> None:
     units, si = plan.subject.units, plan.subject.si
     symbol = plan.subject.states[0][0]
     rate = f"{symbol}₁′" if symbol == "x" else f"{symbol}₂"
-    least.set_ylabel(_label(f"least {symbol}₁ in each period", units.get("x", "")))
-    text = f"impact velocity {rate}\non the upper stop (A1)"
+    labels = plan.subject.labels
+    name = labels.get("displacement", f"{symbol}₁")
+    least.set_ylabel(
+        _label(
+            f"least {name}\nin each period" if labels else f"least {name} in each period",
+            units.get("x", ""),
+        )
+    )
+    where = labels.get("stop", "the upper stop (A1)")
+    text = f"impact velocity {labels.get('velocity', rate)}\non {where}"
     speed.set_ylabel(_label(text, units.get("v", "")))
     growth.set_ylabel(_label("largest Lyapunov\nexponent λ", units.get("λ", "")))
     for axes in panels:
@@ -385,7 +393,8 @@ def _attractor_colours(result: Basins) -> list[str]:
 
 
 def _axis(subject: Subject, name: str) -> str:
-    return _label(NAMES.get(name, name), subject.units.get(name, ""))
+    text = subject.labels.get(name) or NAMES.get(name, name)
+    return _label(text, subject.units.get(name, ""))
 
 
 def _label(text: str, unit: str) -> str:

@@ -14,6 +14,7 @@ from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
 from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless, Mechanical, SiScales
+from designer.model.si_units import MECHANICAL_UNITS
 from designer.report import words
 
 _PARAMETERS = {
@@ -26,11 +27,6 @@ _PARAMETERS = {
     "b": "clearance B K1/(P1 + P2)",
     "sides": "sides of M1 with a stop",
 }
-
-MECHANICAL_UNITS = {
-    "M1": "kg", "M2": "kg", "C1": "N s/m", "C2": "N s/m", "K0": "N/m", "K1": "N/m", "K2": "N/m",
-    "B": "m", "P1": "N", "P2": "N",
-}  # fmt: skip
 
 _MEANINGS = {
     "M": "mass", "C": "damper", "K": "spring", "K0": "stop's spring", "B": "clearance",

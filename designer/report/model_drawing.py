@@ -8,8 +8,8 @@ from matplotlib.patches import Rectangle
 
 from designer.base.figure_style import CONTACT, INK, MUTED, new_figure, styled
 from designer.model.model import Dimensionless, Mechanical
+from designer.model.si_units import MECHANICAL_UNITS
 from designer.report import words
-from designer.report.design_tables import MECHANICAL_UNITS
 
 _SUBSCRIPTS = str.maketrans("012", "₀₁₂")
 

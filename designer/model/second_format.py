@@ -1,0 +1,169 @@
+"""A model file of format 1 rewritten in format 2: the same equations, circuit and responses.
+
+The table ``[model]`` or ``[mechanical]`` becomes elements; frequencies and clearances of the
+responses become those of the new file. Every other table keeps its text, with its comments. The
+result is read again and compared, so a file that is written in another way than a table with a
+header and a key a line is refused, never changed by half.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any, NoReturn
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.base.errors import InputError
+from designer.base.schema import parse_toml
+from designer.model.model import Dimensionless, Mechanical, SiScales
+from designer.model.model_file import ModelFile, parse_model_file
+from designer.model.si_units import MECHANICAL_UNITS
+
+NEAR = 1e-12
+"""Of the largest entry: coefficients of both files that differ by rounding alone."""
+_HEADER = re.compile(r"\s*\[\[?\s*([A-Za-z_.]+)\s*\]\]?\s*(#.*)?")
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A table's lines in a file, from its header on."""
+
+    table: str
+    lines: tuple[str, ...]
+
+
+def second_format(modelfile: ModelFile) -> str:
+    """The text of a file of format 2 that says the same; that of such a file as it is.
+
+    Raises
+    ------
+    InputError : the file is not written with a header for each table and a line for each key.
+    """
+    model = modelfile.model
+    if not isinstance(model, Dimensionless):
+        return modelfile.text
+    scales = modelfile.si or SiScales()
+    blocks = [_rewritten(block, modelfile, scales) for block in _blocks(modelfile.text)]
+    if any(r.omega is None for r in modelfile.responses) and not _has_search(blocks):
+        low, high = (w / scales.time_scale for w in modelfile.search.omega)
+        blocks.append(_Block("search", ("", "[search]", f"omega = [{low!r}, {high!r}]")))
+    text = "\n".join(chain.from_iterable(block.lines for block in blocks)) + "\n"
+    _check(modelfile, text, scales)
+    return text
+
+
+def _blocks(text: str) -> Iterator[_Block]:
+    """The file by tables; blank lines and comments above a header go with it."""
+    table, lines = "", list[str]()
+    for line in text.splitlines():
+        header = _HEADER.fullmatch(line)
+        if header is None:
+            lines.append(line)
+            continue
+        own = len(lines)
+        while own and (not lines[own - 1].strip() or lines[own - 1].lstrip().startswith("#")):
+            own -= 1
+        yield _Block(table, tuple(lines[:own]))
+        table, lines = header[1], [*lines[own:], line]
+    yield _Block(table, tuple(lines))
+
+
+def _has_search(blocks: list[_Block]) -> bool:
+    return any(
+        block.table == "search" and any(re.match(r"\s*omega\s*=", line) for line in block.lines)
+        for block in blocks
+    )
+
+
+def _rewritten(block: _Block, modelfile: ModelFile, scales: SiScales) -> _Block:
+    """A block in the new format."""
+    model = modelfile.model
+    if block.table in ("model", "mechanical"):
+        return _Block(block.table, tuple(_elements(modelfile)))
+    changes: dict[str, Callable[[Any], Any]] = {}
+    if block.table == "":
+        changes["format"] = lambda _: 2
+    if block.table == "response":
+        changes["b"] = lambda b: _each(b, lambda value: value / model.b)
+    if block.table in ("response", "search"):
+        changes["omega"] = lambda omega: _each(omega, lambda value: value / scales.time_scale)
+    return _Block(block.table, tuple(_changed(line, changes) for line in block.lines))
+
+
+def _each(value: Any, change: Callable[[float], float]) -> Any:
+    if isinstance(value, list):
+        return [change(float(each)) for each in value]
+    return value if isinstance(value, str) else change(float(value))
+
+
+def _changed(line: str, changes: Mapping[str, Callable[[Any], Any]]) -> str:
+    """A line ``key = value`` with another value; its comment stays."""
+    match = re.fullmatch(r"(\s*)([A-Za-z0-9_]+)(\s*=\s*)([^#]*?)(\s*(?:#.*)?)", line)
+    if match is None or match[2] not in changes:
+        return line
+    value = parse_toml(f"value = {match[4]}", None)["value"]
+    return f"{match[1]}{match[2]}{match[3]}{json.dumps(changes[match[2]](value))}{match[5]}"
+
+
+def _elements(modelfile: ModelFile) -> Iterator[str]:
+    """The tables of the elements. Plain numbers of [model] are in units of M1, K1 and P1 + P2."""
+    model, given = modelfile.model, modelfile.mechanical
+    assert isinstance(model, Dimensionless)
+    system = given or Mechanical.from_dimensionless(model, M1=1.0, K1=1.0, force=1.0)
+    raw = {} if given is None else parse_toml(modelfile.text, None)["mechanical"]
+
+    def value(name: str) -> str:
+        number = raw.get(name, getattr(system, name))
+        if given is None or isinstance(number, str):
+            return json.dumps(number, ensure_ascii=False)
+        return json.dumps(f"{number!r} {MECHANICAL_UNITS[name]}")
+
+    for mass in ("M1", "M2"):
+        yield from ("[[mass]]", f'name = "{mass}"', f"mass = {value(mass)}", "")
+    for kind, key, names in (("spring", "stiffness", "K"), ("damper", "damping", "C")):
+        for number, between in (("1", '["M1", "M2"]'), ("2", '["M2", "ground"]')):
+            if getattr(system, names + number):
+                yield from (f"[[{kind}]]", f"between = {between}")
+                yield from (f"{key} = {value(names + number)}", "")
+    if system.K0:
+        yield from ("[[clearance]]", 'name = "A"', 'between = ["M1", "ground"]')
+        gaps = ("upper", "lower") if system.sides == "both" else (system.sides,)
+        yield from (f"{side} = {value('B')}" for side in gaps)
+        yield from (f"stiffness = {value('K0')}", "")
+    for number in ("1", "2"):
+        if getattr(system, "P" + number):
+            yield from ("[[force]]", f'on = "M{number}"', f"amplitude = {value('P' + number)}", "")
+
+
+def _check(modelfile: ModelFile, text: str, scales: SiScales) -> None:
+    """InputError unless the new text says what the file says."""
+    try:
+        other = parse_model_file(text, modelfile.source)
+    except InputError:
+        _refuse(modelfile)
+    ours = (modelfile.mechanical or modelfile.model).second_order()
+    theirs = other.model.second_order()
+    keys = ("mass", "damping", "stiffness", "force")
+    pairs = [(getattr(ours, key), getattr(theirs, key)) for key in keys]
+    pairs.append((_frequencies(modelfile, scales), _frequencies(other, SiScales())))
+    same = all(np.allclose(a, b, rtol=NEAR, atol=NEAR * np.abs(a).max()) for a, b in pairs)
+    wanted = [(r.expect, r.twin, r.symmetric) for r in modelfile.responses]
+    kept = [(r.expect, r.twin, r.symmetric) for r in other.responses]
+    if not same or wanted != kept or modelfile.circuit != other.circuit:
+        _refuse(modelfile)
+
+
+def _frequencies(modelfile: ModelFile, scales: SiScales) -> Array:
+    """Of the responses, in the new file's units; 0 for one that is to be chosen."""
+    omegas = [0.0, *(r.omega or 0.0 for r in modelfile.responses)]
+    return np.array(omegas) / scales.time_scale
+
+
+def _refuse(modelfile: ModelFile) -> NoReturn:
+    expected = "a header line for each table, [model] or [mechanical] among them, and a line a key"
+    raise InputError(modelfile.source, "--from", "tables written in another way", expected)
