@@ -57,6 +57,7 @@ from .netlist import (
     nominal_board as nominal_board,
 )
 from .nodal import (
+    Exit as Exit,
     NodalEquations as NodalEquations,
     Solution as Solution,
 )

@@ -124,8 +124,10 @@ class NodalEquations:
                 if j >= 0 or isinstance(switch, Diode):
                     largest = np.abs(row[..., :n]).max(axis=-1, initial=0.0)
                     if j >= 0:
-                        across = np.abs(row[..., self._moving[j]]) / self._per_state(j, solved)
-                        scale = np.where(across > 1e-9 * largest, across, 1.0)
+                        across, per = np.abs(row[..., self._moving[j]]), self._per_state(j, solved)
+                        # A difference amplifier at its limit shows no displacement.
+                        moves = (across > 1e-9 * largest * per) & (per > 0.0)
+                        scale = np.divide(across, per, out=np.ones_like(across), where=moves)
                     else:  # amperes beside volts: bring both to states
                         scale = np.where(largest > 0.0, largest, 1.0)
                     row = row / scale[..., None]
@@ -144,7 +146,7 @@ class NodalEquations:
         """Volts of the displacement in a clearance per volt of the first mass's state."""
         difference = self.circuit.stops[j].difference
         if difference is None:
-            return 1.0
+            return np.float64(1.0)
         return np.abs(solved.voltage[difference[0]][..., self._moving[j]])
 
     def clipped(self, key: ModeKey) -> bool:

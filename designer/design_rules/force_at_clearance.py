@@ -8,7 +8,7 @@ formula of the topology enters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +16,8 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.circuit.netlist import GROUND, Circuit, nominal_board
-from designer.circuit.nodal import NodalEquations
+from designer.circuit.nodal import Exit, NodalEquations
+from designer.dynamics.piecewise_linear import ModeKey
 
 BOLTZMANN, KELVIN = 1.380649e-23, 298.15
 """J/K, exact since 2019; room temperature [K]."""
@@ -24,8 +25,11 @@ BOLTZMANN, KELVIN = 1.380649e-23, 298.15
 
 @dataclass(frozen=True)
 class Forces:
-    """Equivalent force, in volts of the generator, of one unit of each disturbance."""
+    """Equivalent force at one clearance, in volts of the generator, of one unit of each
+    disturbance."""
 
+    clearance: str
+    """Name of the clearance; "" where a circuit without one has the first mass's displacement."""
     offset: Mapping[str, float]
     """Force by section, per volt at its input."""
     current: Mapping[str, float]
@@ -45,29 +49,36 @@ class Statics:
         self._nets = [net for net in circuit.nets if net != circuit.generator.net]
 
     @cached_property
-    def forces(self) -> Forces:
-        """Of every section's offset, and of a current into every net.
+    def forces(self) -> tuple[Forces, ...]:
+        """Of every section's offset, and of a current into every net: at each clearance in order.
 
         Raises
         ------
-        ArithmeticError : the circuit has no rest.
+        ArithmeticError : the circuit has no rest, or the generator does not move a clearance.
         """
+        names = [stop.clearance for stop in self.circuit.stops] or [""]
+        return tuple(map(self._force, names, self._moved()))
+
+    def _force(self, clearance: str, moved: Array) -> Forces:
+        """moved : of the displacement, by the generator, by each section and each net."""
         sections = [s.name for s in self.circuit.sections]
-        moved = self._moved()
         drive, rest = moved[0], moved[1:]
         if drive == 0.0:
-            raise ArithmeticError("the generator does not move the mass")
+            where = f"the mass at clearance {clearance}" if clearance else "the mass"
+            raise ArithmeticError(f"the generator does not move {where}")
         volts = [float(m / drive) for m in rest]
         return Forces(
+            clearance,
             dict(zip(sections, volts, strict=False)),
             dict(zip(self._nets, volts[len(sections) :], strict=True)),
         )
 
-    def _moved(self) -> Array:
-        """How far the mass moves from the clearance's middle, for the generator and each source."""
+    def _moved(self) -> list[Array]:
+        """How far the mass moves from the middle of each clearance, for the generator and each
+        source."""
         c = self.circuit
         n = len(c.states)
-        key = c.rest
+        key = c.open
         G, right = self._equations.of(key)
         sections = len(c.sections)
         count = sections + len(self._nets)
@@ -82,13 +93,20 @@ class Statics:
         solved.voltage[GROUND] = np.zeros(y.shape[1])
         rates = self._equations.rates(solved)
         # Where each source holds the states, all else at zero.
-        states = -np.linalg.solve(rates[:, :n], rates[:, n:-1])
-        ways = [e for e in self._equations.exits(key, solved) if e.clearance == 0]
-        if not ways:
-            return np.asarray(states[0])
-        moved = np.zeros(states.shape[1])
+        states = np.asarray(-np.linalg.solve(rates[:, :n], rates[:, n:-1]), dtype=np.float64)
+        exits = self._equations.exits(key, solved)
+        if not c.stops:
+            return [np.asarray(states[0])]
+        return [
+            self._from_middle([e for e in exits if e.clearance == k], k, states)
+            for k in range(len(c.stops))
+        ]
+
+    def _from_middle(self, ways: Sequence[Exit], clearance: int, states: Array) -> Array:
+        """ways : into each contact of a clearance. states : (n, sources) displaced so far."""
+        n, moved = len(states), np.zeros(states.shape[1])
         for way in ways:
-            side = self._equations.sides(way.target)[0]
+            side = self._equations.sides(way.target)[clearance]
             moved += side * (way.row[:n] @ states + way.row[n:-1])
         return moved / len(ways)
 
@@ -103,24 +121,29 @@ def thermal(ohms: float) -> float:
     return float(np.sqrt(4.0 * BOLTZMANN * KELVIN / ohms))
 
 
-def leftover(circuit: Circuit, values: Mapping[str, float] | None = None) -> float:
-    """Stiffness that the dead zone leaves inside the clearance, over that of the stop.
+def leftovers(circuit: Circuit, values: Mapping[str, float] | None = None) -> Array:
+    """(stops,) stiffness that each dead zone leaves inside its clearance, over that of its stops.
 
-    From the rate of the moving mass in the open mode and in contact: the nonlinear stage's output
-    is the only path that differs, so its slope against the displacement is read there. values :
-    ohm and farad in the place of the circuit's.
+    From the slope of the stage's output against the displacement, open and in contact: the output
+    is the only path that differs. Of unequal stops the mean counts. values : ohm and farad in the
+    place of the circuit's.
     """
     board = nominal_board(circuit)
     if values is not None:
         board = replace(board, values={**circuit.values, **values})
     equations = NodalEquations(circuit, board)
-    stop = circuit.stops[0]
-    place = circuit.states.index(stop.state)
-    slopes = []
-    for key in (circuit.open, *(circuit.carrying(c) for _, c in stop.contacts)):
+
+    def slopes(key: ModeKey) -> Array:
+        """(stops,) of each output against the displacement of its mass."""
         G, right = equations.of(key)
-        y = np.asarray(np.linalg.solve(G, right), dtype=np.float64)
-        solved = equations.solution(y)
-        slopes.append(float(solved.voltage[stop.output][place]))
-    contact = float(np.mean(slopes[1:])) - slopes[0]
-    return slopes[0] / contact
+        solved = equations.solution(np.asarray(np.linalg.solve(G, right), dtype=np.float64))
+        places = (circuit.states.index(stop.state) for stop in circuit.stops)
+        pairs = zip(circuit.stops, places, strict=True)
+        return np.array([solved.voltage[stop.output][place] for stop, place in pairs])
+
+    inside = slopes(circuit.open)
+    contact = [
+        np.mean([slopes(circuit.carrying(c))[k] for _, c in stop.contacts])
+        for k, stop in enumerate(circuit.stops)
+    ]
+    return np.asarray(inside / (np.array(contact) - inside))

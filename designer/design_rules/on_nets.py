@@ -24,7 +24,7 @@ def feedback(s: RuleSubject) -> Iterator[Finding]:
     """What comes back of each section's output, its neighbours' outputs held: at rest and in each
     contact, for a diode may open the loop."""
     circuit = s.circuit
-    keys = dict.fromkeys([circuit.rest])
+    keys = dict.fromkeys([circuit.rest, circuit.open])
     for stop in circuit.stops:
         keys |= dict.fromkeys(circuit.carrying(contact) for _, contact in stop.contacts)
     for key in keys:

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from designer.base.arrays import Array
 from designer.catalog.design_rule import Finding
 from designer.circuit.netlist import Diode
-from designer.design_rules.force_at_clearance import leftover, thermal
+from designer.design_rules.force_at_clearance import Forces, leftovers, thermal
 from designer.design_rules.subject import RuleSubject
 
 INSULATION = 1e9
@@ -30,25 +31,27 @@ def offset(s: RuleSubject) -> Iterator[Finding]:
     """All sections' largest offsets, independent of each other."""
     figure = s.opamp.offset
     limit = figure.max if figure.max is not None else s.opamp.offset_limit
-    share = {
-        section.name: abs(s.forces.offset[section.name]) * limit / s.drive
-        for section in s.circuit.sections
-    }
-    total = float(np.sqrt(sum(each**2 for each in share.values())))
-    more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections"
-    yield Finding(total, _most(share), more=more)
+    for at in s.forces:
+        share = {
+            section.name: abs(at.offset[section.name]) * limit / s.drive
+            for section in s.circuit.sections
+        }
+        total = float(np.sqrt(sum(each**2 for each in share.values())))
+        more = f"{1e3 * limit:.3g} mV at each of {len(share)} sections"
+        yield Finding(total, _most(share), more=_told(s, at, more))
 
 
 def bias(s: RuleSubject) -> Iterator[Finding]:
     """All inputs' largest bias currents, added up."""
     figure = s.opamp.bias
     limit = figure.max if figure.max is not None else figure.nominal
-    current = s.forces.current
-    share = {
-        section.name: abs(current.get(section.inverting, 0.0)) for section in s.circuit.sections
-    }
-    total = sum(share.values()) * limit / s.drive
-    yield Finding(total, _most(share), more=f"{limit:.3g} A at each input")
+    for at in s.forces:
+        share = {
+            section.name: abs(at.current.get(section.inverting, 0.0))
+            for section in s.circuit.sections
+        }
+        total = sum(share.values()) * limit / s.drive
+        yield Finding(total, _most(share), more=_told(s, at, f"{limit:.3g} A at each input"))
 
 
 def noise(s: RuleSubject) -> Iterator[Finding]:
@@ -56,11 +59,12 @@ def noise(s: RuleSubject) -> Iterator[Finding]:
     corner = s.opamp.noise_corner.nominal if s.opamp.noise_corner is not None else 0.0
     white = s.fastest - SLOWEST
     flicker = corner * float(np.log(s.fastest / SLOWEST))
-    density, forces = s.opamp.noise.nominal, s.forces
-    amplifiers = sum((forces.offset[a.name] * density) ** 2 for a in s.circuit.sections)
-    resistors = sum((forces.between(r.a, r.b) * thermal(r.value)) ** 2 for r in s.circuit.resistors)
-    total = float(np.sqrt(amplifiers * (white + flicker) + resistors * white)) / s.drive
-    yield Finding(total, more=f"{SLOWEST:g} Hz to {s.fastest:.4g} Hz")
+    density, resistors = s.opamp.noise.nominal, s.circuit.resistors
+    for at in s.forces:
+        amplifiers = sum((at.offset[a.name] * density) ** 2 for a in s.circuit.sections)
+        warm = sum((at.between(r.a, r.b) * thermal(r.value)) ** 2 for r in resistors)
+        total = float(np.sqrt(amplifiers * (white + flicker) + warm * white)) / s.drive
+        yield Finding(total, more=_told(s, at, f"{SLOWEST:g} Hz to {s.fastest:.4g} Hz"))
 
 
 def leakage(s: RuleSubject) -> Iterator[Finding]:
@@ -68,23 +72,25 @@ def leakage(s: RuleSubject) -> Iterator[Finding]:
 
     Opposed diodes at one node leak less than that: neither sees a voltage there.
     """
-    circuit, forces = s.circuit, s.forces
-    through = 0.0
-    for diode in circuit.diodes:
-        if diode.rest:
-            continue  # it conducts
-        entry = s.catalog.diode(diode.model.name)
-        through += abs(forces.between(diode.cathode, diode.anode)) * entry.reverse_current.nominal
+    circuit = s.circuit
+    positions = circuit.open[len(circuit.sections) :]
+    blocking = [d for d, on in zip(circuit.diodes, positions, strict=True) if not on]
     opposed = {frozenset(d.nets) for d in circuit.fittings if isinstance(d, Diode)}
-    for section in circuit.sections:
-        node = section.inverting
-        over_board = abs(forces.current.get(node, 0.0)) * circuit.supply / INSULATION
-        more = f"{circuit.supply:g} V over {INSULATION / 1e9:g} GΩ"
-        if through:
-            more += ", and through the diodes"
-        if any(node in pair for pair in opposed):
-            more += "; the protection's diodes see no voltage"
-        yield Finding((over_board + through) / s.drive, f"{section.name}, node {node}", more=more)
+    for at in s.forces:
+        through = 0.0
+        for diode in blocking:
+            entry = s.catalog.diode(diode.model.name)
+            through += abs(at.between(diode.cathode, diode.anode)) * entry.reverse_current.nominal
+        for section in circuit.sections:
+            node = section.inverting
+            over_board = abs(at.current.get(node, 0.0)) * circuit.supply / INSULATION
+            more = f"{circuit.supply:g} V over {INSULATION / 1e9:g} GΩ"
+            if through:
+                more += ", and through the diodes"
+            if any(node in pair for pair in opposed):
+                more += "; the protection's diodes see no voltage"
+            where = f"{section.name}, node {node}"
+            yield Finding((over_board + through) / s.drive, where, more=_told(s, at, more))
 
 
 def absorption(s: RuleSubject) -> Iterator[Finding]:
@@ -95,31 +101,54 @@ def absorption(s: RuleSubject) -> Iterator[Finding]:
         known = [share for word, share in ABSORPTION.items() if word.lower() in words.lower()]
         share = known[0] if known else UNKNOWN
         current = share * capacitor.value * circuit.saturation / RETURNS
-        force = abs(s.forces.between(capacitor.plus, capacitor.minus)) * current / s.drive
         more = f"{100 * share:g} % of {circuit.saturation:g} V, {words or 'dielectric not known'}"
-        yield Finding(force, capacitor.name, more=more)
+        for at in s.forces:
+            force = abs(at.between(capacitor.plus, capacitor.minus)) * current / s.drive
+            yield Finding(force, capacitor.name, more=_told(s, at, more))
 
 
 def stiffness(s: RuleSubject) -> Iterator[Finding]:
-    """What the dead zone leaves, in units of K1: |nominal| and a standard deviation.
+    """What each dead zone leaves, in units of its mass's stiffness: |nominal| and a standard
+    deviation.
 
     The resistors are spread evenly within the grades at which they are bought.
     """
-    circuit, grades, system = s.circuit, s.resistor_grades, s.design.model.second_order()
-    mu = system.relative_stiffness(system.clearances[0])
+    circuit, grades = s.circuit, s.resistor_grades
     if not circuit.stops:
         return
-    nominal = mu * leftover(circuit)
+    units = _relative_stiffness(s)
+    nominal = units * leftovers(circuit)
     change = {
-        r.name: (mu * leftover(circuit, {r.name: r.value * (1.0 + STEP)}) - nominal) / STEP
+        r.name: (units * leftovers(circuit, {r.name: r.value * (1.0 + STEP)}) - nominal) / STEP
         for r in circuit.resistors
     }
     most = max(grades[name] for name in change)
-    shares = {name: c * (grades[name] / most) for name, c in change.items()}
-    deviation = float(np.sqrt(sum(c**2 for c in shares.values()))) * most / np.sqrt(3.0)
     bought = " and ".join(f"{100 * g:g}" for g in sorted({grades[name] for name in change}))
-    more = f"nominal {abs(nominal):.2g}, deviation {deviation:.2g} at {bought} % resistors"
-    yield Finding(float(abs(nominal) + deviation), _most(shares), more=more)
+    for k, stop in enumerate(circuit.stops):
+        shares = {name: float(c[k]) * (grades[name] / most) for name, c in change.items()}
+        deviation = float(np.sqrt(sum(c**2 for c in shares.values()))) * most / np.sqrt(3.0)
+        left = abs(float(nominal[k]))
+        more = f"nominal {left:.2g}, deviation {deviation:.2g} at {bought} % resistors"
+        if len(circuit.stops) > 1:
+            more = f"clearance {stop.clearance}: {more}"
+        yield Finding(float(left + deviation), _most(shares), more=more)
+
+
+def _relative_stiffness(s: RuleSubject) -> Array:
+    """(clearances,) stiffness of the stops, the mean of both, over that of the mass's springs."""
+    system = s.design.model.second_order()
+    return np.array(
+        [
+            np.mean([stop.stiffness for _, stop in clearance.sides])
+            / system.stiffness[clearance.mass, clearance.mass]
+            for clearance in system.clearances
+        ]
+    )
+
+
+def _told(s: RuleSubject, at: Forces, more: str) -> str:
+    """What a reader should know, with the clearance where there are several."""
+    return f"clearance {at.clearance}: {more}" if len(s.forces) > 1 else more
 
 
 def _most(shares: Mapping[str, float]) -> str:

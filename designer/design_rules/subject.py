@@ -91,8 +91,8 @@ class RuleSubject:
         return _complete(stuck(self.circuit, largest), "with")
 
     @cached_property
-    def forces(self) -> Forces:
-        """Disturbances as forces."""
+    def forces(self) -> tuple[Forces, ...]:
+        """Disturbances as forces at each clearance."""
         return Statics(self.circuit).forces
 
     @cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from designer.circuit.dead_zone_parts import Kind
 from designer.circuit.netlist import GROUND, Capacitor, Circuit, Diode, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.design_rules import on_nets, on_precision, on_ratings, run_rules
-from designer.design_rules.force_at_clearance import Statics, leftover, thermal
+from designer.design_rules.force_at_clearance import Statics, leftovers, thermal
 from designer.design_rules.operating_point import operating, stuck
 from designer.design_rules.subject import RuleSubject
 from designer.dynamics.piecewise_linear import Drive
@@ -24,6 +25,8 @@ from designer.synthesis import output_loads
 from designer.synthesis.output_loads import Run
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
+from tests.shared.chains import chain, chain_circuit, chain_text, table
+from tests.shared.exact_circuits import Scale, exact_values
 from tests.shared.oracles import linear_matrix
 from tests.shared.rule_cases import PAIRS, TEXT, base, subject_of, with_circuit, with_part
 from tests.shared.stages import bought, model, one_sided, rectifier, stage
@@ -227,19 +230,38 @@ def test_without_responses_nothing_is_said_of_operation() -> None:
 # Errors as forces
 
 
-def shift(subject: RuleSubject, **board: dict[str, float]) -> float:
-    """Where the mass rests in the middle of the clearance [V], of a board with these errors: by
-    the reduction's own offsets and biases, and its guards."""
+def shift(subject: RuleSubject, clearance: int = 0, **board: dict[str, float]) -> float:
+    """Where the mass rests in the middle of a clearance [V], of a board with these errors: by the
+    reduction's own offsets and biases, and its guards."""
     circuit = subject.circuit
     errors: dict[str, Any] = {"bias": {}, **board}
     ideal = replace(nominal_board(circuit), **errors)
-    mode = Reduction(circuit, ideal).system().mode(circuit.rest)
+    mode = Reduction(circuit, ideal).system().mode(circuit.open)
     x = np.linalg.solve(mode.A, -mode.d)
-    ends = [g for g in mode.guards if g.clearance == 0]
+    ends = [g for g in mode.guards if g.clearance == clearance]
     distances = [-(g.C @ x + g.e) for g in ends]
     assert len(distances) == 2
-    side = [np.sign(g.C[0]) for g in ends]
+    state = circuit.states.index(circuit.stops[clearance].state)
+    side = [np.sign(g.C[state]) for g in ends]
     return float(-0.5 * (side[0] * distances[0] + side[1] * distances[1]))
+
+
+GAP = {"upper": 0.5, "lower": 0.5, "stiffness": 5.0}
+TWO_GAPS = (
+    table("clearance", name="A", between=("m1", "ground"), **GAP),
+    table("clearance", name="B", between=("m2", "m3"), **GAP),
+)
+STATIC = ("feedback", "offset-force", "bias-force", "leakage-force", "absorption-force")
+
+
+@cache
+def chain_subject() -> RuleSubject:
+    """Three masses with a clearance to ground and one between two masses, rectifiers for both."""
+    wanted = '[[response]]\nomega = 1.0\n[circuit]\ndead_zone = "rectifier"\n'
+    mechanism = chain(3, *TWO_GAPS)
+    values = exact_values(mechanism.second_order(), Scale(1e-3, np.full(6, 4.0), 2.0))
+    circuit = chain_circuit(mechanism, "rectifier", values=bought(values))
+    return subject_of(circuit, mechanism, chain_text(3, *TWO_GAPS, wanted))
 
 
 def per_volt(subject: RuleSubject) -> float:
@@ -253,7 +275,7 @@ def per_volt(subject: RuleSubject) -> float:
 def test_offsets_and_currents_move_the_mass_as_the_reduction_says(kind: str) -> None:
     circuit = base().circuit if kind == "rectifier" else stage("saturation", "both", EXACT)
     subject = RuleSubject(base().made, circuit, base().components)
-    forces = Statics(circuit).forces
+    forces = Statics(circuit).forces[0]
     rest, unit = shift(subject), per_volt(subject)
     for section in circuit.sections:
         moved = shift(subject, offset={section.name: 1e-6}) - rest
@@ -263,9 +285,42 @@ def test_offsets_and_currents_move_the_mass_as_the_reduction_says(kind: str) -> 
         assert -forces.current[section.inverting] * 1e-12 == pytest.approx(biased / unit, abs=1e-15)
 
 
+def test_each_clearance_has_forces_of_its_own() -> None:
+    """Three masses with a clearance to ground and one between two masses: an offset moves either
+    as far as the reduction says, and the rules name the clearance."""
+    subject = chain_subject()
+    forces = Statics(subject.circuit).forces
+    assert [at.clearance for at in forces] == ["A", "B"]
+    rest = [shift(subject, k) for k in range(2)]
+    mode = Reduction(subject.circuit, nominal_board(subject.circuit)).system()
+    still = mode.mode(subject.circuit.open)
+    unit = [row[:6] @ np.linalg.solve(still.A, -still.B) for row in mode.displacement]
+    for section in subject.circuit.sections[::3]:
+        for k, at in enumerate(forces):
+            moved = shift(subject, k, offset={section.name: 1e-6}) - rest[k]
+            assert at.offset[section.name] * 1e-6 == pytest.approx(moved / unit[k], abs=1e-12)
+    found = {o.rule.id: o for o in (run_rules.look(id_, subject) for id_ in STATIC)}
+    assert {o.status for o in found.values()} <= {PASS, FAIL}
+    assert any(f"clearance {name}: " in found["offset-force"].found for name in "AB")
+
+
+def test_each_dead_zone_leaves_stiffness_by_its_own_resistors() -> None:
+    """In contact the linear path alone carries; 1 % of it more is left over at rest."""
+    stages = {
+        f"R{int(name[1:]) + step}": value
+        for name, value in EXACT.items()
+        for step in (0, 100)
+        if name.startswith("R2") and len(name) == 4
+    }
+    circuit = chain_circuit(chain(3, *TWO_GAPS), values=stages)
+    assert leftovers(circuit) == pytest.approx([0.0, 0.0], abs=1e-3)
+    changed = leftovers(circuit, {"R307": 1.01 * stages["R307"]}) - leftovers(circuit)
+    assert np.abs(changed) == pytest.approx([0.0, 0.01], rel=2e-2, abs=1e-9)
+
+
 def test_a_current_into_the_driven_node_is_the_generator_s() -> None:
     """One ampere into s2 is R6 volts of the generator."""
-    forces = Statics(base().circuit).forces
+    forces = Statics(base().circuit).forces[0]
     assert forces.current["s2"] == pytest.approx(base().circuit.values["R6"], rel=1e-6)
 
 
@@ -283,7 +338,7 @@ def at(circuit: Circuit, **figures: object) -> RuleSubject:
 
 def test_noise_is_that_of_each_source_by_itself() -> None:
     circuit = base().circuit
-    forces = Statics(circuit).forces
+    forces = Statics(circuit).forces[0]
     (found,) = on_precision.noise(at(circuit, drive=1.0, fastest=1000.1))
     power = sum((forces.offset[s.name] * 18e-9) ** 2 for s in circuit.sections)
     for r in circuit.resistors:
@@ -294,7 +349,7 @@ def test_noise_is_that_of_each_source_by_itself() -> None:
 
 def test_flicker_noise_counts_from_a_tenth_of_a_hertz() -> None:
     circuit, opamp = base().circuit, base().opamp
-    forces = Statics(circuit).forces
+    forces = Statics(circuit).forces[0]
     (plain,) = on_precision.noise(at(circuit, drive=1.0, fastest=1000.0))
     corner = replace(opamp, noise_corner=Figure(None, 500.0, None, "a test"))
     noisy = at(replace(circuit, figures=corner), drive=1.0, fastest=1000.0)
@@ -306,7 +361,7 @@ def test_flicker_noise_counts_from_a_tenth_of_a_hertz() -> None:
 
 def test_offsets_add_as_squares_and_bias_currents_as_they_are() -> None:
     circuit = base().circuit
-    forces = Statics(circuit).forces
+    forces = Statics(circuit).forces[0]
     (offset,) = on_precision.offset(at(circuit, drive=2.0))
     expected = np.sqrt(sum((10e-3 * forces.offset[s.name]) ** 2 for s in circuit.sections)) / 2.0
     assert offset.value == pytest.approx(expected)
@@ -333,9 +388,9 @@ def test_leftover_stiffness_is_the_difference_of_two_gains() -> None:
     """Eq. (18): with R205 off by 1 % the saturating path gains (R205/(R204 + R205)) differently;
     for small changes the leftover over the stop's slope is the relative change of the path."""
     circuit = stage("saturation", "both", EXACT)
-    assert leftover(circuit) == pytest.approx(0.0, abs=1e-3)
+    assert leftovers(circuit) == pytest.approx(0.0, abs=1e-3)
     board = circuit.values
-    changed = leftover(circuit, {"R207": board["R207"] * 1.01}) - leftover(circuit)
+    changed = leftovers(circuit, {"R207": board["R207"] * 1.01}) - leftovers(circuit)
     # The linear path alone carries in contact; at rest 1 % of it is left over.
     assert abs(changed) == pytest.approx(0.01, rel=2e-2)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -40,7 +41,8 @@ def project(
     choice = BoardChoice(BoardSpec(mounting=mounting, dc_trim=dc_trim))  # type: ignore[arg-type]
     board = fitted(circuit, choice, catalog)
     found = components(board, catalog, choice)
-    return Project(title, board, found, RUN, rules_text(board_rules(board)))
+    run = replace(RUN, initial=np.zeros(len(circuit.states)))
+    return Project(title, board, found, run, rules_text(board_rules(board)))
 
 
 @cache

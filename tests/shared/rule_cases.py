@@ -24,7 +24,7 @@ from designer.circuit.netlist import GROUND, Capacitor, Circuit, Resistor, Secti
 from designer.design_rules import run_rules
 from designer.design_rules.subject import RuleSubject
 from designer.model.find_responses import find
-from designer.model.model import Dimensionless
+from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import parse_model_file
 from tests.shared.model_text import PAPER_TABLE
 from tests.shared.stages import CATALOG, PAPER, bought, rectifier, stage
@@ -53,7 +53,7 @@ def base() -> RuleSubject:
     return subject_of(stage("rectifier", "both", bought(rectifier())), PAPER, TEXT)
 
 
-def subject_of(circuit: Circuit, model: Dimensionless, text: str) -> RuleSubject:
+def subject_of(circuit: Circuit, model: MechanicalModel, text: str) -> RuleSubject:
     """What the rules look at of a circuit for this model, with the model file's responses."""
     modelfile = parse_model_file(text)
     design = Design(
