@@ -9,6 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from hypothesis import given, strategies as st
@@ -36,6 +37,12 @@ Point = tuple[float, float]
 
 def file(made: dict[str, str], ending: str) -> Expression:
     return read(next(text for name, text in made.items() if name.endswith(ending)))
+
+
+@cache
+def part_of(name: str, ending: str) -> Expression:
+    """A file of one of ``CASES`` as it is read."""
+    return file(case_files(name), ending)
 
 
 def prop(symbol: Expression, name: str) -> str:
@@ -105,7 +112,7 @@ class Drawing:
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_sheet_connects_what_the_components_say(name: str) -> None:
-    drawing = Drawing(file(case_files(name), ".kicad_sch"))
+    drawing = Drawing(part_of(name, ".kicad_sch"))
     simulated = {"VM1", "VCC1", "VEE1"}
     nets = {
         circuit_net(net): {pin for pin in pins if pin[0] not in simulated}
@@ -119,7 +126,7 @@ def test_the_sheet_connects_what_the_components_say(name: str) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_board_and_the_netlist_carry_the_same_nets(name: str) -> None:
-    board = file(case_files(name), ".kicad_pcb")
+    board = part_of(name, ".kicad_pcb")
     numbers = {net.text(1): net.text(0) for net in board.all("net")}
     pins = {(c.reference, pin.number) for c in case(name).components for pin in c.pins}
     on_board: dict[str, set[tuple[str, str]]] = {}
@@ -135,7 +142,7 @@ def test_the_board_and_the_netlist_carry_the_same_nets(name: str) -> None:
         net.get("name").text(0): {
             (n.get("ref").text(0), n.get("pin").text(0)) for n in net.all("node")
         }
-        for net in file(case_files(name), ".net").get("nets").all("net")
+        for net in part_of(name, ".net").get("nets").all("net")
     }
     assert on_board == listed
     wanted = {kicad_net(n): set(pads) for n, pads in joined(case(name).components).items()}
@@ -185,7 +192,7 @@ def courtyard(spot: PlacedComponent) -> tuple[float, float, float, float]:
 
 @pytest.mark.parametrize("name", CASES)
 def test_ids_are_given_once_and_references_lead_to_their_symbols(name: str) -> None:
-    sheet, board = (file(case_files(name), end) for end in (".kicad_sch", ".kicad_pcb"))
+    sheet, board = (part_of(name, end) for end in (".kicad_sch", ".kicad_pcb"))
     for tree in (sheet, board):
         ids = Counter(e.text(0) for e in tree.walk() if e.name == "uuid")
         assert [i for i, n in ids.items() if n > 1] == []

@@ -14,7 +14,7 @@ from graphlib import TopologicalSorter
 import pytest
 
 from designer.base import jit
-from tests.shared.house import HOUSE, ORDER, ROOT, Import, arrows, imports, public, sources
+from tests.shared.house import HOUSE, ORDER, ROOT, Import, arrows, imports, public, trees
 
 DRAWS = "matplotlib takes a second to import, and nothing before a picture needs it"
 STARTS = "most verbs do not need it"
@@ -46,8 +46,8 @@ LAZY = {
 
 
 @pytest.fixture(scope="module")
-def every() -> list[Import]:
-    return list(imports())
+def every() -> tuple[Import, ...]:
+    return imports()
 
 
 def test_every_module_stands_in_a_package() -> None:
@@ -61,7 +61,7 @@ def test_every_module_stands_in_a_package() -> None:
     }
 
 
-def test_no_import_runs_back(every: list[Import]) -> None:
+def test_no_import_runs_back(every: tuple[Import, ...]) -> None:
     """Every import goes to the own package or to one that stands before it."""
     place = {package: number for number, package in enumerate(ORDER)}
     assert len(every) > 1000
@@ -73,13 +73,15 @@ def test_no_import_runs_back(every: list[Import]) -> None:
     assert back == []
 
 
-def test_packages_use_modules_and_not_the_public_list_of_the_whole(every: list[Import]) -> None:
+def test_packages_use_modules_and_not_the_public_list_of_the_whole(
+    every: tuple[Import, ...],
+) -> None:
     """``designer`` and the packages' lists are for users: inside, an import names its module."""
     assert [f"{i.importer}:{i.line}" for i in every if "." not in i.module] == []
 
 
 @pytest.mark.parametrize("package", ORDER)
-def test_no_circle_inside_a_package(package: str, every: list[Import]) -> None:
+def test_no_circle_inside_a_package(package: str, every: tuple[Import, ...]) -> None:
     graph: dict[str, set[str]] = defaultdict(set)
     for i in every:
         if i.importer.split(".")[0] == i.module.split(".")[0] == package:
@@ -87,13 +89,13 @@ def test_no_circle_inside_a_package(package: str, every: list[Import]) -> None:
     TopologicalSorter(graph).prepare()  # CycleError names the circle
 
 
-def test_no_private_name_crosses_a_module(every: list[Import]) -> None:
+def test_no_private_name_crosses_a_module(every: tuple[Import, ...]) -> None:
     private = [f"{i.importer}:{i.line} {i.name}" for i in every if re.match(r"_[^_]", i.name)]
     assert private == []
 
 
 @pytest.mark.parametrize("package", ORDER)
-def test_what_others_use_is_listed(package: str, every: list[Import]) -> None:
+def test_what_others_use_is_listed(package: str, every: tuple[Import, ...]) -> None:
     """What another package imports is in the package's list, with its module."""
     listed = public(package)
     missing = set()
@@ -123,7 +125,7 @@ def test_what_is_listed_is_there(package: str) -> None:
             assert value.__name__ == f"designer.{package}.{name}"
 
 
-def test_imports_inside_functions_have_a_reason(every: list[Import]) -> None:
+def test_imports_inside_functions_have_a_reason(every: tuple[Import, ...]) -> None:
     """Start-up time is the only one; whatever the command line uses may wait for its verb."""
     lazy = {(i.importer, i.module) for i in every if i.lazy and not i.importer.startswith("cli.")}
     assert lazy == {pair for pairs in LAZY.values() for pair in pairs}
@@ -132,20 +134,20 @@ def test_imports_inside_functions_have_a_reason(every: list[Import]) -> None:
 def test_a_class_name_stands_once() -> None:
     """Private classes and those of tests aside."""
     homes: dict[str, list[str]] = defaultdict(list)
-    for module, path in sources().items():
-        for node in ast.parse(path.read_text("utf-8")).body:
+    for module, tree in trees().items():
+        for node in tree.body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes[node.name].append(module)
     assert {name: found for name, found in homes.items() if len(found) > 1} == {}
 
 
-def bare_fields(text: str) -> tuple[list[str], int]:
+def bare_fields(tree: ast.Module) -> tuple[list[str], int]:
     """Public fields without a docstring, as "Class.field", and how many fields there are.
 
     Of public dataclasses and named tuples at the top of a module.
     """
     bare, count = [], 0
-    for node in ast.parse(text).body:
+    for node in tree.body:
         if not isinstance(node, ast.ClassDef) or node.name.startswith("_") or not is_record(node):
             continue
         for field, after in zip(node.body, [*node.body[1:], ast.Pass()], strict=True):
@@ -194,16 +196,16 @@ def test_bare_fields_are_found() -> None:
             size: float
         '''
     )
-    assert bare_fields(text) == (["Spring.gap", "Step.size"], 3)
+    assert bare_fields(ast.parse(text)) == (["Spring.gap", "Step.size"], 3)
 
 
 @pytest.mark.parametrize("package", ORDER)
 def test_every_field_has_its_docstring(package: str) -> None:
     """In editors and on the pages of the reference, each field is explained where it stands."""
     bare, total = [], 0
-    for module, path in sources().items():
+    for module, tree in trees().items():
         if module.split(".")[0] == package:
-            found, count = bare_fields(path.read_text("utf-8"))
+            found, count = bare_fields(tree)
             bare += [f"{module}:{field}" for field in found]
             total += count
     assert total > 0 or package == "cli"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,11 +62,21 @@ def sources() -> dict[str, Path]:
     }
 
 
-def imports() -> Iterator[Import]:
+@cache
+def trees() -> dict[str, ast.Module]:
+    """The parsed text of every module in a package, as "package.module"."""
+    return {module: ast.parse(path.read_text("utf-8")) for module, path in sources().items()}
+
+
+@cache
+def imports() -> tuple[Import, ...]:
     """All imports between modules of the project, lazy ones and those for types only too."""
-    modules = sources()
-    for importer, path in modules.items():
-        tree = ast.parse(path.read_text("utf-8"))
+    return tuple(_imports())
+
+
+def _imports() -> Iterator[Import]:
+    modules = trees()
+    for importer, tree in modules.items():
         lazy = {
             id(node)
             for function in ast.walk(tree)
@@ -84,6 +95,7 @@ def imports() -> Iterator[Import]:
                 yield Import(importer, module, name, id(node) in lazy, node.lineno)
 
 
+@cache
 def public(package: str) -> dict[str, str]:
     """The names that a package lists, each with its module; a listed module with ""."""
     listed: dict[str, str] = {}

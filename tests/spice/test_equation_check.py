@@ -30,10 +30,12 @@ from designer.spice.equation_check import (
     transfer,
 )
 from designer.spice.pool import SpicePool
+from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
 
-COARSE = """
+COARSE = (
+    """
 format = 1
 [model]
 m = 0.5
@@ -45,11 +47,9 @@ f20 = 0.3
 b = 0.25
 [[response]]
 omega = 0.85
-[circuit]
-opamp = "TL074C"
-resistors = "E12"
-capacitors = "E6"
 """
+    + COARSE_CIRCUIT
+)
 OPEN = ("transfer, open",)
 ALL = {
     "transfer, open", "transfer, upper contact", "transfer, lower contact",
