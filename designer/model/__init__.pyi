@@ -8,6 +8,7 @@ from .absolute_motion import (
 )
 from .ascii_sketch import (
     sketch as sketch,
+    system_sketch as system_sketch,
 )
 from .board_table import (
     BoardChoice as BoardChoice,
@@ -38,6 +39,12 @@ from .find_responses import (
     matches as matches,
     peaks as peaks,
     scale_of as scale_of,
+)
+from .lumped_elements import (
+    GROUND as GROUND,
+    Damper as Damper,
+    Gap as Gap,
+    Spring as Spring,
 )
 from .lumped_system import (
     LumpedSystem as LumpedSystem,
@@ -100,6 +107,12 @@ from .spread_table import (
 from .swept_model import (
     ModelSubject as ModelSubject,
     of_model as of_model,
+)
+from .system_equations import (
+    element_rows as element_rows,
+    equations_of as equations_of,
+    hertz_notes as hertz_notes,
+    number_of as number_of,
 )
 from .template import (
     new as new,

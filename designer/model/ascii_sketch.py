@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from designer.model.lumped_elements import Elements
     from designer.model.model import Dimensionless
 
 _SPRING, _DAMPER, _NONE = "---/\\/\\/\\---", "----[=------", " " * 12
@@ -44,4 +45,36 @@ def sketch(model: Dimensionless | None = None) -> str:
     lines.append(" " * 16 + f"{mark}--> x2" + " " * 13 + "'--> x1")
     if second:
         lines.append(" " * 16 + second)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def system_sketch(system: Elements) -> str:
+    """Lines of ASCII for any system: the masses in a row from ground, what joins neighbours between
+    them; a line for everything else."""
+    row = ("|", *system.row)
+    widths = [len(name) + 4 for name in row]
+    widths[0] = 1
+    springs = {frozenset(spring.between) for spring in system.springs}
+    dampers = {frozenset(damper.between) for damper in system.dampers}
+    pairs = [frozenset(name.replace("|", "ground") for name in row[i : i + 2])
+             for i in range(len(row) - 1)]  # fmt: skip
+    lines = []
+    for joints, drawn in ((springs, _SPRING), (set[frozenset[str]](), _NONE), (dampers, _DAMPER)):
+        named = not joints
+        parts = ["|"]
+        for pair, name, width in zip(pairs, row[1:], widths[1:], strict=True):
+            parts.append(drawn if pair in joints else _NONE)
+            parts.append(f"[ {name} ]" if named else "|" + " " * (width - 2) + "|")
+        lines.append("".join(parts))
+    lines.append("")
+    for what, joints in (("spring", springs), ("damper", dampers)):
+        apart = sorted(sorted(pair) for pair in joints - set(pairs))
+        lines += [f"{what}: {first} to {second}" for first, second in apart]
+    for gap in system.gaps:
+        sides = " and ".join(s for s in ("upper", "lower") if getattr(gap, s) is not None)
+        lines.append(f"{gap.name}: {sides} stop, {' to '.join(gap.between)}")
+    lines += [f"force on {force.on}" for force in system.forces]
+    if system.base is not None:
+        stops = "with it" if system.base.stops == "base" else "stay"
+        lines.append(f"the ground moves, stops go {stops}".replace("go stay", "stay"))
     return "\n".join(line.rstrip() for line in lines)

@@ -174,6 +174,17 @@ class Elements:
         return tuple(mass.name for mass in self.masses)
 
     @property
+    def row(self) -> tuple[str, ...]:
+        """Names of the masses from the ground on, by how many springs away from it they are."""
+        reached, row = {GROUND}, list[str]()
+        ends = [set(spring.between) for spring in self.springs]
+        while len(row) < len(self.masses):
+            near = {n for pair in ends if not reached.isdisjoint(pair) for n in pair} - reached
+            row += [name for name in reversed(self.names) if name in near]
+            reached |= near
+        return tuple(row)
+
+    @property
     def stiffness_matrix(self) -> Array:
         """(n, n) of the springs."""
         return self._matrix([(spring.between, spring.stiffness) for spring in self.springs])

@@ -22,8 +22,10 @@ from designer.base.page import (
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.model import equations as forms
-from designer.model.ascii_sketch import sketch
+from designer.model.ascii_sketch import sketch, system_sketch
+from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless
+from designer.model.system_equations import equations_of, hertz_notes, number_of
 from designer.report import design_tables, response_tables, summary, tolerance_tables, words
 from designer.report.data import ReportData
 from designer.report.spread_words import words_of
@@ -109,8 +111,9 @@ def design_page(data: ReportData, pictures: Pictures) -> Page:
 def _model(data: ReportData, drawing: Picture | Gallery | None) -> PageSection:
     model, mechanical = data.design.model, data.mechanical
     assert not isinstance(drawing, Gallery)
-    if not isinstance(model, Dimensionless):
-        return PageSection("The model", [design_tables.elements_table(model)], "model")
+    if isinstance(model, LumpedSystem):
+        return _system(model, drawing or Picture(), si=data.si is not None)
+    assert isinstance(model, Dimensionless)
     picture = replace(
         drawing or Picture(), sketch=tuple(sketch(model).splitlines()), caption=_drawing_note(data)
     )
@@ -130,6 +133,25 @@ def _model(data: ReportData, drawing: Picture | Gallery | None) -> PageSection:
         picture,
         PageSection("Equations of motion", equations),
         Columns(tuple(tables)),
+    ]
+    return PageSection("The model", blocks, "model")
+
+
+def _system(model: LumpedSystem, drawing: Picture, *, si: bool) -> PageSection:
+    """The model of a file of format 2."""
+    sketch = tuple(system_sketch(model).splitlines())
+    caption = "Values as the model file gives them. Displacements count to the right."
+    equations: list[Block] = []
+    for title, lines in (
+        ("With symbols; u is the displacement in a clearance:", equations_of(model)),
+        ("With the numbers of this model:", equations_of(model, number_of)),
+    ):
+        equations += [SmallPrint(title), Verbatim(lines, equations=True)]
+    blocks: list[Block] = [
+        replace(drawing, sketch=sketch, caption=caption),
+        PageSection("Equations of motion", equations),
+        *(SmallPrint(note) for note in hertz_notes(model, si=si)),
+        design_tables.elements_table(model, si=si),
     ]
     return PageSection("The model", blocks, "model")
 

@@ -12,9 +12,10 @@ from designer.base.page import Table, table
 from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
-from designer.model.mechanics import MechanicalModel
+from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical, SiScales
 from designer.model.si_units import MECHANICAL_UNITS
+from designer.model.system_equations import element_rows
 from designer.report import words
 
 _PARAMETERS = {
@@ -79,10 +80,9 @@ def mechanical_table(given: Mechanical) -> Table | None:
     return table(("parameter", "value", "what it is"), rows, (1,))
 
 
-def elements_table(model: MechanicalModel) -> Table | None:
-    """The numbers of a system's elements by their names."""
-    rows = [(name, words.number(model.parameter(name))) for name in model.parameters]
-    return table(("parameter", "value"), rows, (1,))
+def elements_table(model: LumpedSystem, *, si: bool) -> Table | None:
+    """The numbers of a system's elements. si : whether they are SI values."""
+    return table(("symbol", "value", "what it is"), element_rows(model, si=si), (1,))
 
 
 def bom_table(bom: Sequence[Mapping[str, str]]) -> Table | None:

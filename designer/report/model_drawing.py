@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 
-from designer.base.figure_style import CONTACT, INK, MUTED, new_figure, styled
+from designer.base.figure_style import INK, MUTED, styled
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.si_units import MECHANICAL_UNITS
 from designer.report import words
+from designer.report.mechanical_symbols import MechanicalSheet
 
 _SUBSCRIPTS = str.maketrans("012", "₀₁₂")
 
 WIDTH, HEIGHT = 18.5, 7.0
 """Of the drawing, in its own units."""
-INCH = 0.4
-"""Of one such unit."""
 _GROUND = (0.6, 0.6, 4.0)
 """Abscissa of the wall at the left, and the ordinates of its ends."""
 _M2, _M1 = (5.0, 7.4), (11.8, 14.2)
@@ -26,7 +23,6 @@ _BOTTOM, _TOP = 0.8, 3.6
 _SPRING, _DAMPER, _FORCE, _STOP = 3.0, 1.4, 1.95, 5.1
 """Ordinates of springs, dampers, forces and stops."""
 _GAP, _STOP_LENGTH = 1.3, 3.1
-_SIZE = 8.5
 
 
 @styled
@@ -41,14 +37,9 @@ def model_drawing(model: Dimensionless | Mechanical | None = None) -> Figure:
     return page.figure
 
 
-class _Page:
+class _Page(MechanicalSheet):
     def __init__(self, model: Dimensionless | Mechanical | None) -> None:
-        self.figure = new_figure(WIDTH * INCH, HEIGHT * INCH)
-        self.figure.set_layout_engine("none")
-        self.axes: Axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        self.axes.set_axis_off()
-        self.axes.set_xlim(0.0, WIDTH)
-        self.axes.set_ylim(0.0, HEIGHT)
+        super().__init__(WIDTH, HEIGHT)
         self.plain = isinstance(model, Dimensionless)
         self.units = isinstance(model, Mechanical)
         if isinstance(model, Dimensionless):
@@ -92,8 +83,7 @@ class _Page:
     def mass(self, name: str, sides: tuple[float, float], number: str) -> None:
         left, right = sides
         middle = 0.5 * (left + right)
-        box = Rectangle((left, _BOTTOM), right - left, _TOP - _BOTTOM, fc=CONTACT, ec=INK, lw=1.2)
-        self.axes.add_patch(box)
+        self.box(left, right, _BOTTOM, _TOP)
         self.text(middle, 2.2, self.label(name, "\n"), size=9.5, va="center")
         self.line([middle, middle], [_BOTTOM, 0.25], MUTED, 0.8)
         self.arrow(middle, middle + 0.9, 0.4)
@@ -135,52 +125,3 @@ class _Page:
         )  # fmt: skip
         side = 1.0 if align == "left" else -1.0
         self.text(x0 + 0.15 * side, height + 0.25, text, align)
-
-    def spring(self, x0: float, x1: float, y: float) -> None:
-        turns, lead = 6, 0.18 * (x1 - x0)
-        step = (x1 - x0 - 2.0 * lead) / (2 * turns)
-        xs = [x0, x0 + lead]
-        ys = [y, y]
-        for i in range(2 * turns):
-            xs.append(x0 + lead + (i + 0.5) * step)
-            ys.append(y + (0.28 if i % 2 == 0 else -0.28))
-        self.line([*xs, x1 - lead, x1], [*ys, y, y], INK, 1.2)
-
-    def damper(self, x0: float, x1: float, y: float) -> None:
-        middle, half = 0.5 * (x0 + x1), 0.7
-        self.line([x0, middle - half], [y, y], INK, 1.2)
-        self.line(
-            [middle + half, middle - half, middle - half, middle + half],
-            [y + 0.35, y + 0.35, y - 0.35, y - 0.35], INK, 1.2,
-        )  # fmt: skip
-        self.line([middle + 0.15, middle + 0.15], [y + 0.26, y - 0.26], INK, 1.8)
-        self.line([middle + 0.15, x1], [y, y], INK, 1.2)
-
-    def wall(self, x: float, low: float, high: float, side: int) -> None:
-        """Ground, hatched on the side away from the system."""
-        self.line([x, x], [low, high], INK, 1.2)
-        y = low + 0.25
-        while y <= high + 1e-9:
-            self.line([x, x + 0.25 * side], [y, y - 0.25], MUTED, 0.8)
-            y += 0.35
-
-    def arrow(self, x0: float, x1: float, y: float, colour: str = MUTED) -> None:
-        self.axes.annotate(
-            "", (x1, y), (x0, y),
-            arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.1, "shrinkA": 0,
-                        "shrinkB": 0},
-        )  # fmt: skip
-
-    def line(self, xs: list[float], ys: list[float], colour: str, width: float) -> None:
-        self.axes.plot(xs, ys, color=colour, lw=width, solid_joinstyle="round")
-
-    def text(
-        self,
-        x: float,
-        y: float,
-        text: str,
-        ha: str = "center",
-        va: str = "bottom",
-        size: float = _SIZE,
-    ) -> None:
-        self.axes.text(x, y, text, ha=ha, va=va, color=INK, size=size)

@@ -12,12 +12,14 @@ from designer.base.page import Gallery, Picture
 from designer.board import schematic_drawing
 from designer.check.checked_design import CheckedResponse, traces
 from designer.circuit.coefficients import EXACT
+from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical
 from designer.report import blame_plots, map_plots, orbit_plots, study_plots, words
 from designer.report.data import ReportData
 from designer.report.design_page import Pictures
 from designer.report.inline_svg import InlineSvg
 from designer.report.model_drawing import model_drawing
+from designer.report.system_drawing import system_drawing
 
 INTRO = (
     "Displacement x₁ and velocity x₁′ of mass 1, dimensionless, over one response; below, x₁ over "
@@ -53,6 +55,9 @@ def pictures(data: ReportData) -> Pictures:
     if isinstance(given, Dimensionless | Mechanical):
         drawing = element(model_drawing(given), _drawing_label(data))
         out["model"] = Picture(svg=drawing)
+    elif isinstance(given, LumpedSystem):
+        drawing = element(system_drawing(given, si=data.si is not None), _drawing_label(data))
+        out["model"] = Picture(svg=drawing)
     if data.checked:
         out["portraits"] = _portraits(data, element)
         out |= _study_pictures(data, element)
@@ -79,7 +84,8 @@ def _drawing_label(data: ReportData) -> str:
     """The drawing of the model in words."""
     model = data.design.model
     if not isinstance(model, Dimensionless):
-        return "The model."
+        names = ", ".join(model.second_order().names)
+        return f"The model: the masses {names} with what joins them, and its clearances."
     stops = f"the {model.sides} side" if model.sides != "both" else "both sides"
     end = f" between stops on springs K0 at {stops}" if model.k0 else ", without stops"
     damper = " and damper C2" if model.c else ""
