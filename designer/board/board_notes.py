@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.board_parts import (
@@ -18,10 +20,9 @@ from designer.board.board_parts import (
 from designer.board.component import Component
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
-from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Connector, Trimmer
 from designer.circuit.netlist import Circuit, Section, nominal_board
-from designer.circuit.working_modes import at_rest
+from designer.circuit.reduction import Reduction
 from designer.model.board_table import BoardChoice
 
 PROBE = 100e-12
@@ -135,6 +136,16 @@ def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[
     return ["## Generator before supply", head, "\n".join(lines)]
 
 
+def _displacement(circuit: Circuit) -> tuple[str, str]:
+    """Nets of the displacement in the first clearance and of its stage's output; of a circuit
+    without a clearance the first mass's."""
+    if not circuit.stops:
+        return circuit.state_nets[0], circuit.state_nets[0]
+    stop = circuit.stops[0]
+    own = circuit.state_nets[circuit.states.index(stop.state)]
+    return (own if stop.difference is None else stop.difference[0]), stop.output
+
+
 def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
     trimmers = [p for p in circuit.fittings if isinstance(p, Trimmer)]
     if not trimmers:
@@ -150,13 +161,15 @@ def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
         else f"It is not fitted, and not on the bill: the generator's DC offset does the same. Fit "
         f"{name} and {series.name} where the generator has none."
     )
+    moving, output = _displacement(circuit)
+    several = f", clearance {circuit.stops[0].clearance}" if len(circuit.stops) > 1 else ""
     steps = [
         f"Turn {name} until its wiper, net `trim`, is at 0 V.",
-        "Start the board as the first line of `setup.csv` says. On the X-Y display, `v1` against "
-        "`fv`, read where `fv` leaves zero.",
-        "Switch the generator off, leave it connected, and wait until `v1` rests.",
-        f"Turn the scale of `v1` up ten times, and {name} until {_centred(circuit)}. If {name} "
-        "comes to its end first, leave it there.",
+        "Start the board as the first line of `setup.csv` says. On the X-Y display, "
+        f"`{moving}` against `{output}`{several}, read where `{output}` leaves zero.",
+        f"Switch the generator off, leave it connected, and wait until `{moving}` rests.",
+        f"Turn the scale of `{moving}` up ten times, and {name} until {_centred(circuit)}. If "
+        f"{name} comes to its end first, leave it there.",
         "This one setting is for all responses.",
     ]
     head = (
@@ -169,12 +182,16 @@ def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
 
 
 def _centred(circuit: Circuit) -> str:
-    """Where v1 is to rest."""
-    rest, stops = at_rest(Boards.of(circuit, [nominal_board(circuit)]))
-    if len(stops) == 2:
-        return "`v1` rests in the middle of the two voltages"
-    away = [f"{_q(abs(float(rest[0] - v[0])), 'V', 4)} from that voltage" for v in stops.values()]
-    return f"`v1` rests {away[0] if away else 'at ' + _q(float(rest[0]), 'V', 3)}"
+    """Where the displacement in the first clearance is to rest."""
+    moving, _ = _displacement(circuit)
+    system = Reduction(circuit, nominal_board(circuit)).system()
+    mode = system.mode(circuit.rest)
+    still = np.concatenate([np.linalg.solve(mode.A, -mode.d), [0.0, 1.0]])
+    past = [float(row @ still) for row in system.contact_rows(0).values()] if circuit.stops else []
+    if len(past) == 2:
+        return f"`{moving}` rests in the middle of the two voltages"
+    away = [f"{_q(abs(volts), 'V', 4)} from that voltage" for volts in past]
+    return f"`{moving}` rests {away[0] if away else 'at ' + _q(float(still[0]), 'V', 3)}"
 
 
 def _spare(circuit: Circuit) -> list[str]:

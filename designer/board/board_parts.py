@@ -105,6 +105,13 @@ def board_circuit(made: Designed) -> tuple[Circuit, BoardChoice]:
     return fitted(made.design.circuit, choice, made.catalog), choice
 
 
+def shown(circuit: Circuit) -> tuple[str, ...]:
+    """The nets with a probe: the circuit's outputs, and the displacement in each clearance between
+    two masses."""
+    between = [stop.difference[0] for stop in circuit.stops if stop.difference is not None]
+    return (*circuit.outputs, *between)
+
+
 def driven_nodes(circuit: Circuit) -> dict[str, tuple[Resistor, ...]]:
     """The summing nodes that the generator drives, each with the resistors of its path."""
     driven: dict[str, tuple[Resistor, ...]] = {}
@@ -185,7 +192,7 @@ def _supply(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
 def _probes(circuit: Circuit, choice: BoardChoice) -> Iterator[Fitting]:
     """A resistor for each output, its pad behind it, and one connector for all."""
     behind = []
-    for i, net in enumerate(circuit.outputs, start=1):
+    for i, net in enumerate(shown(circuit), start=1):
         out = f"{net}_out"
         behind.append(out)
         value, role = choice.spec.probe_resistor, f"probe of {net}"
@@ -208,6 +215,16 @@ def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iter
             number += 1
 
 
+def _trimmed_node(circuit: Circuit) -> str | None:
+    """The driven summing node that the trim feeds: of the mass at the first clearance whose mass is
+    driven, else the first; None where nothing is driven."""
+    driven = driven_nodes(circuit)
+    plates = {c.name: set(c.nets) for c in circuit.capacitors}
+    velocities = [circuit.states[circuit.states.index(s.state) + 1] for s in circuit.stops]
+    nodes = [node for name in velocities for node in driven if node in plates[name]]
+    return next(iter([*nodes, *driven]), None)
+
+
 def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Fitting]:
     """A trimmer between the rails, and a resistor from its wiper into the driven summing node.
 
@@ -215,7 +232,7 @@ def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[F
     taken: ``trim_reach`` says how far it goes.
     """
     views = View.FITTED if choice.spec.dc_trim == "fitted" else View.BOARD
-    node = next(iter(driven_nodes(circuit)), None)
+    node = _trimmed_node(circuit)
     if node is None:
         return
     wanted = circuit.supply * drive_resistance(circuit, node) / choice.trim
@@ -228,5 +245,5 @@ def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[F
     value = float(max((v for v in sold if v <= wanted), default=sold[0]))
     role = "DC trim"
     yield Trimmer("RV901", NEGATIVE, "trim", POSITIVE, TRIMMER, role, views)
-    number = 901 + max(PROBES, len(circuit.outputs))
+    number = 901 + max(PROBES, len(shown(circuit)))
     yield Resistor(f"R{number}", "trim", node, value, role, views)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from designer.board.board_parts import shown
 from designer.board.component import Component
 from designer.board.footprints import FootprintShape, footprint
 from designer.circuit.netlist import GROUND, Circuit, Section
@@ -279,7 +280,7 @@ def _sides(
         drives = {
             net for p in (*circuit.parts, *circuit.fittings) if own & set(p.nets) for net in p.nets
         }
-        out = bool(drives & set(circuit.outputs))
+        out = bool(drives & set(shown(circuit)))
         (outgoing if out else incoming).append(spot)
     return incoming, outgoing
 

@@ -15,6 +15,7 @@ from designer.circuit.netlist import Circuit, Excitation, Section, nominal_board
 from designer.model.board_table import BoardChoice
 from designer.spice.deck import SolverSettings, write
 from tests.circuit.test_reduction import EXACT
+from tests.shared.chains import EVERYTHING, PRELOADED, chain, chain_circuit
 from tests.shared.stages import CATALOG, bought, one_sided, rectifier, stage
 
 CHOICE = BoardChoice()
@@ -32,6 +33,8 @@ def circuits() -> dict[str, Circuit]:
         "composites": stage("saturation", "both", bought(composite), {"R50": "series"}),
         "duals": stage("rectifier", "lower", bought(rectifier(5.0)), opamp="TL072C"),
         "singles": stage("saturation", "both", bought(EXACT), opamp="TL071C"),
+        "one mass": chain_circuit(chain(1, PRELOADED), "rectifier"),
+        "four masses": chain_circuit(chain(4, *EVERYTHING), "rectifier"),
     }
 
 

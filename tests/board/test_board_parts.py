@@ -19,6 +19,7 @@ from designer.board.board_parts import (
     fault_current,
     fitted,
     protection_offset,
+    shown,
     trim_reach,
 )
 from designer.board.component import Component, components, joined
@@ -134,10 +135,10 @@ def test_outputs_are_shown_through_a_resistor_and_summing_nodes_are_not(circuit:
     board = fitted(circuit, CHOICE, CATALOG)
     nets = joined(components(board, CATALOG, CHOICE))
     nodes = {s.inverting for s in circuit.sections}
-    shown = {p.net for p in of(board, TestPoint)}  # type: ignore[union-attr]
-    assert not shown & nodes
-    assert shown == {f"{net}_out" for net in circuit.outputs} | {GROUND}
-    for net in circuit.outputs:
+    probed = {p.net for p in of(board, TestPoint)}  # type: ignore[union-attr]
+    assert not probed & nodes
+    assert probed == {f"{net}_out" for net in shown(circuit)} | {GROUND}
+    for net in shown(circuit):
         references = {reference for reference, _ in nets[f"{net}_out"]}
         assert len([r for r in references if r.startswith("R")]) == 1
         assert "J3" in references

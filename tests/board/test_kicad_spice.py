@@ -18,10 +18,14 @@ from designer.dynamics.attractors import settle
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.mechanics import Sides
-from designer.spice import numerics_gate
+from designer.spice import deck, numerics_gate
+from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
+from designer.spice.worker import open_simulator
 from tests.board.test_kicad_cli import same, spice
+from tests.shared.chains import TWO_GAPS, chain, chain_circuit
+from tests.shared.exact_circuits import Scale, exact_values
 from tests.shared.kicad_cases import project, written
 from tests.shared.stages import bought, model, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
@@ -87,3 +91,27 @@ def test_kicads_own_deck_shows_the_same_responses(name: str, tmp_path: Path) -> 
         assert isinstance(theirs, Read), theirs
         assert theirs.orbit.response == ours.orbit.response == each.orbit.response
         same(ours.orbit, theirs.orbit)
+
+
+def test_kicads_deck_of_a_chain_shows_the_same_waves(tmp_path: Path) -> None:
+    """Three masses, a clearance to ground and one between masses: every state and both outputs of
+    the dead zones, from rest, in KiCad's netlist and in ours."""
+    mechanism = chain(3, *TWO_GAPS)
+    values = exact_values(mechanism.second_order(), Scale(1e-3, np.full(6, 1.5), 4.0))
+    circuit = chain_circuit(mechanism, "rectifier", values=bought(values))
+    omega, stop = 1.0, 40e-3
+    run = FirstRun(
+        Excitation(omega / (2e-3 * np.pi), 9.0), SolverSettings("trap", 5e-6), stop, np.zeros(6)
+    )
+    own = deck.write(
+        circuit, nominal_board(circuit), run.excitation, run.settings,
+        title="ours", stop_time=stop, initial=run.initial,
+    )  # fmt: skip
+    theirs = spice(written(files(replace(project(circuit), run=run)), tmp_path))
+    assert len(circuit.outputs) == 8
+    waves = [open_simulator("batch").run(text, circuit.outputs, stop) for text in (own, theirs)]
+    steps = np.linspace(0.0, stop, 500)
+    for net in circuit.outputs:
+        ours, other = (np.interp(steps, w.axis, w.signals[net].real) for w in waves)
+        assert np.ptp(ours) > 0.1, f"{net} moves"
+        np.testing.assert_allclose(ours, other, atol=2e-3 * float(np.ptp(ours)))

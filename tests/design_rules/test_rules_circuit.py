@@ -25,7 +25,7 @@ from designer.synthesis import output_loads
 from designer.synthesis.output_loads import Run
 from tests.circuit.test_reduction import EXACT, circuit_of
 from tests.shared import rule_cases
-from tests.shared.chains import chain, chain_circuit, chain_text, table
+from tests.shared.chains import TWO_GAPS, chain, chain_circuit, chain_text
 from tests.shared.exact_circuits import Scale, exact_values
 from tests.shared.oracles import linear_matrix
 from tests.shared.rule_cases import PAIRS, TEXT, base, subject_of, with_circuit, with_part
@@ -246,11 +246,6 @@ def shift(subject: RuleSubject, clearance: int = 0, **board: dict[str, float]) -
     return float(-0.5 * (side[0] * distances[0] + side[1] * distances[1]))
 
 
-GAP = {"upper": 0.5, "lower": 0.5, "stiffness": 5.0}
-TWO_GAPS = (
-    table("clearance", name="A", between=("m1", "ground"), **GAP),
-    table("clearance", name="B", between=("m2", "m3"), **GAP),
-)
 STATIC = ("feedback", "offset-force", "bias-force", "leakage-force", "absorption-force")
 
 

@@ -64,3 +64,20 @@ def chain_circuit(
         saturation=SATURATION,
         stage=dead_zone_stage(model, CircuitSpec(dead_zone=kind), CATALOG),
     )
+
+
+EVEN = {"upper": 0.5, "lower": 0.5, "stiffness": 5.0}
+TWO_GAPS = (
+    table("clearance", name="A", between=("m1", "ground"), **EVEN),
+    table("clearance", name="B", between=("m2", "m3"), **EVEN),
+)
+"""A clearance to ground and one between two masses, for chains of three masses or more."""
+PRELOADED = table("clearance", name="A", between=("m1", "ground"), upper=-0.1, stiffness=4.0)
+"""One stop, in contact at rest."""
+EVERYTHING = (
+    *TWO_GAPS,
+    table("clearance", name="C", between=("m4", "ground"), lower=0.3, stiffness=3.0),
+    table("force", on="m1", amplitude=1.0, constant=0.2),
+    table("force", on="m3", amplitude=-0.5),
+)
+"""Three clearances of a chain of four masses, a constant force, forces in phase and antiphase."""
