@@ -54,7 +54,7 @@ Show = Callable[[ModelFile], list[Evidence]]
 
 def figure_block(name: str, caption: str) -> Picture:
     """The place of a figure in the page."""
-    return Picture(caption, caption, f"{name}.png")
+    return Picture(name, caption, f"{name}.png")
 
 
 def comparison_table(comparisons: Sequence[Comparison], digits: int = 8) -> Table | None:
