@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from designer.base.plain_json import FORMAT
+from designer.base.plain_json import FORMAT, plain
 
 if TYPE_CHECKING:  # the engines are not needed to print a catalogue
     from designer.base.arrays import Array
@@ -43,7 +43,7 @@ def synthesis_json(
     return {
         "format": FORMAT,
         "title": modelfile.title,
-        "model": dict(design.model.__dict__),
+        "model": plain(design.model.as_dict()),
         "circuit": {
             "opamp": circuit.opamp,
             "gain": circuit.gain,
