@@ -44,11 +44,12 @@ UNITS = {
     "damping": "N s/m",
     "upper": "m",
     "lower": "m",
+    "preload": "N",
     "constant": "N",
 }
 """SI unit of each of these numbers; of an amplitude see ``LumpedSystem.units``."""
 
-_MAY_BE_ZERO = ("damping", "amplitude", "constant")
+_MAY_BE_ZERO = ("damping", "preload", "amplitude", "constant")
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,9 @@ def _of_gap(gap: Gap) -> Iterator[tuple[str, float, str, str]]:
     if gap.constant is not None and gap.depth is not None:
         yield f"{gap.name}.constant", gap.constant, "", f"of the Hertzian law {where}"
         yield f"{gap.name}.depth", gap.depth, "m", f"down to which the law holds {where}"
+    if gap.preload:
+        what = f"push of the stops where they are touched {where}"
+        yield f"{gap.name}.preload", gap.preload, "N", what
     if gap.damping:
         yield f"{gap.name}.damping", gap.damping, "N s/m", f"damping of the stops {where}"
 
@@ -187,10 +190,22 @@ def _law(model: LumpedSystem, gap: Gap, naming: Naming) -> str:
         for place, stiffness in stop.springs:
             shift = naming(f"{gap.name}.{end}", place)
             terms.append(f"{_times(naming(name, stiffness))}{bound}(u {sign} {shift}, 0)")
+        if stop.preload:
+            holds = f"(u {'>' if end == 'upper' else '<'} {_at(model, gap, end, naming)})"
+            push = _times(naming(f"{gap.name}.preload", stop.preload))
+            terms.append(f"{'' if end == 'upper' else '−'}{push or '1 '}{holds}")
     text = " + ".join(terms).replace("− −", "+ ").replace("+ −", "− ")
     if gap.damping:
         text += f", and {_times(naming(f'{gap.name}.damping', gap.damping))}u′ in contact"
     return f"{gap.name}(u) = {text}"
+
+
+def _at(model: LumpedSystem, gap: Gap, end: str, naming: Naming) -> str:
+    """The displacement at which a stop is touched."""
+    place = model.b * getattr(gap, end)
+    if end == "upper":
+        return naming(f"{gap.name}.{end}", place)
+    return f"−{naming(f'{gap.name}.{end}', place)}".replace("−−", "")
 
 
 def _times(value: str) -> str:

@@ -175,7 +175,9 @@ class _Page(MechanicalSheet):
         self.spring(plate, end, y)
         own = self.values.get(f"{gap.name}.{word}_stiffness")
         stiffness = own or self.values.get(f"{gap.name}.stiffness", "Hertz")
-        self.text(0.5 * (plate + end), y - 0.95, stiffness)
+        preload = self.values.get(f"{gap.name}.preload")
+        text = stiffness if preload is None else f"{stiffness}, preload {preload}"
+        self.text(0.5 * (plate + end), y - 0.95, text)
         place = self.values[f"{gap.name}.{word}"].replace("-", "−")
         self.text(plate, y + 0.5, place, "left" if side > 0 else "right")
         return side, end

@@ -134,10 +134,10 @@ def test_b_is_a_factor_on_gaps_and_constant_forces() -> None:
 
 def test_every_parameter_has_a_name_and_can_be_changed() -> None:
     model = read(HAMMER).model
-    assert set(model.parameters) == {
+    assert set(model.parameters) == {"b", *model.units} == {
         "b", "hammer.mass", "casing.mass", "hammer-casing.stiffness", "casing-ground.stiffness",
         "hammer-casing.damping", "casing-ground.damping", "A.upper", "A.lower", "A.stiffness",
-        "A.damping", "hammer.amplitude", "hammer.constant",
+        "A.damping", "A.preload", "hammer.amplitude", "hammer.constant",
     }  # fmt: skip
     for name in model.parameters:
         other = model.changed({name: 1.25 * model.parameter(name) + 1e-6})

@@ -19,6 +19,7 @@ from designer.base.errors import MISSING, InputError
 from designer.base.schema import FileTable, keys_of
 from designer.dynamics.counts import Counts
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
+from designer.model.lumped_elements import Damper, Force, Gap, Mass, MovingBase, Spring
 from designer.model.model import Dimensionless, Mechanical
 from designer.model.model_file import MAX_BYTES, ModelFile, parse_model_file, read_model_file
 from designer.model.response_table import Response, ResponseTable
@@ -616,3 +617,31 @@ def test_the_docs_name_every_key(name: str) -> None:
             assert float(default) == field.default, key
         elif isinstance(field.default, str):
             assert default == f'`"{field.default}"`', key
+
+
+def test_the_docs_name_every_key_of_an_element() -> None:
+    """Of format 2, by table, with the default of those that have one."""
+    section = DOCS.split("\n## Format 2", 1)[1].split("\n## ", 1)[0]
+    found: dict[str, dict[str, str]] = {}
+    table = ""
+    for line in section.splitlines():
+        match = re.fullmatch(r"\| (?:`\[+(\w+)\]+`)? ?\| (`.*?) \|.*\| (.*) \|", line)
+        if match is not None:
+            table = match[1] or table
+            keys = re.findall(r"`(\w+)`", match[2])
+            found.setdefault(table, {}).update(dict.fromkeys(keys, match[3]))
+    kinds: dict[str, type[FileTable]] = {
+        "mass": Mass, "spring": Spring, "damper": Damper, "clearance": Gap, "force": Force,
+        "base": MovingBase,
+    }  # fmt: skip
+    assert found.keys() == kinds.keys()
+    for table, kind in kinds.items():
+        assert found[table].keys() == keys_of(kind).keys()
+        for field in fields(kind):
+            if field.default is dataclasses.MISSING:
+                assert found[table][field.name] == "required"
+            elif isinstance(field.default, str | int | float):
+                shown = found[table][field.name].strip('`"')
+                assert shown == (
+                    field.default if isinstance(field.default, str) else f"{field.default:g}"
+                )

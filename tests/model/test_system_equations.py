@@ -26,6 +26,7 @@ FILES = {
     "moving base": CHAIN + SECOND + '[base]\namplitude = "0.3 mm"\n',
     "fixed stops, Hertz": CHAIN.replace('stiffness = "540 kN/m"', HERTZ)
     + '[base]\namplitude = "0.3 mm"\nstops = "fixed"\n',
+    "a push": CHAIN.replace('stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\npreload = "7 N"'),
     "ground first, damped": CHAIN.replace('["hammer", "ground"]', '["ground", "hammer"]').replace(
         'stiffness = "540 kN/m"', 'stiffness = "540 kN/m"\ndamping = 30.0'
     ),
