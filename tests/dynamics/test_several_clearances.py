@@ -65,16 +65,18 @@ def test_impacts_are_counted_for_each_clearance() -> None:
     assert orbit.impact_velocities == pytest.approx([e.velocity for e in entries], abs=1e-8)
 
 
-def test_the_monodromy_of_damped_contacts() -> None:
+@pytest.mark.parametrize("gap", [CHAIN.gaps[1], Gap(2, 1, upper=((0.1, 10.0),), preload=0.2)])
+def test_the_monodromy_of_contacts_that_begin_with_a_force(gap: Gap) -> None:
     """By central differences of the independent integrator. Without the jump of the tangent
-    vectors it would be off by what the damper takes at each contact."""
-    flow, orbit = settled(CHAIN)
+    vectors it would be off by what the damper, or the preload, does at each contact."""
+    system = replace(CHAIN, gaps=[CHAIN.gaps[0], gap])
+    flow, orbit = settled(system)
     assert not flow.system.continuous
     found = shoot(flow, orbit.start, orbit.n)
     assert found is not None
     h, columns = 1e-5, []
     for direction in np.eye(len(orbit.start))[:3]:
-        ends = [map_of(CHAIN, orbit.start + s * h * direction, orbit.n) for s in (1.0, -1.0)]
+        ends = [map_of(system, orbit.start + s * h * direction, orbit.n) for s in (1.0, -1.0)]
         columns.append((ends[0] - ends[1]) / (2.0 * h))
     wanted = np.stack(columns, axis=1)
     assert found[1][:, :3] == pytest.approx(wanted, abs=1e-6)
@@ -82,6 +84,21 @@ def test_the_monodromy_of_damped_contacts() -> None:
     off = smooth.run(orbit.start, orbit.n, tangent=np.eye(6)).tangent
     assert off is not None
     assert np.abs(off[:, :3] - wanted).max() > 1e-3
+
+
+def test_a_mass_that_rests_on_a_preloaded_stop() -> None:
+    """It rattles ever faster between pushing and not pushing: that ends with a status."""
+    rig = Mechanism(
+        masses=[1.0],
+        springs=[(0, GROUND, 1.0)],
+        dampers=[(0, GROUND, 0.2)],
+        forces=[0.3],
+        omega=0.9,
+        gaps=[Gap(0, upper=((0.1, 10.0),), preload=1.0)],
+        constants=[0.5],
+    )
+    orbit = settle(flow_of(rig), np.zeros(2))
+    assert (orbit.status, orbit.reason) == (OrbitStatus.NOT_SETTLED, "too many events")
 
 
 def test_the_exponent_of_damped_contacts_is_that_of_the_multipliers() -> None:
