@@ -12,6 +12,9 @@ from .board_parts_only import (
     TestPoint as TestPoint,
     Trimmer as Trimmer,
 )
+from .build import (
+    constant_resistor as constant_resistor,
+)
 from .coefficients import (
     EXACT as EXACT,
     CoefficientErrors as CoefficientErrors,
@@ -21,10 +24,12 @@ from .dead_zone_parts import (
     DeadZoneStage as DeadZoneStage,
     Kind as Kind,
     dead_zone_stage as dead_zone_stage,
+    half_parts as half_parts,
     idle_limits as idle_limits,
 )
 from .dead_zone_place import (
     OUTPUT as OUTPUT,
+    DeadZonePlace as DeadZonePlace,
 )
 from .dead_zone_reading import (
     CutShort as CutShort,
@@ -54,6 +59,7 @@ from .netlist import (
     Reference as Reference,
     Resistor as Resistor,
     Section as Section,
+    Stop as Stop,
     nominal_board as nominal_board,
 )
 from .nodal import (

@@ -23,8 +23,6 @@ from designer.model.mechanics import Clearance, MechanicalModel
 GENERATOR = Generator("VM1", "vg")
 INVERSE = f"{GENERATOR.net}n"
 """Net of the generator's negative, for forces in antiphase."""
-CONSTANT = 160
-"""Number of the resistor of a constant force on the first mass."""
 
 _PAPER_SECTIONS = {
     ("integrator", 0): "U1A",
@@ -133,6 +131,11 @@ def build(
     return packed(circuit, opamp)
 
 
+def constant_resistor(mass: int) -> str:
+    """Name of the resistor of the constant force on a mass."""
+    return f"R{160 + mass}"
+
+
 def _role(term: Term) -> str:
     """A term's role in words, for the bill of materials and the drawing."""
     kind, i, j = term.quantity
@@ -181,8 +184,7 @@ def _source(term: Term) -> str:
 def _constant(mass: int, sign: float, resistors: Resistors) -> list[Part]:
     """The resistor of a constant force, from the reference of this sign: integrators invert."""
     net, node = RAILS[1 if sign > 0.0 else -1], f"s{2 * mass + 2}"
-    name = f"R{CONSTANT + mass}"
-    return [*resistors(name, net, node, f"constant force on M{mass + 1}")]
+    return [*resistors(constant_resistor(mass), net, node, f"constant force on M{mass + 1}")]
 
 
 def _inverter(state: int, resistors: Resistors) -> list[Part]:

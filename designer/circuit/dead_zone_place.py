@@ -101,6 +101,6 @@ class DeadZonePlace:
             *resistors(self.part("R221"), second, node, role),
             *resistors(self.part("R222"), node, out, role),
             Section(self.section("U4B"), turned, GROUND, self.reaction, back),
-            *resistors(self.part("R223"), self.output, turned, back),
-            *resistors(self.part("R224"), turned, self.reaction, back),
+            *resistors(self.part("R224"), self.output, turned, back),
+            *resistors(self.part("R225"), turned, self.reaction, back),
         ]

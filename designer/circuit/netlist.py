@@ -8,7 +8,7 @@ has them, and the role they play: the term of Eq. (10) that they realise.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -341,6 +341,16 @@ class Circuit:
     def carrying(self, contact: Contact) -> tuple[int, ...]:
         """Position of each switch while this stop alone carries force."""
         return self._moved(self.open, dict([(contact.switch, contact.position), *contact.others]))
+
+    def in_contact(self, sides: Sequence[int]) -> tuple[int, ...]:
+        """Position of each switch while each stop carries force on this side, 1 or -1, or is open,
+        0."""
+        moved: dict[str, int] = {}
+        for stop, side in zip(self.stops, sides, strict=True):
+            if side:
+                contact = dict(stop.contacts)[side]
+                moved |= dict([(contact.switch, contact.position), *contact.others])
+        return self._moved(self.open, moved)
 
     def _moved(self, key: tuple[int, ...], moved: Mapping[str, int]) -> tuple[int, ...]:
         pairs = zip(self.switches, key, strict=True)

@@ -40,7 +40,7 @@ from designer.spice.deck import SolverSettings
 from designer.spice.numerics_gate import GateSubject
 from designer.spice.opamp_model import RUNGS as SPICE_RUNGS, Rung
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import Read, Reading, read
+from designer.spice.read_orbit import Read, Reading, clearance_rows, read
 from designer.spice.simulator import SimulationFailed, Waveforms
 
 Run = Read | SimulationFailed
@@ -212,16 +212,13 @@ def _runge_kutta(
     period = 2.0 * np.pi / r.omega
     time = np.arange(len(states)) * period / steps
     signals = dict(zip(system.states, states.T, strict=True)) | {"u": np.sin(r.omega * time)}
-    rows = system.contact_rows(0) if system.clearances else {}
     reading = Reading(
         period,
         0,
         system.states,
         np.zeros(system.size),
-        rows.get(1),
-        rows.get(-1),
+        clearance_rows(system),
         "u",
-        0,
         keep=True,
     )
     found = read(Waveforms(time, signals, "", 0.0), reading)

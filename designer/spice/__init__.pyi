@@ -45,6 +45,7 @@ from .read_orbit import (
     STROBE_TOLERANCE as STROBE_TOLERANCE,
     Read as Read,
     Reading as Reading,
+    clearance_rows as clearance_rows,
     read as read,
 )
 from .simulator import (

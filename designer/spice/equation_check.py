@@ -2,14 +2,14 @@
 
 The deck is the one that is simulated in time, but for the generator's line, the analysis, and
 op-amps without finite gain and bias, as the matching conditions and the coefficient errors assume.
-A constant force decides where the mass rests, so the clearance is open or closed without a change
-of the circuit:
+A constant force decides where the masses rest, so each clearance is open or closed without a change
+of the circuit (``static_rests``):
 
-- ``.ac`` from generator to v1 over a decade around resonance, the clearance open (no force) and
-  closed at each stop, against the model's transfer function at the design's scales;
-- ``.dc`` of the generator, slowly as it were: v1 and the nonlinear stage's output fv follow the
-  statics. Straight lines through the dead zone and each contact give slope, thresholds and what
-  slope is left, against Eq. (20).
+- ``.ac`` from generator to v1 over a decade around resonance, all clearances open and in each
+  contact, against the model's transfer function at the design's scales;
+- ``.dc`` of the generator, slowly as it were: the displacement in a clearance and its stage's
+  output fv follow the statics. Straight lines through the dead zone and each contact give slope,
+  thresholds and what slope is left, against Eq. (20).
 
 A response function may differ from the model's by what the coefficient errors explain, to first
 order in each, and by `FLOOR` beside it.
@@ -27,16 +27,17 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.circuit.design import Design
-from designer.circuit.netlist import Excitation, nominal_board
+from designer.circuit.netlist import Excitation, Stop, nominal_board
 from designer.circuit.noise_gains import conductance
 from designer.circuit.reduction import Reduction
-from designer.model.find_responses import ModelResponse, peaks
+from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import SecondOrderSystem
 from designer.spice import deck
 from designer.spice.convergence_aids import did_not_converge
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.spice.simulator import SimulationFailed, SpiceJob, Waveforms
+from designer.spice.static_rests import StaticRest, drive_of, static_rests
 
 Complex = NDArray[np.complex128]
 
@@ -44,16 +45,6 @@ FLOOR = 1e-3
 """What may differ beside the coefficient errors."""
 POINTS = 50
 """Points of an ``.ac`` analysis; a decade. Of each stretch of a ``.dc`` analysis likewise."""
-DEPTH = 0.5
-"""Penetration at the far end of a contact's line, over the clearance, where the responses go as
-deep; the near end lies at `NEAR` of that."""
-NEAR = 0.1
-INSIDE = 0.9
-"""Of the force that closes the clearance: how far the dead zone's line goes."""
-ROOM = 0.8
-"""Of the saturation: how far any state may be pushed by the constant force."""
-STAGE = "fv"
-"""Net of the nonlinear stage's output."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +75,9 @@ class EquationCheck:
     findings: tuple[EquationFinding, ...]
     """"transfer, open", "transfer, upper contact" … are the largest |H/H_model - 1| over the decade
     from ``low`` to ``high``; "slope …" |ln(realised/wanted)| of fv against v1 in contact;
-    "threshold …" |realised/wanted - 1|; "leftover slope" that of the dead zone in units of K1."""
+    "threshold …" |realised/wanted - 1|; "leftover slope" that of the dead zone in units of K1. Of
+    several clearances each is named. A contact in which no constant force of the drive holds the
+    masses has none."""
     low: float = field(default=float("nan"))
     """Lower end of the decade [Hz]."""
     high: float = field(default=float("nan"))
@@ -137,15 +130,6 @@ class EquationCheck:
         }
 
 
-@dataclass(frozen=True)
-class _Rest:
-    """Where the mass rests: contact 0, 1, -1 and the force [model] on the way there."""
-
-    contact: int
-    near: float
-    far: float
-
-
 def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> EquationCheck:
     """Compare the design's deck, in ngspice, with its model.
 
@@ -156,7 +140,7 @@ def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> Eq
     EnvironmentMissing : see `SpicePool.map`.
     """
     model = design.model.second_order()
-    rests = _rests(design, model, found)
+    rests = static_rests(design, model, found)
     centre = _resonance(model)
     low, high = (design.errors.scales.frequency(centre * 10.0**e) for e in (-0.5, 0.5))
     curve = rests if design.circuit.stops else ()
@@ -176,103 +160,74 @@ def check(design: Design, found: Sequence[ModelResponse], pool: SpicePool) -> Eq
     bare = jobs(nodeset=False)
     answers |= {again[k]: answer for k, answer in pool.map(bare[i] for i in again)}
     findings = [_transfer(design, model, rest, answers[i]) for i, rest in enumerate(rests)]
-    lines = {rest.contact: answers[len(rests) + i] for i, rest in enumerate(curve)}
-    return EquationCheck((*findings, *(_curve(design, model, lines) if lines else ())), low, high)
+    sweeps = [(rest, answers[len(rests) + i]) for i, rest in enumerate(curve)]
+    return EquationCheck((*findings, *_curve(design, model, sweeps)), low, high)
 
 
-# ---------------------------------------------------------------------------------------------
-# What the model says
+def transfer(model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]) -> Complex:
+    """(k,) displacement of M1 per unit of drive at ``omega`` (k,), each clearance in contact with
+    this side or open (0)."""
+    return np.array([_impedance(model, w, sides)[1][0] for w in omega])
 
 
-def transfer(model: SecondOrderSystem, omega: Array, contact: int) -> Complex:
-    """(k,) displacement of M1 per unit of drive at ``omega`` (k,), resting in this contact."""
-    return np.array([_impedance(model, w, contact)[1][0] for w in omega])
-
-
-def explained(model: SecondOrderSystem, omega: Array, contact: int) -> Array:
+def explained(model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]) -> Array:
     """(k,) largest |dH/H| for a relative change of 1 in every coefficient of the equations.
 
     Each term of the impedance Z counts with |L_i Z_ij R_j/H|, where H = R_1, R = Z⁻¹ force and L
-    is the first row of Z⁻¹; K1 twice, since the dead zone's leftover slope is measured in it, and
-    damping twice, since a displacement's integrator has an error of its own: with v = x'/κ the
-    equation is x''/κ + d v + … = force.
+    is the first row of Z⁻¹; the springs on the mass of each clearance twice, since the dead zone's
+    leftover slope is measured in them, and damping twice, since a displacement's integrator has an
+    error of its own: with v = x'/κ the equation is x''/κ + d v + … = force.
     """
     out = np.zeros(len(omega))
+    rows = [(model.displacement(c), c.mass) for c in model.clearances]
+    rows = rows or [(np.eye(model.size)[0], 0)]
     for k, w in enumerate(omega):
-        terms, right = _impedance(model, w, contact)
+        terms, right = _impedance(model, w, sides)
         left = np.linalg.inv(sum(terms))[0]
         size = sum(float((np.abs(left)[:, None] * np.abs(t) * np.abs(right)).sum()) for t in terms)
-        size += abs(left[0] * model.stiffness[0, 1] * right[0])
+        for row, mass in rows:
+            size += abs((left @ row) * model.stiffness[mass, mass] * (row @ right))
         size += float((np.abs(left)[:, None] * np.abs(terms[1]) * np.abs(right)).sum())
         out[k] = size / abs(right[0])
     return out
 
 
-def _drive_error(design: Design, model: SecondOrderSystem, omega: Array, contact: int) -> Array:
-    """(k,) |dH/H| that the drive explains: R6 and R12 share the force in a ratio of their own,
-    which is no coefficient of the equations and not in their error."""
-    wanted = model.force
+def _drive_error(
+    design: Design, model: SecondOrderSystem, omega: Array, sides: tuple[int, ...]
+) -> Array:
+    """(k,) |dH/H| that the drive explains: the driven masses share the force in a ratio of their
+    own, which is no coefficient of the equations and not in their error."""
+    wanted = drive_of(model)
     error = np.abs(np.where(wanted, design.errors.drive_gain * design.amplitude() - wanted, 0.0))
     out = np.zeros(len(omega))
     for k, w in enumerate(omega):
-        terms, right = _impedance(model, w, contact)
+        terms, right = _impedance(model, w, sides)
         out[k] = float(np.abs(np.linalg.inv(sum(terms))[0]) @ error) / abs(right[0])
     return out
 
 
 def _impedance(
-    model: SecondOrderSystem, omega: float, contact: int
+    model: SecondOrderSystem, omega: float, sides: tuple[int, ...]
 ) -> tuple[list[Complex], Complex]:
-    """Terms of Z = -ω²M + iωC + K + contact, and the displacements Z⁻¹ force."""
+    """Terms of Z = -ω²M + iωC + K + contacts, and the displacements Z⁻¹ force."""
     terms = [
         -(omega**2) * np.diag(model.mass).astype(complex),
         1j * omega * model.damping.astype(complex),
         model.stiffness.astype(complex),
     ]
-    if contact:
-        stop = model.clearances[0]
-        spring = np.zeros_like(terms[0])
-        spring[stop.mass, stop.mass] = stop.first.stiffness
-        terms.append(spring)
-    return terms, np.linalg.solve(sum(terms), model.force.astype(complex))
+    for stop, side in zip(model.clearances, sides, strict=True):
+        if side:
+            row = model.displacement(stop)
+            stiffness = dict(stop.sides)[side].stiffness
+            terms.append((stiffness * np.outer(row, row)).astype(complex))
+    return terms, np.linalg.solve(sum(terms), drive_of(model).astype(complex))
 
 
 def _resonance(model: SecondOrderSystem) -> float:
-    """ω at which the open system's M1 moves most."""
-    omega = np.geomspace(1e-2, 1e2, 4001)
-    return float(omega[np.argmax(np.abs(transfer(model, omega, 0)))])
-
-
-def _rests(
-    design: Design, model: SecondOrderSystem, found: Sequence[ModelResponse]
-) -> tuple[_Rest, ...]:
-    """The dead zone and each contact, with constant forces that hold the mass there."""
-    if not design.circuit.stops:
-        return (_Rest(0, 0.0, 0.0),)
-    stop, side = model.clearances[0], model.clearances[0].first
-    volts, limit = design.errors.scales.volts, ROOM * design.circuit.saturation
-    closed = model.stiffness.copy()
-    closed[stop.mass, stop.mass] += side.stiffness
-    by_force = np.linalg.solve(closed, model.force)
-    by_stop = np.linalg.solve(closed, side.stiffness * side.gap * np.eye(model.size)[stop.mass])
-    reach = peaks(design.model, found).penetration
-    depth = min(DEPTH * side.gap, reach) if reach > 0.0 else NEAR * side.gap
-
-    def force(depth: float) -> float:
-        return float((side.gap + depth - by_stop[stop.mass]) / by_force[stop.mass])
-
-    def pushed(depth: float) -> float:
-        return float((np.abs(force(depth) * by_force + by_stop) * volts[0::2]).max())
-
-    if pushed(depth) > limit > pushed(0.0):
-        depth *= (limit - pushed(0.0)) / (pushed(depth) - pushed(0.0))
-    zone = INSIDE * abs(force(0.0))
-    contacts = [_Rest(s, s * force(NEAR * depth), s * force(depth)) for s in stop.positions]
-    return (_Rest(0, -zone, zone), *contacts)
-
-
-# ---------------------------------------------------------------------------------------------
-# What ngspice is asked
+    """ω at which the open system's M1 moves most, near the model's own frequency."""
+    omega = model.own_frequency * np.geomspace(1e-2, 1e2, 4001)
+    still = (0,) * len(model.clearances)
+    return float(omega[np.argmax(np.abs(transfer(model, omega, still)))])
 
 
 def _deck(
@@ -280,21 +235,21 @@ def _deck(
     source: str,
     analysis: str,
     generator: float,
-    contact: int,
+    sides: tuple[int, ...],
     *,
     nodeset: bool,
     turned: bool = False,
 ) -> str:
     """The deck that is simulated in time, with another generator line and analysis.
 
-    generator, contact : at the first operating point [V]. nodeset : ngspice looks for that point
+    generator [V], sides : at the first operating point. nodeset : ngspice looks for that point
     from where the reduction says it is. Neither from there nor from zero does it find every point.
     turned : the generator's poles are exchanged, so that its voltage counts negative.
     """
     circuit = design.circuit
     board = nominal_board(circuit, ideal=True)
     try:
-        known = rest(Reduction(circuit, board), generator, contact) if nodeset else []
+        known = rest(Reduction(circuit, board), generator, sides) if nodeset else []
     except ArithmeticError:  # a floating net: ngspice shall say it
         known = []
     resting = [".nodeset " + " ".join(f"v({n})={v!r}" for n, v in known)] if known else []
@@ -314,17 +269,18 @@ def _deck(
             line = f"{circuit.generator.name} {poles} {source}"
         elif word == ".tran":
             line = "\n".join([*resting, analysis])
+        elif word == ".save":
+            between = [stop.difference[0] for stop in circuit.stops if stop.difference is not None]
+            line = " ".join([line, *(f"v({net})" for net in between)])
         lines.append(line)
     return "\n".join(lines) + "\n"
 
 
-def rest(reduction: Reduction, generator: float, contact: int) -> list[tuple[str, float]]:
-    """Every net with its voltage [V] where the circuit rests, in this contact, at a constant
+def rest(reduction: Reduction, generator: float, sides: tuple[int, ...]) -> list[tuple[str, float]]:
+    """Every net with its voltage [V] where the circuit rests, in these contacts, at a constant
     generator voltage; exact, since a mode is linear."""
     circuit = reduction.circuit
-    key = circuit.rest
-    if contact:
-        key = circuit.carrying(dict(circuit.stops[0].contacts)[contact])
+    key = circuit.in_contact(sides)
     mode = reduction.system().mode(key)
     x = np.linalg.solve(mode.A, -(mode.B * generator + mode.d))
     voltage = reduction.solution(key).voltage
@@ -338,15 +294,15 @@ def _volts(design: Design, force: float) -> float:
 
 
 def _ac(
-    design: Design, resting: _Rest, low: float, high: float, *, nodeset: bool
+    design: Design, resting: StaticRest, low: float, high: float, *, nodeset: bool
 ) -> SpiceJob[Waveforms]:
-    held = 0.0 if resting.contact == 0 else _volts(design, 0.5 * (resting.near + resting.far))
+    held = _volts(design, 0.5 * (resting.near + resting.far))
     source, card = f"DC {held!r} AC 1", f".ac dec {POINTS} {low!r} {high!r}"
-    text = _deck(design, source, card, held, resting.contact, nodeset=nodeset)
+    text = _deck(design, source, card, held, resting.sides, nodeset=nodeset)
     return SpiceJob(text, (design.circuit.state_nets[0],), high * (1.0 - 1e-6), _whole, "ac")
 
 
-def _dc(design: Design, resting: _Rest, *, nodeset: bool) -> SpiceJob[Waveforms]:
+def _dc(design: Design, resting: StaticRest, *, nodeset: bool) -> SpiceJob[Waveforms]:
     """From the near end, where the stage carries least; upwards, as every sweep goes."""
     near, far = _volts(design, resting.near), _volts(design, resting.far)
     turned = far < near
@@ -354,8 +310,9 @@ def _dc(design: Design, resting: _Rest, *, nodeset: bool) -> SpiceJob[Waveforms]
     step = (last - first) / POINTS
     # Half a step more: the last point is not lost to rounding.
     card = f".dc {design.circuit.generator.name} {first!r} {last + 0.5 * step!r} {step!r}"
-    nets = (design.circuit.state_nets[0], STAGE)
-    text = _deck(design, "DC 0", card, near, resting.contact, nodeset=nodeset, turned=turned)
+    shown = [(_moving(design, stop), stop.output) for stop in design.circuit.stops]
+    nets = tuple(dict.fromkeys(net for pair in shown for net in pair))
+    text = _deck(design, "DC 0", card, near, resting.sides, nodeset=nodeset, turned=turned)
     return SpiceJob(text, nets, last - 0.01 * step, _whole, "dc")
 
 
@@ -367,72 +324,120 @@ def _whole(sweep: Waveforms) -> Waveforms:
     return sweep
 
 
-# ---------------------------------------------------------------------------------------------
-# What the two say of each other
-
-
 def _transfer(
-    design: Design, model: SecondOrderSystem, resting: _Rest, answer: Waveforms | SimulationFailed
+    design: Design,
+    model: SecondOrderSystem,
+    resting: StaticRest,
+    answer: Waveforms | SimulationFailed,
 ) -> EquationFinding:
-    name = f"transfer, {_place(resting.contact)}"
+    name = f"transfer, {resting.place(model)}"
     bound = FLOOR
     if isinstance(answer, SimulationFailed):
         return EquationFinding(name, float("nan"), bound, answer.reason)
-    scales = design.errors.scales
+    scales, sides = design.errors.scales, resting.sides
     omega = 2.0 * np.pi * answer.axis * scales.seconds
     unit = -scales.volts[0] / design.amplitude()
-    wanted = unit * transfer(model, omega, resting.contact)
+    wanted = unit * transfer(model, omega, sides)
     deviation = np.abs(answer.signals[design.circuit.state_nets[0]] / wanted - 1.0)
-    known = design.errors.max_error * explained(model, omega, resting.contact)
-    bounds = np.expm1(known + _drive_error(design, model, omega, resting.contact)) + FLOOR
+    known = design.errors.max_error * explained(model, omega, sides)
+    bounds = np.expm1(known + _drive_error(design, model, omega, sides)) + FLOOR
     worst = int(np.argmax(deviation / bounds))
     return EquationFinding(name, float(deviation[worst]), float(bounds[worst]))
 
 
 def _curve(
-    design: Design, model: SecondOrderSystem, answers: dict[int, Waveforms | SimulationFailed]
+    design: Design,
+    model: SecondOrderSystem,
+    sweeps: Sequence[tuple[StaticRest, Waveforms | SimulationFailed]],
 ) -> list[EquationFinding]:
     """Slope, threshold, leftover slope from straight lines through the stretches."""
     bound = design.errors.max_error + FLOOR
-    lines: dict[int, Array] = {}
-    findings = []
-    for contact, sweep in answers.items():
+    still: list[tuple[float, float]] = []
+    out: list[EquationFinding] = []
+    for resting, sweep in sweeps:
         if isinstance(sweep, SimulationFailed):
-            findings.append(
-                EquationFinding(f"curve, {_place(contact)}", float("nan"), bound, sweep.reason)
-            )
-            continue
-        v1, fv = (sweep.signals[n].real for n in (design.circuit.state_nets[0], STAGE))
-        lines[contact] = np.polyfit(v1, fv, 1)
-    if 0 not in lines:
-        return findings
-    wanted = _wanted_slope(design, model)
-    leftover, level = lines.pop(0)
-    for contact, (slope, offset) in lines.items():
-        place = _place(contact)
-        error = abs(np.log(slope / wanted)) if slope > 0.0 else np.inf
-        findings.append(EquationFinding(f"slope, {place}", float(error), bound))
-        threshold = contact * (level - offset) / (slope - leftover)
-        # Both stops need not lie at the same distance: an offset of the generator centres them.
-        stated = design.errors.scales.threshold_lower if contact < 0 else float("nan")
-        gap = model.clearances[0].first.gap * design.errors.scales.volts[0]
-        gap = stated if np.isfinite(stated) else gap
-        findings.append(
-            EquationFinding(f"threshold, {place}", float(abs(threshold / gap - 1.0)), bound)
-        )
-    share = float(abs(leftover / wanted) * model.relative_stiffness(model.clearances[0]))
-    return [*findings, EquationFinding("leftover slope", share, bound)]
+            name = f"curve, {resting.place(model)}"
+            out.append(EquationFinding(name, float("nan"), bound, sweep.reason))
+        elif resting.clearance is None:
+            still = [_line(design, stop, sweep) for stop in design.circuit.stops]
+        elif still:
+            out += _contact(design, model, resting, sweep, still[resting.clearance], bound)
+    for index, (leftover, _) in enumerate(still):
+        stop = model.clearances[index]
+        share = abs(leftover / _wanted_slope(design, model, index, stop.sides[0][0]))
+        name = "leftover slope" + ("" if len(still) == 1 else f" {stop.name}")
+        deviation = float(share * model.relative_stiffness(stop))
+        out.append(EquationFinding(name, deviation, bound))
+    return out
 
 
-def _wanted_slope(design: Design, model: SecondOrderSystem) -> float:
-    """fv per volt of v1 in contact: the model's stop at the design's scales, through R50."""
-    circuit, scales, stop = design.circuit, design.errors.scales, model.clearances[0]
+def _contact(
+    design: Design,
+    model: SecondOrderSystem,
+    resting: StaticRest,
+    sweep: Waveforms,
+    inside: tuple[float, float],
+    bound: float,
+) -> list[EquationFinding]:
+    """Slope and threshold of one contact. inside : the line through the dead zone."""
+    index, side = resting.clearance, resting.side
+    assert index is not None
+    leftover, level = inside
+    slope, offset = _line(design, design.circuit.stops[index], sweep)
+    wanted = _wanted_slope(design, model, index, side)
+    place = resting.place(model)
+    error = abs(np.log(slope / wanted)) if slope > 0.0 else np.inf
+    findings = [EquationFinding(f"slope, {place}", float(error), bound)]
+    clearance = model.clearances[index]
+    gap = dict(clearance.sides)[side].gap
+    if gap:
+        threshold = side * (level - offset) / (slope - leftover)
+        volts = gap * design.errors.scales.volts[2 * clearance.mass] * _gain(design, index)
+        # Both stops of an even clearance alone need not lie at the same distance: an offset of the
+        # generator centres them.
+        stated = design.errors.scales.threshold_lower if side < 0 else float("nan")
+        alone = len(model.clearances) == 1 and clearance.upper == clearance.lower
+        volts = stated if alone and np.isfinite(stated) else volts
+        deviation = float(abs(threshold / volts - 1.0))
+        findings.append(EquationFinding(f"threshold, {place}", deviation, bound))
+    return findings
+
+
+def _line(design: Design, stop: Stop, sweep: Waveforms) -> tuple[float, float]:
+    """Slope and level of a stage's output over the displacement in its clearance."""
+    sign = 1 if stop.difference is None else stop.difference[1]
+    moved = sign * sweep.signals[_moving(design, stop)].real
+    slope, level = np.polyfit(moved, sweep.signals[stop.output].real, 1)
+    return float(slope), float(level)
+
+
+def _moving(design: Design, stop: Stop) -> str:
+    """The net that carries the displacement in a clearance, or its negative."""
+    circuit = design.circuit
+    if stop.difference is not None:
+        return stop.difference[0]
+    return circuit.state_nets[circuit.states.index(stop.state)]
+
+
+def _gain(design: Design, index: int) -> float:
+    """Volts of the displacement in a clearance per volt of the first mass's."""
+    circuit = design.circuit
+    stop = circuit.stops[index]
+    if stop.difference is None:
+        return 1.0
+    net, sign = stop.difference
+    solved = Reduction(circuit, nominal_board(circuit, ideal=True)).solution(circuit.open)
+    return float(sign * solved.voltage[net][circuit.states.index(stop.state)])
+
+
+def _wanted_slope(design: Design, model: SecondOrderSystem, index: int, side: int) -> float:
+    """fv per volt of displacement in contact: the model's stop at the design's scales, through the
+    force resistor."""
+    circuit, scales, stop = design.circuit, design.errors.scales, model.clearances[index]
     velocity = 2 * stop.mass + 1
     capacitor = next(c for c in circuit.capacitors if c.name == circuit.states[velocity])
-    rate = stop.first.stiffness / model.mass[stop.mass] / scales.seconds
+    rate = dict(stop.sides)[side].stiffness / model.mass[stop.mass] / scales.seconds
     per_volt = scales.volts[velocity] / scales.volts[velocity - 1]
-    return float(rate * per_volt * capacitor.value / conductance(circuit, STAGE, capacitor.minus))
-
-
-def _place(contact: int) -> str:
-    return {0: "open", 1: "upper contact", -1: "lower contact"}[contact]
+    output = circuit.stops[index].output
+    force = conductance(circuit, output, capacitor.minus)
+    return float(rate * per_volt * capacitor.value / force) / _gain(design, index)

@@ -34,7 +34,7 @@ from designer.spice.convergence_aids import AidedRun, Remedy, Task
 from designer.spice.deck import SolverSettings
 from designer.spice.opamp_model import Rung, limit_into
 from designer.spice.pool import SpicePool
-from designer.spice.read_orbit import BRIEF, Read, Reading, read
+from designer.spice.read_orbit import BRIEF, Read, Reading, clearance_rows, read
 from designer.spice.simulator import SimulationFailed, SpiceJob
 
 STEPS_PER_PERIOD, STEPS_PER_CONTACT = 200, 20
@@ -191,16 +191,13 @@ def job(
     """
     stop = length(subject) * subject.period
     start = subject.orbit.start if subject.start is None else subject.start
-    upper, lower = contact_rows(_rung_reduction(subject).system())
     reading = Reading(
         period=subject.period,
         discard=0 if whole else subject.discard,
         nets=subject.circuit.state_nets,
         shift=subject.shift,
-        upper=upper,
-        lower=lower,
+        clearances=clearance_rows(_rung_reduction(subject).system()),
         generator=subject.circuit.generator.net,
-        moving=subject.system.moving,
         keep=keep,
         brief=subject.brief and not subject.orbit.n,
     )
@@ -252,12 +249,6 @@ def _rung_reduction(subject: GateSubject) -> Reduction:
     return Reduction(subject.circuit, replace(subject.board, rails=rails))
 
 
-def contact_rows(system: PiecewiseLinearSystem) -> tuple[Array | None, Array | None]:
-    """Rows over (states, generator, 1) of the displacement past the upper, the lower stop."""
-    rows = system.contact_rows(0)
-    return rows.get(1), rows.get(-1)
-
-
 def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Excitation) -> float:
     """Length [s] of the orbit's shortest contact; the period where there is none.
 
@@ -273,12 +264,16 @@ def shortest_contact(orbit: Orbit, system: PiecewiseLinearSystem, excitation: Ex
     swing = np.sin(2.0 * np.pi * np.arange(len(lap)) / WAVE_POINTS)
     u = excitation.offset - excitation.amplitude * swing
     shortest = period
-    for side, row in zip((1, -1), contact_rows(system), strict=True):
-        if row is None:
-            continue
+    stops = [
+        (k, side, row)
+        for k in range(len(system.clearances))
+        for side, row in sorted(system.contact_rows(k).items(), reverse=True)
+    ]
+    for k, side, row in stops:
         touching = lap @ row[:-2] + row[-2] * u + row[-1] > 0.0
         lengths = contact_lengths(touching)
-        entries = orbit.impact_times[orbit.impact_sides == side]
+        mine = (orbit.impact_sides == side) & (orbit.impact_clearances == k)
+        entries = orbit.impact_times[mine]
         # One further as well: rounding may put an entry on the wrong side of a point.
         after = (entries // apart).astype(int)[:, None] + [1, 2]
         met = touching[after % len(touching)].any(axis=1)

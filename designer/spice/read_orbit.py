@@ -10,10 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from designer.base.arrays import Array
 from designer.dynamics.counts import MAX_PERIOD
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.spice.simulator import Waveforms
 
 STROBE_TOLERANCE = 2e-3
@@ -23,6 +25,38 @@ BRIEF = 2 * MAX_PERIOD
 period: the shortest proof that there is none."""
 ENGINE_ERROR = 5e-4
 """Of the peak of the moving state: contacts shallower, misses nearer than this are undecided."""
+
+
+@dataclass(frozen=True)
+class ClearanceRows:
+    """How the motion in one clearance is read from the states and the generator."""
+
+    upper: Array | None
+    """(states + 2,) guard row over (states, generator, 1), positive in contact with the upper stop;
+    None where there is none."""
+    lower: Array | None
+    """The same of the lower stop."""
+    displacement: Array
+    """(states + 2,) row of the displacement in the clearance."""
+    velocity: Array
+    """(states,) row of the velocity in it; what the generator's rate adds is left out."""
+
+    @property
+    def stops(self) -> tuple[tuple[int, Array], ...]:
+        """The sides that have a stop, 1 upper and -1 lower, each with its row."""
+        pairs = ((1, self.upper), (-1, self.lower))
+        return tuple((side, row) for side, row in pairs if row is not None)
+
+
+def clearance_rows(system: PiecewiseLinearSystem) -> tuple[ClearanceRows, ...]:
+    """The rows of each clearance of a system, in their order."""
+    rows = [system.contact_rows(k) for k in range(len(system.clearances))]
+    return tuple(
+        ClearanceRows(row.get(1), row.get(-1), displacement, velocity[:-1])
+        for row, displacement, velocity in zip(
+            rows, system.displacement, system.velocity, strict=True
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -37,16 +71,10 @@ class Reading:
     """Nets that carry the states."""
     shift: Array
     """(states,) what their voltages are above the capacitors' (offsets)."""
-    upper: Array | None
-    """(states + 2,) guard row over (states, generator, 1), positive in contact with the upper stop;
-    None where there is none."""
-    lower: Array | None
-    """(states + 2,) guard row over (states, generator, 1), positive in contact with the lower stop;
-    None where there is none."""
+    clearances: tuple[ClearanceRows, ...]
+    """How the motion in each clearance is read."""
     generator: str
     """Net of the generator."""
-    moving: int
-    """Index of the state that moves in the clearance."""
     keep: bool = False
     """Whether to return a trace."""
     brief: bool = False
@@ -97,48 +125,99 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
     inside = (t >= first - slack) & (t <= marks[-1] + slack)
     u = waveforms.signals[reading.generator]
     u = np.interp(t, time, u)
-    sides, times, velocities = [], [], []
-    depth, miss, counts = np.inf, np.inf, {1: 0.0, -1: 0.0}
-    for side, row in ((1, reading.upper), (-1, reading.lower)):
-        if row is None:
-            continue
-        g = y[inside] @ row[:-2] + row[-2] * u[inside] + row[-1]
-        when, deep, near = _entries(t[inside], g)
-        counts[side] = len(when) / laps
-        depth, miss = min(depth, deep), min(miss, near)
-        end = first + n * reading.period
-        once = when[when < end]
-        times += list(once - first)
-        sides += [side] * len(once)
-        velocity = np.interp(once, t, y[:, reading.moving + 1]) if len(once) else np.zeros(0)
-        velocities += list(velocity)
-    order = np.argsort(times, kind="stable")
-    whole = all(abs(c - round(c)) < 1e-9 for c in counts.values())
-    floor = ENGINE_ERROR * peak[reading.moving]
+    impacts = _impacts(t, y, u, reading.clearances, inside, laps, first, n * reading.period)
     status, reason = OrbitStatus.PERIODIC, ""
-    if not whole:
-        status = OrbitStatus.GRAZING
-        reason = f"impacts a lap differ: {counts[1]:g} upper, {counts[-1]:g} lower"
-    elif min(depth, miss) < floor:
-        status = OrbitStatus.GRAZING
-        reason = f"a contact or miss of {min(depth, miss):.3g} V is below {floor:.3g} V"
+    doubt = next((each.doubt for each in impacts if each.doubt), "")
+    if doubt:
+        status, reason = OrbitStatus.GRAZING, doubt
+    times = np.concatenate([np.zeros(0), *(each.times for each in impacts)])
+    order = np.argsort(times, kind="stable")
+    which = [np.full(len(each.times), k) for k, each in enumerate(impacts)]
+    pairs = [each.pair for each in impacts] or [(0, 0)]
     orbit = Orbit(
         status=status,
         n=n,
-        p=round(counts[1]),
-        q=round(counts[-1]),
+        p=pairs[0][0],
+        q=pairs[0][1],
+        more=tuple(pairs[1:]),
         start=strobes[-1],
         extremes=np.stack([y[inside].min(axis=0), y[inside].max(axis=0)], axis=1),
-        impact_times=np.array(times)[order],
-        impact_velocities=np.array(velocities)[order],
-        impact_sides=np.array(sides, dtype=float)[order],
+        impact_times=times[order],
+        impact_velocities=_joined([each.velocities for each in impacts])[order],
+        impact_sides=_joined([each.sides for each in impacts])[order],
+        impact_clearances=_joined(which)[order].astype(np.int64),
         asymmetry=_asymmetry(t, y, marks[-1], n, reading.period, peak),
-        penetration=float(depth),
-        miss=float(miss),
+        penetration=min((each.depth for each in impacts), default=np.inf),
+        miss=min((each.miss for each in impacts), default=np.inf),
         reason=reason,
         periods=last,
     )
     return Read(orbit, strobes, _tail(t, y, marks, strobes, reading, n))
+
+
+@dataclass(frozen=True)
+class _Impacts:
+    """The impacts in one clearance over a lap, and what makes their count doubtful.
+
+    counts : a lap, by side. depth, miss : of the shallowest contact and the nearest miss.
+    """
+
+    counts: dict[int, float]
+    times: Array
+    sides: Array
+    velocities: Array
+    depth: float
+    miss: float
+    doubt: str
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        return round(self.counts[1]), round(self.counts[-1])
+
+
+def _impacts(
+    t: Array,
+    y: Array,
+    u: Array,
+    clearances: tuple[ClearanceRows, ...],
+    inside: NDArray[np.bool_],
+    laps: int,
+    first: float,
+    lap: float,
+) -> list[_Impacts]:
+    """The impacts in each clearance between times ``first`` and ``first`` + ``lap``."""
+    out = []
+    for rows in clearances:
+        counts, depth, miss = {1: 0.0, -1: 0.0}, np.inf, np.inf
+        times, sides, velocities = [], [], []
+        moving = y @ rows.velocity
+        for side, row in rows.stops:
+            g = y[inside] @ row[:-2] + row[-2] * u[inside] + row[-1]
+            when, deep, near = _entries(t[inside], g)
+            counts[side] = len(when) / laps
+            depth, miss = min(depth, deep), min(miss, near)
+            once = when[when < first + lap]
+            times.append(once - first)
+            sides.append(np.full(len(once), float(side)))
+            velocities.append(np.interp(once, t, moving) if len(once) else np.zeros(0))
+        moved = y @ rows.displacement[:-2] + rows.displacement[-2] * u + rows.displacement[-1]
+        floor = ENGINE_ERROR * max(float(np.abs(moved).max()), 1e-12)
+        found = _joined(times), _joined(sides), _joined(velocities), depth, miss
+        out.append(_Impacts(counts, *found, _doubt(counts, min(depth, miss), floor)))
+    return out
+
+
+def _joined(arrays: list[Array]) -> Array:
+    return np.concatenate([np.zeros(0), *arrays])
+
+
+def _doubt(counts: dict[int, float], nearest: float, floor: float) -> str:
+    """Why the impacts of a clearance are not sure; nothing where they are."""
+    if any(abs(c - round(c)) >= 1e-9 for c in counts.values()):
+        return f"impacts a lap differ: {counts[1]:g} upper, {counts[-1]:g} lower"
+    if nearest < floor:
+        return f"a contact or miss of {nearest:.3g} V is below {floor:.3g} V"
+    return ""
 
 
 def _period(strobes: Array, peak: Array) -> int:

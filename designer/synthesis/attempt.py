@@ -23,8 +23,9 @@ from designer.circuit.terms import entry_resistor
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
 from designer.model.mechanics import MechanicalModel
-from designer.synthesis import linear_search, size_dead_zone
-from designer.synthesis.dead_zone_target import DeadZone, target_of
+from designer.synthesis import all_stages, linear_search
+from designer.synthesis.all_stages import StageQuestion
+from designer.synthesis.dead_zone_target import DeadZone
 from designer.synthesis.equal_parts import equal_parts
 from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLimits
 from designer.synthesis.linear_terms import LinearBlock, Shortfall, Targets
@@ -217,13 +218,10 @@ def attempt(
     if isinstance(inverters, Shortfall):
         return inverters
     values |= inverters
-    dead_zone: DeadZone | None = None
-    if order.model.second_order().clearances:
-        sized = _dead_zone(order, limits, values)
-        if isinstance(sized, str):
-            return Shortfall(sized, True)
-        dead_zone = sized
-        values |= dead_zone.values
+    sized = all_stages.size(_question(order, limits), values)
+    if isinstance(sized, str):
+        return Shortfall(sized, True)
+    values |= sized.values if sized is not None else {}
     try:
         drive = _drive(order, limits, values, thrifty)
         if isinstance(drive, Shortfall):
@@ -233,30 +231,20 @@ def attempt(
         errors = order.errors(circuit, limits.swing)
     except CutShort:  # an output that is meant to be linear is not, within the clearance
         return Shortfall("swing", False)
-    return Attempt(values, circuit, errors, linear, dead_zone)
+    return Attempt(values, circuit, errors, linear, sized)
 
 
-def _dead_zone(
-    order: Order, limits: ConditionLimits, values: Mapping[str, float]
-) -> DeadZone | str:
-    """The stage beside this linear block, or the name of what leaves none."""
-    target = target_of(
-        order.model,
-        values,
-        order.stage,
-        limits,
-        order.peaks,
+def _question(order: Order, limits: ConditionLimits) -> StageQuestion:
+    return StageQuestion(
+        model=order.model,
+        stage=order.stage,
+        limits=limits,
+        peaks=order.peaks,
         saturation=order.saturation,
-        supply=order.spec.supply,
-    )
-    return size_dead_zone.size(
-        target,
-        order.resistors,
-        nearest(order.resistors, BASE),
-        frozenset(values.values()),
-        order.spec,
-        values,
-        order.resistor_prices,
+        spec=order.spec,
+        resistors=order.resistors,
+        base=nearest(order.resistors, BASE),
+        prices=order.resistor_prices,
     )
 
 

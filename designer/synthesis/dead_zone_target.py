@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from designer.catalog.diode_curve import diode_model
 from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
 from designer.circuit.scale_fit import minimax
-from designer.model.find_responses import Peaks
+from designer.model.find_responses import Peaks, Reach
 from designer.model.mechanics import MechanicalModel, Sides
 from designer.synthesis.limits import ConditionLimits, depth
 from designer.synthesis.linear_block import errors_of
@@ -140,20 +140,23 @@ def target_of(
     *,
     saturation: float,
     supply: float,
+    index: int = 0,
 ) -> DeadZoneTarget:
-    """What the stage has to do beside this linear block.
+    """What the stage of a clearance has to do beside this linear block.
 
-    values : of the linear block by part name. saturation, supply : ± [V].
+    values : of the linear block by part name. saturation, supply : ± [V]. index : of the clearance.
     """
     system = model.second_order()
-    stop = system.clearances[0]
+    stop = system.clearances[index]
     own, wanted = 2 * stop.mass, stop.first.stiffness / float(system.mass[stop.mass])
     targets, mu = Targets.of(model), system.relative_stiffness(stop)
     errors = errors_of(values, targets)
     relative = np.exp(errors.volts @ minimax(errors.offsets, errors.columns))
     relative = relative / relative[own]  # volts of each state over those of the stop's displacement
     top = limits.swing / float((peaks.states * relative).max())  # volts per unit of length
-    peak = float(peaks.states[own])
+    reach = peaks.reaches[index] if index < len(peaks.reaches) else Reach()
+    peak = float(peaks.states[own]) if stop.other is None else reach.peak
+    gap = abs(stop.first.gap)
     drop, reference, current = 0.0, 5.0, (0.0, float("inf"))
     if stage.diode is not None and stage.reference is not None:
         drop, reference = diode_model(stage.diode).drop, stage.reference.voltage
@@ -165,15 +168,15 @@ def target_of(
         mu=mu,
         slope=slope_interval(values, targets, wanted, stop.mass),
         saturation=saturation,
-        threshold=min(stop.first.gap * top, saturation / LEAST_GAIN),
+        threshold=min(gap * top, saturation / LEAST_GAIN),
         linear_gain=more * (limits.swing / (top * peak)),
-        output_gain=more * ((limits.swing - drop) / (top * depth(peaks, stop.mass))),
+        output_gain=more * ((limits.swing - drop) / (top * depth(reach, peak))),
         load=limits.load,
         noise_gain=limits.noise_gain,
         strict=bool(limits.conditions),
         kind=stage.kind,
         sides=stop.which,
-        excursion=(peaks.excursion or peak) / stop.first.gap,
+        excursion=(reach.excursion or peak) / (gap or peak),
         supply=supply,
         reference=reference,
         reference_current=current,

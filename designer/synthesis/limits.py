@@ -14,7 +14,7 @@ from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
 from designer.model.circuit_table import CircuitSpec
-from designer.model.find_responses import Peaks
+from designer.model.find_responses import Peaks, Reach
 from designer.synthesis.linear_terms import Bounds, Targets
 
 SWING_SHARE = 0.85
@@ -178,9 +178,11 @@ def guaranteed(figure: Figure) -> float:
 def output_gain(peaks: Peaks, mass: int = 0) -> float:
     """Largest slope of fv: the displacement of the stop's mass fills the swing, fv at the deepest
     penetration of a stop too."""
-    return float(peaks.states[2 * mass] / depth(peaks, mass))
+    peak = float(peaks.states[2 * mass])
+    return peak / depth(Reach(peaks.penetration), peak)
 
 
-def depth(peaks: Peaks, mass: int = 0) -> float:
-    """Deepest penetration of a stop, in model units; a stop that is hardly met counts a little."""
-    return max(peaks.penetration, 0.02 * float(peaks.states[2 * mass]))
+def depth(reach: Reach, peak: float) -> float:
+    """Deepest penetration of a stop, in model units; a stop that is hardly met counts a little of
+    the displacement's ``peak``."""
+    return max(reach.penetration, 0.02 * peak)

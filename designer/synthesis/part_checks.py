@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -18,14 +18,12 @@ from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import diode_model
 from designer.catalog.entries import DiodeEntry, Kind, OpAmp, ReferenceEntry
 from designer.circuit import build
-from designer.circuit.dead_zone_parts import dead_zone_stage
+from designer.circuit.dead_zone_parts import DeadZoneStage, dead_zone_stage
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import drive_resistor
 from designer.model.circuit_table import CircuitSpec
-from designer.model.mechanics import MechanicalModel
+from designer.model.mechanics import Clearance, MechanicalModel
 
-GENERATOR_INVERTER = ("R190", "R191")
-"""Resistors of the generator's inverter, for forces in antiphase."""
 _SECTION = re.compile("[A-OQ-Z]")
 """Names that sections may have: U1P is the supply of U1."""
 Refusal = InputError | None
@@ -40,12 +38,16 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
         circuit does not have, or a choice of the contract that this version does not build.
     Unreachable : no value of the series can be bought in the range.
     """
+    check_system(model, spec)
     opamp_of(spec, catalog)
     if spec.saturation is not None and not 0.0 < spec.saturation <= spec.supply:
         expected = f"above 0 and up to {spec.supply:g} V"
         raise InputError(None, "circuit.saturation", spec.saturation, expected)
-    if spec.dead_zone == "rectifier" and model.second_order().clearances:
+    system = model.second_order()
+    rectifies = spec.dead_zone == "rectifier" and bool(system.clearances)
+    if rectifies:
         diode_of(spec.diode, catalog)
+    if rectifies or system.constant.any():
         _reference_of(spec, catalog)
     if spec.objective != "match":
         raise InputError(
@@ -67,6 +69,62 @@ def check_choices(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) -
             near = nearest(values, value)
             expected = f"values of the series that can be bought in the range, such as {near:g}"
             raise InputError(None, "circuit.preferred", value, expected)
+
+
+def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
+    """Refuse what no circuit of ours can do, element by element.
+
+    Raises
+    ------
+    InputError : the first such element, why, and what would be near.
+    """
+    system = model.second_order()
+    for clearance in system.clearances:
+        if clearance.damping:
+            raise InputError(
+                None,
+                f"clearance {clearance.name}.damping",
+                clearance.damping,
+                "0 for a circuit: a force that jumps at the contact has no stage; the dissipation "
+                "of short contacts is near that of larger [[damper]] values",
+            )
+        if system.fixed_stops and system.base and clearance.other is None:
+            raise InputError(
+                None,
+                "base.stops",
+                "fixed",
+                '"base" for a circuit: a threshold cannot follow the ground, whose displacement is '
+                "no voltage",
+            )
+    if system.base and system.force.any():
+        raise InputError(
+            None,
+            "base.amplitude",
+            system.base,
+            "no base, or no force with an amplitude: one generator drives both, and their ratio "
+            "changes with the frequency",
+        )
+    _check_clearances(system.clearances, spec)
+
+
+def _check_clearances(clearances: Sequence[Clearance], spec: CircuitSpec) -> None:
+    """What the stage of this kind cannot make; names that nets cannot tell apart."""
+    stage = DeadZoneStage(spec.dead_zone)
+    for number, clearance in enumerate(clearances):
+        refusal = stage.refused(clearance)
+        if refusal is not None:
+            raise refusal
+        for other in clearances[:number]:
+            if other.name.lower() == clearance.name.lower():
+                expected = f"a name that differs from {other.name} in more than capitals"
+                raise InputError(None, "clearance.name", clearance.name, expected)
+    if len(clearances) > 1 and spec.dead_zone == "saturation":
+        raise InputError(
+            None,
+            "circuit.dead_zone",
+            '"saturation", with several clearances',
+            '"rectifier": the thresholds of amplifiers that clip do not keep a ratio',
+        )
 
 
 def buyable(kind: Kind, spec: CircuitSpec, catalog: Catalog) -> Array:
@@ -99,15 +157,16 @@ def unit_circuit(model: MechanicalModel, spec: CircuitSpec, catalog: Catalog) ->
     )
 
 
-def inverter_pair(state: int) -> tuple[str, str]:
-    """Names of the resistors of a state's inverter."""
-    return f"R{100 + 2 * state}", f"R{101 + 2 * state}"
-
-
 def inverter_resistors(circuit: Circuit) -> frozenset[str]:
-    """Resistors of the inverters, which only set a level: of the states', of the generator's."""
-    own = {name for state in range(len(circuit.states)) for name in inverter_pair(state)}
-    return frozenset((own | set(GENERATOR_INVERTER)) & set(circuit.values))
+    """Resistors of the inverters, which only set a level: the two of an amplifier that neither
+    integrates nor belongs to a dead zone."""
+    stored = {net for capacitor in circuit.capacitors for net in capacitor.nets}
+    out: set[str] = set()
+    for s in circuit.sections:
+        at = [r.name for r in circuit.resistors if s.inverting in r.nets]
+        if not s.limits and s.inverting not in stored and len(at) == 2:
+            out.update(at)
+    return frozenset(out)
 
 
 def drive_resistors(circuit: Circuit) -> tuple[str, ...]:

@@ -67,7 +67,7 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
             masses.append((small + 1, clearance.other))
             ratio = own / volts[2 * clearance.other]
             values |= {f"R{base + 20}": 20e3, f"R{base + 21}": 20e3 / ratio, f"R{base + 22}": 20e3}
-            values |= {f"R{base + 23}": 10e3, f"R{base + 24}": 10e3}
+            values |= {f"R{base + 24}": 10e3, f"R{base + 25}": 10e3}
         for number, mass in masses:
             rate = reference / system.mass[mass] * volts[2 * mass + 1] * ramp
             values[f"R{number}"] = gain * own / rate

@@ -100,7 +100,7 @@ def test_transfer_function_of_two_masses(contact: int) -> None:
     z12 = -(2 * d.zeta * s + 1)
     z22 = m2 * s**2 + 2 * d.zeta / (1 - d.c) * s + 1 / (1 - d.k)
     exact = (z22 * (1 - d.f20) - z12 * d.f20) / (z11 * z22 - z12**2)
-    np.testing.assert_allclose(transfer(d.second_order(), omega, contact), exact, rtol=1e-12)
+    np.testing.assert_allclose(transfer(d.second_order(), omega, (contact,)), exact, rtol=1e-12)
 
 
 def test_explained_is_the_sum_of_all_sensitivities() -> None:
@@ -108,12 +108,12 @@ def test_explained_is_the_sum_of_all_sensitivities() -> None:
     through an integrator whose error changes it once more."""
     model = Dimensionless(0.3, 0.4, 0.9, 0.2, 0.07, 0.25, 0.2).second_order()
     omega, step = np.array([0.3, 0.9, 2.0]), 1e-6
-    base = transfer(model, omega, 1)
+    base = transfer(model, omega, (1,))
     total = np.zeros(3)
 
     def add(changed: SecondOrderSystem) -> None:
         nonlocal total
-        total = total + np.abs(transfer(changed, omega, 1) / base - 1.0) / step
+        total = total + np.abs(transfer(changed, omega, (1,)) / base - 1.0) / step
 
     for i in range(2):
         mass = model.mass.copy()
@@ -133,7 +133,7 @@ def test_explained_is_the_sum_of_all_sensitivities() -> None:
     leftover = model.stiffness.copy()
     leftover[0, 0] += step
     add(replace(model, stiffness=leftover))
-    np.testing.assert_allclose(explained(model, omega, 1), total, rtol=1e-4)
+    np.testing.assert_allclose(explained(model, omega, (1,)), total, rtol=1e-4)
 
 
 # ---------------------------------------------------------------------------------------------

@@ -14,8 +14,17 @@ from designer.dynamics.attractors import coexisting, settle, starts
 from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Clearance, SecondOrderSystem, Side
 from designer.model.model import Dimensionless
-from designer.spice.read_orbit import BRIEF, ENGINE_ERROR, Read, Reading, read
+from designer.spice.read_orbit import (
+    BRIEF,
+    ENGINE_ERROR,
+    ClearanceRows,
+    Read,
+    Reading,
+    clearance_rows,
+    read,
+)
 from designer.spice.simulator import Waveforms
 
 NETS = ("v1", "v2", "v3", "v4")
@@ -29,7 +38,8 @@ def flow_at(omega: float, b: float = 0.25) -> Flow:
 def reading_of(omega: float, *, discard: int = 2, b: float = 0.25, keep: bool = False) -> Reading:
     upper = np.array([1.0, 0, 0, 0, 0, -b])
     lower = np.array([-1.0, 0, 0, 0, 0, -b])
-    return Reading(2 * np.pi / omega, discard, NETS, np.zeros(4), upper, lower, "vg", 0, keep)
+    rows = ClearanceRows(upper, lower, np.eye(6)[0], np.eye(4)[1])
+    return Reading(2 * np.pi / omega, discard, NETS, np.zeros(4), (rows,), "vg", keep)
 
 
 def waveforms(
@@ -193,7 +203,7 @@ def test_a_run_that_goes_on_past_the_last_strobe(beyond: float) -> None:
 def test_no_clearance_no_impacts() -> None:
     orbit, flow = orbit_at(0.85, 1), flow_at(0.85)
     reading = reading_of(0.85)
-    bare = Reading(reading.period, 2, NETS, np.zeros(4), None, None, "vg", 0)
+    bare = Reading(reading.period, 2, NETS, np.zeros(4), (), "vg")
     got = read(waveforms(flow, orbit.start, 10), bare).orbit
     assert got.response == "1-0-0"
 
@@ -201,7 +211,7 @@ def test_no_clearance_no_impacts() -> None:
 def test_one_sided_clearance() -> None:
     orbit, flow = orbit_at(0.85, 1), flow_at(0.85)
     full = reading_of(0.85)
-    only = Reading(full.period, 2, NETS, np.zeros(4), full.upper, None, "vg", 0)
+    only = replace(full, clearances=(replace(full.clearances[0], lower=None),))
     assert read(waveforms(flow, orbit.start, 10), only).orbit.response == "1-2-0"
 
 
@@ -216,3 +226,29 @@ def test_a_trace_is_kept_on_request_over_n_periods() -> None:
     assert states[0] == pytest.approx(flow.run(orbit.start, 11).strobes[-1], abs=1e-6)
     assert states.shape == (len(time), 4)
     assert read(waveforms(flow, orbit.start, 14), reading_of(1.55)).trace is None
+
+
+def test_impacts_are_counted_clearance_by_clearance() -> None:
+    """Two masses, one clearance to ground and one between them: the exact flow's own counts,
+    velocities and clearances."""
+    system = SecondOrderSystem(
+        mass=np.array([1.0, 1.0]),
+        damping=np.array([[0.3, -0.3], [-0.3, 0.7]]),
+        stiffness=np.array([[1.0, -1.0], [-1.0, 2.0]]),
+        force=np.array([1.0, 0.0]),
+        clearances=(
+            Clearance("A", 0, None, Side(0.5, 5.0), Side(0.6, 6.0)),
+            Clearance("B", 0, 1, Side(0.3, 4.0), None),
+        ),
+    ).piecewise_linear()
+    flow = Flow(system, Drive(1.3))
+    orbit = settle(flow, np.zeros(4))
+    assert orbit.status is OrbitStatus.PERIODIC
+    assert len(set(orbit.impact_clearances)) == 2
+    reading = Reading(flow.drive.period, 2, NETS, np.zeros(4), clearance_rows(system), "vg")
+    got = read(waveforms(flow, orbit.start, 4 + 6 * orbit.n), reading).orbit
+    assert got.response == orbit.response, got.reason
+    assert got.more == orbit.more
+    assert got.impact_clearances.tolist() == orbit.impact_clearances.tolist()
+    assert got.impact_sides == pytest.approx(orbit.impact_sides)
+    assert got.impact_velocities == pytest.approx(orbit.impact_velocities, abs=5e-3)

@@ -1,0 +1,193 @@
+"""Where constant forces of the drive hold the masses: all clearances open, or in each contact."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from designer.base.arrays import Array
+from designer.circuit.design import Design
+from designer.circuit.netlist import nominal_board
+from designer.circuit.reduction import Reduction
+from designer.model.find_responses import ModelResponse, Reach, peaks
+from designer.model.mechanics import SecondOrderSystem
+
+DEPTH = 0.5
+"""Penetration at the far end of a contact's line, over the clearance, where the responses go as
+deep; the near end lies at `NEAR` of that."""
+NEAR = 0.1
+INSIDE = 0.9
+"""Of the force that closes the clearance: how far the dead zone's line goes."""
+ROOM = 0.8
+"""Of the saturation: how far any state may be pushed by the constant force."""
+ROUNDS = 8
+"""How often the contacts of a rest are corrected before it counts as none."""
+
+
+@dataclass(frozen=True)
+class StaticRest:
+    """Where the masses rest over a stretch of constant forces."""
+
+    sides: tuple[int, ...]
+    """For each clearance the side that is in contact, 1 or -1, or 0."""
+    clearance: int | None
+    """Index of the clearance whose contact is looked at; None where all are open."""
+    near: float
+    """The least force, over the drive's amplitude."""
+    far: float
+    """The largest."""
+
+    @property
+    def side(self) -> int:
+        """The side of the contact that is looked at; 0 where all are open."""
+        return 0 if self.clearance is None else self.sides[self.clearance]
+
+    def place(self, model: SecondOrderSystem) -> str:
+        """In words: "open", "upper contact", of several clearances "upper contact A"."""
+        word = {0: "open", 1: "upper contact", -1: "lower contact"}[self.side]
+        if self.clearance is None or len(model.clearances) == 1:
+            return word
+        return f"{word} {model.clearances[self.clearance].name}"
+
+
+def drive_of(model: SecondOrderSystem) -> Array:
+    """(n,) forces of the drive at the model's own frequency, by which the generator is set."""
+    return model.drive_force(model.own_frequency)
+
+
+def static_rests(
+    design: Design, model: SecondOrderSystem, found: Sequence[ModelResponse]
+) -> tuple[StaticRest, ...]:
+    """The dead zone and each contact, with constant forces that hold the masses there. A contact
+    that no such force reaches, or a state that it would drive too far, is left out."""
+    if not design.circuit.stops:
+        return (StaticRest((), None, 0.0, 0.0),)
+    statics = _Statics(design, model, peaks(design.model, found).reaches)
+    still = statics.open()
+    contacts = [
+        statics.contact(k, side)
+        for k, clearance in enumerate(model.clearances)
+        for side in clearance.positions
+    ]
+    return tuple(rest for rest in (still, *contacts) if rest is not None)
+
+
+@dataclass(frozen=True)
+class _Statics:
+    """The statics of a model under multiples of its drive."""
+
+    design: Design
+    model: SecondOrderSystem
+    reaches: tuple[Reach, ...]
+
+    def displaced(self, sides: tuple[int, ...]) -> tuple[Array, Array]:
+        """(n,) displacements per unit of drive and without it, in these contacts."""
+        model = self.model
+        closed, push = model.stiffness.copy(), model.constant.copy()
+        for clearance, side in zip(model.clearances, sides, strict=True):
+            if side:
+                row, stop = model.displacement(clearance), dict(clearance.sides)[side]
+                closed += stop.stiffness * np.outer(row, row)
+                push = push + side * stop.stiffness * stop.gap * row
+        by_force = np.asarray(np.linalg.solve(closed, drive_of(model)))
+        return by_force, np.asarray(np.linalg.solve(closed, push))
+
+    def force(self, sides: tuple[int, ...], clearance: int, side: int, depth: float) -> float:
+        """The force at which a displacement is so far past a stop, in these contacts."""
+        row = self.model.displacement(self.model.clearances[clearance])
+        gap = dict(self.model.clearances[clearance].sides)[side].gap
+        by_force, without = self.displaced(sides)
+        return float((side * (gap + depth) - row @ without) / (row @ by_force))
+
+    def holds(self, sides: tuple[int, ...], force: float) -> tuple[int, ...]:
+        """The contacts that there are where these would put the masses."""
+        by_force, without = self.displaced(sides)
+        x = force * by_force + without
+        out = []
+        for clearance in self.model.clearances:
+            z = float(self.model.displacement(clearance) @ x)
+            met = [side for side, stop in clearance.sides if side * z > stop.gap]
+            out.append(met[0] if met else 0)
+        return tuple(out)
+
+    def clipped(self, sides: tuple[int, ...], force: float) -> bool:
+        """Whether an output would have to pass its limit."""
+        circuit, volts = self.design.circuit, -force * self.design.amplitude()
+        reduction = Reduction(circuit, nominal_board(circuit, ideal=True))
+        key = circuit.in_contact(sides)
+        try:
+            mode = reduction.system().mode(key)
+        except ArithmeticError:  # a floating net: ngspice shall say it
+            return False
+        x = np.linalg.solve(mode.A, -(mode.B * volts + mode.d))
+        known, voltage = np.concatenate([x, [volts, 1.0]]), reduction.solution(key).voltage
+        tops = [
+            abs(float(voltage[section.output] @ known))
+            for section, position in zip(circuit.sections, key, strict=False)
+            if not position
+        ]
+        return max(tops) > circuit.saturation
+
+    def open(self) -> StaticRest | None:
+        """All clearances open: up to near the force that closes the first one, either way."""
+        sides = (0,) * len(self.model.clearances)
+        ends = []
+        for k, clearance in enumerate(self.model.clearances):
+            row = self.model.displacement(clearance)
+            if row @ self.displaced(sides)[0] == 0.0:
+                continue
+            for side, _ in clearance.sides:
+                own = tuple(side * (j == k) for j in range(len(sides)))
+                turn = side * np.sign(row @ self.displaced(sides)[0])
+                ends.append((float(turn), self.force(own, k, side, 0.0)))
+        high = min((end for turn, end in ends if turn > 0.0), default=None)
+        low = max((end for turn, end in ends if turn < 0.0), default=None)
+        if low is None and high is None:
+            return None
+        if low is None:
+            low = -high if high > 0.0 else 2.0 * high  # type: ignore[operator]
+        if high is None:
+            high = -low if low < 0.0 else 2.0 * low
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        if half <= 0.0:
+            return None
+        return StaticRest(sides, None, middle - INSIDE * half, middle + INSIDE * half)
+
+    def contact(self, clearance: int, side: int) -> StaticRest | None:
+        """In contact with one stop, and with whichever others that takes."""
+        stop = dict(self.model.clearances[clearance].sides)[side]
+        size = abs(stop.gap) or max(reach.peak for reach in self.reaches)
+        reach = self.reaches[clearance].penetration
+        wanted = min(DEPTH * size, reach) if reach > 0.0 else NEAR * size
+        sides = tuple(side * (j == clearance) for j in range(len(self.model.clearances)))
+        for _ in range(ROUNDS):
+            row = self.model.displacement(self.model.clearances[clearance])
+            if row @ self.displaced(sides)[0] == 0.0:
+                return None
+            depth = self._held_back(sides, clearance, side, wanted)
+            near, far = (self.force(sides, clearance, side, d) for d in (NEAR * depth, depth))
+            ends = {self.holds(sides, near), self.holds(sides, far)}
+            if ends == {sides} and not self.clipped(sides, far):
+                return StaticRest(sides, clearance, near, far)
+            sides = self.holds(sides, far)
+            if sides[clearance] != side:
+                return None
+            if len(ends) > 1 or ends == {sides}:
+                wanted = 0.5 * depth  # on the way another contact changes, or an output clips
+        return None
+
+    def _held_back(self, sides: tuple[int, ...], clearance: int, side: int, depth: float) -> float:
+        """A depth at which no state is pushed past its room."""
+        volts = self.design.errors.scales.volts
+        limit = ROOM * self.design.circuit.saturation
+        by_force, without = self.displaced(sides)
+
+        def pushed(depth: float) -> float:
+            force = self.force(sides, clearance, side, depth)
+            return float((np.abs(force * by_force + without) * volts[0::2]).max())
+
+        if pushed(depth) > limit > pushed(0.0):
+            depth *= (limit - pushed(0.0)) / (pushed(depth) - pushed(0.0))
+        return depth

@@ -1,0 +1,105 @@
+"""Whole circuits of other systems than the paper's: chosen, reduced and run."""
+
+from __future__ import annotations
+
+import pytest
+
+from designer.base.errors import InputError
+from designer.catalog.catalog import load_catalog
+from designer.check.synthesis_result import synthesise
+from designer.circuit.nominal import nominal_reduction, on_circuit
+from designer.model.model_file import parse_model_file
+from designer.spice import equation_check
+from designer.spice.pool import SpicePool
+from designer.synthesis.part_checks import check_choices
+
+TWO = """\
+format = 2
+[[mass]]
+name = "one"
+mass = 1.0
+[[mass]]
+name = "two"
+mass = 1.0
+[[spring]]
+between = ["one", "two"]
+stiffness = 1.0
+[[spring]]
+between = ["two", "ground"]
+stiffness = 1.0
+[[damper]]
+between = ["one", "two"]
+damping = 0.3
+[[damper]]
+between = ["two", "ground"]
+damping = 0.4
+[[clearance]]
+name = "A"
+between = ["one", "ground"]
+upper = 0.5
+lower = 0.6
+upper_stiffness = 5.0
+lower_stiffness = 6.0
+[[clearance]]
+name = "B"
+between = ["one", "two"]
+upper = 0.3
+stiffness = 4.0
+[[force]]
+on = "one"
+amplitude = 1.0
+constant = -0.1
+[[response]]
+omega = 1.3
+[circuit]
+dead_zone = "rectifier"
+"""
+
+
+@pytest.mark.slow
+def test_two_unequal_clearances_one_between_masses_and_a_weight() -> None:
+    """The chosen parts follow the model: errors by the reduction, the orbit, and ngspice's own
+    transfer functions, slopes and thresholds in each contact that a constant force reaches."""
+    made = synthesise(parse_model_file(TWO))
+    design = made.design
+    assert design.errors.max_error < 5e-3
+    assert all(check.holds for check in design.checks)
+    assert {"gap A lower", "gap B upper", "constant x1", "stop slope B x2' x1"} <= set(
+        design.errors.errors
+    )
+    (response,) = made.found
+    orbit = on_circuit(nominal_reduction(design).system(), design, response)
+    assert orbit.counts == response.orbit.counts
+    with SpicePool(2) as pool:
+        check = equation_check.check(design, made.found, pool)
+    names = {finding.name for finding in check.findings}
+    assert {"transfer, open", "slope, upper contact A", "threshold, upper contact B"} <= names
+    assert check.passed, check.problem
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "text"),
+    [
+        (("stiffness = 4.0", "stiffness = 4.0\ndamping = 0.1"), "clearance B.damping", "damper"),
+        (("[[response]]", "[base]\namplitude = 0.1\n[[response]]"), "base.amplitude", "ratio"),
+        (('"rectifier"', '"saturation"'), "circuit.dead_zone", "unequal stops in clearance A"),
+        (("stiffness = 4.0", 'law = "hertz"\nconstant = 9.0\ndepth = 0.2'),
+         "clearance B", "one [[clearance]] for each step"),
+        (('name = "B"', 'name = "a"'), "clearance.name", "capitals"),
+    ],
+)  # fmt: skip
+def test_what_no_circuit_can_do_is_refused(change: tuple[str, str], field: str, text: str) -> None:
+    file = parse_model_file(TWO.replace(*change))
+    with pytest.raises(InputError) as caught:
+        check_choices(file.model, file.circuit, load_catalog())
+    assert caught.value.field == field
+    assert text in str(caught.value)
+
+
+def test_stops_that_stay_while_the_base_moves_are_refused() -> None:
+    base = '[base]\namplitude = 0.1\nstops = "fixed"\n[[response]]'
+    text = TWO.replace("amplitude = 1.0\nconstant", "constant").replace("[[response]]", base)
+    file = parse_model_file(text)
+    with pytest.raises(InputError, match="fixed") as caught:
+        check_choices(file.model, file.circuit, load_catalog())
+    assert caught.value.field == "base.stops"
