@@ -182,11 +182,13 @@ def linear_block(
     most_values: int | None = None,
     between: tuple[float, float] = (0.0, np.inf),
     level: float | None = None,
+    empty: float = 0.0,
 ) -> LinearBlock | Shortfall:
     """The linear block within these limits, or what leaves none.
 
     most_values : its share of the limit on distinct values. between : range of the resistor of
-    ``Order.stiffness`` [ohm]. level : the one level of error to search, if not all.
+    ``Order.stiffness`` [ohm]. level : the one level of error to search, if not all. empty : a level
+    at which wider limits leave nothing.
     """
     system = order.model.second_order()
     mu = max((system.relative_stiffness(stop) for stop in system.clearances), default=0.0)
@@ -200,6 +202,7 @@ def linear_block(
         replace(bounds, stop=max(bounds.stop, between[0]), stop_most=between[1]),
         replace(order.spec, most_values=most_values),
         level,
+        empty,
     )
 
 

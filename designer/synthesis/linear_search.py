@@ -53,16 +53,20 @@ def best(
     bounds: Bounds,
     spec: CircuitSpec = ANY,
     level: float | None = None,
+    empty: float = 0.0,
 ) -> LinearBlock | Shortfall:
     """The choice of least error, among those the fewest distinct values and the lowest price.
 
     resistors, capacitors : what can be bought [ohm], [F]. prices : (len(capacitors),) price class
     of each; resistors of a grade cost the same. spec : its matched, preferred, most_values and
     slack count. level : the one level of error that is searched; without it they grow until
-    something is found. A ``Shortfall`` names what leaves no choice: "distinct values", "matched
-    parts", "frequency", "signal level", "stop stiffness", "signal resistors" or "side conditions"
-    (together) if there is one without it, else "coefficients" or, where ratios can be met but no
-    level of them, "displacement integrators".
+    something is found. empty : a level at which wider conditions leave nothing, so that a tree of
+    choices may begin there.
+
+    A ``Shortfall`` names what leaves no choice: "distinct values", "matched parts", "frequency",
+    "signal level", "stop stiffness", "signal resistors" or "side conditions" (together) if there is
+    one without it, else "coefficients" or, where ratios can be met but no level of them,
+    "displacement integrators".
     """
     low, high = bounds.signal
     signal = np.sort(resistors[(resistors >= low) & (resistors <= high)])
@@ -74,7 +78,7 @@ def best(
     capacitors, prices = capacitors[order], prices[order]
     question = LinearQuestion(targets, signal, capacitors, prices, bounds, spec)
     if level is None:
-        found = _levels(question, MOST_STEPS)
+        found = _levels(question, MOST_STEPS, 0.0 if question.by_joins else empty)
     else:
         search = _search(question)
         found = search.level(max(level, search.first), MOST_STEPS)
@@ -116,11 +120,14 @@ def _linear_block(found: Levels, question: LinearQuestion) -> LinearBlock:
     )
 
 
-def _levels(question: LinearQuestion, patience: int, level: float = 0.0) -> Levels:
-    """Search level by level until something is found, the levels or the steps end."""
+def _levels(question: LinearQuestion, patience: int, empty: float = 0.0) -> Levels:
+    """Search level by level until something is found, the levels or the steps end.
+
+    empty : a level at which there is nothing.
+    """
     search = _search(question)
-    level = max(level, search.first)
-    found = Levels(np.inf, np.full(len(question.targets.parts), -1), 0.0, False, -1, 0, 0)
+    level = max(empty, search.first)
+    found = Levels(np.inf, np.full(len(question.targets.parts), -1), empty, False, -1, 0, 0)
     while True:
         level = min(level, LAST_LEVEL, found.error)
         at = search.level(level, patience - found.steps)

@@ -27,13 +27,15 @@ from designer.model.mechanics import MechanicalModel
 from designer.synthesis import composites, output_loads, side_conditions
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
-from designer.synthesis.linear_terms import LinearBlock, Shortfall
+from designer.synthesis.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.part_checks import check_choices
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
 BESIDE = 10
 """Linear blocks that are tried beside the first."""
+EMPTY = 1e-9
+"""Relative: so far below a bound there is no choice, where at the bound there may be one."""
 ASIDE = 1e-6
 """Relative: the ends of an interval of R4 leave out the value between."""
 FREES = {
@@ -141,9 +143,11 @@ class _Search:
         return answer.short if isinstance(answer, _Missed) else answer
 
     def binding(self, best: _Verified) -> dict[str, float]:
-        """max_error without each condition that costs some; nothing where the error is none."""
+        """max_error without each condition that costs some; nothing where the error is none, or
+        where a tree of choices was not searched to its end: its errors say nothing about costs."""
         error, conditions = best.design.errors.max_error, self.order.spec.kept
-        if error <= EXACT:
+        linear, joins = best.attempt.linear, Targets.of(self.order.model).fully_coupled_pair
+        if error <= EXACT or not (linear.proved or joins):
             return {}
 
         def without(names: frozenset[str]) -> float:
@@ -220,7 +224,7 @@ class _Search:
         if isinstance(widest, Shortfall):
             return _Missed(widest, False)
         for number in range(ROUNDS + 1):
-            made = self._within_most_values(within, widest if number == 0 else None)
+            made = self._within_most_values(within, widest, again=number > 0)
             if isinstance(made, Shortfall):
                 return _Missed(made, number > 0)
             design = self._verified(made, conditions)
@@ -235,19 +239,19 @@ class _Search:
         return _Missed(Shortfall(broken[0].name, False), True)
 
     def _within_most_values(
-        self, within: ConditionLimits, first: LinearBlock | None
+        self, within: ConditionLimits, widest: LinearBlock, *, again: bool
     ) -> Attempt | Shortfall:
         """An attempt that keeps the limit on distinct values, where there is one.
 
-        first : the linear block within these limits, where it is known. What is over the limit is
-        taken from the linear block's share, after a round in which whatever only sets a level does
-        with values that the linear block has.
+        widest : the linear block within limits at least as wide; within these themselves unless
+        ``again``. What is over the limit is taken from the linear block's share, after a round in
+        which whatever only sets a level does with values that the linear block has.
         """
-        spec = self.order.spec
+        spec, empty = self.order.spec, widest.bound * (1.0 - EMPTY)
         most, share = spec.most_values, spec.most_values
         for number in range(ROUNDS + 1):
-            known = first if number == 0 else None
-            linear = known or linear_block(self.order, within, most_values=share)
+            known = None if again or number > 0 else widest
+            linear = known or linear_block(self.order, within, most_values=share, empty=empty)
             if isinstance(linear, Shortfall):
                 return linear
             made = attempt(self.order, within, linear, thrifty=number > 0)

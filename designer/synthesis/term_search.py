@@ -32,6 +32,8 @@ from designer.synthesis.term_program import TermProgram
 
 CANDIDATE = 40
 """Steps of a search that one candidate of the compiled loops counts for."""
+FRESH = 2000
+"""Candidates that the linear program of one choice counts for."""
 ROOM = 64
 """Choices that the loops return at a time, at first."""
 TINY = 1e-9
@@ -66,6 +68,7 @@ class TermSearch:
                 if row.tobytes() in known:
                     continue
                 known.add(row.tobytes())
+                steps += FRESH
                 error = self.error(row)
                 if error < best and self._conditions.hold(self._offsets(row)):
                     best, parts = error, row
