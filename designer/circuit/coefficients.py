@@ -10,6 +10,7 @@ chose the parts (``circuit.dead_zone_reading``).
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +71,9 @@ class CoefficientErrors:
     """How circuit and model correspond, with the least ``max_error``."""
     drive_gain: Array
     """Model force per generator volt, for the driven masses (0 where not driven)."""
+    slopes: Array
+    """(errors, 1 + states) change of each error with the logarithms of the time scale and of each
+    state's volts."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +135,7 @@ def coefficient_errors(
         max_error=max(abs(e) for e in errors.values()),
         scales=scales,
         drive_gain=drive[1::2] * model.mass,
+        slopes=_scale_slopes(coefficients, errors, len(wanted)),
     )
 
 
@@ -206,13 +211,21 @@ def _least(coefficients: dict[str, _Coefficient], states: int) -> tuple[dict[str
     if not np.all(np.isfinite(h)):
         wrong = [name for name, c in coefficients.items() if not np.isfinite(c.log)]
         raise ArithmeticError(f"coefficients of the wrong sign: {', '.join(wrong)}")
-    D = np.zeros((len(coefficients), 1 + states))
-    for row, c in enumerate(coefficients.values()):
-        for place, weight in c.weights.items():
-            D[row, place] += weight
+    D = _scale_slopes(coefficients, coefficients, states)
     D = D[:, [0, *range(2, 1 + states)]]  # volts of x1 is the amplitude, which a gap sets
     free = minimax(h, D)
     return dict(zip(coefficients, (h + D @ free).tolist(), strict=True)), free
+
+
+def _scale_slopes(
+    coefficients: Mapping[str, _Coefficient], names: Collection[str], states: int
+) -> Array:
+    """(names, 1 + states) weights of the scales; 0 for what is no logarithm of a coefficient."""
+    D = np.zeros((len(names), 1 + states))
+    for row, name in enumerate(names):
+        for place, weight in coefficients[name].weights.items() if name in coefficients else ():
+            D[row, place] += weight
+    return D
 
 
 def _flatness(

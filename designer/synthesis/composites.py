@@ -155,18 +155,7 @@ def _without_scales(errors: CoefficientErrors) -> tuple[Array, Array]:
     """The errors (m,) with all scales taken out, and how they depend on the scales (m, n)."""
     volts = errors.scales.volts
     logs = np.log(np.concatenate([[errors.scales.seconds], volts]))
-    D = np.zeros((len(errors.errors), len(logs)))
-    for row, name in zip(D, errors.errors, strict=True):
-        equation, state = 1, 0
-        if name.startswith("dead-zone"):
-            continue
-        if not name.endswith("stop slope"):
-            left, right = name.split(" ")
-            equation = 2 * int(left[1]) - 2 + (left.endswith("''"))
-            state = 2 * int(right[1]) - 2 + right.endswith("'")
-        row[0] = 1.0
-        row[1 + state] += 1.0
-        row[1 + equation] -= 1.0
+    D = errors.slopes
     h = np.array(list(errors.errors.values())) - D @ logs
     return h, D[:, [0, *range(2, len(logs))]]
 
