@@ -211,7 +211,9 @@ class _Hunt:
                 chosen.append(best.found[number])
                 continue
             step = self.said.stage(f"place of response {number + 1}, {spec.expect}")
-            room = room_of(spec, self.modelfile.model.b, self.modelfile.search.omega)
+            room = room_of(
+                spec, self.modelfile.model.b, self.modelfile.search.band(self.modelfile.model)
+            )
             ranked, tried = best_points(bench, spec, self.seen[number], room, progress=step)
             self.places += tried
             if not ranked:
@@ -234,7 +236,8 @@ class _Hunt:
         if self.listen is None:
             return best
         tried: list[tuple[Candidate, float, tuple[Agreement, ...]]] = []
-        frequency = best.design.errors.scales.frequency(1.0)
+        unit = self.modelfile.model.second_order().own_frequency
+        frequency = best.design.errors.scales.frequency(unit)
         low, _ = self.modelfile.circuit.frequency
         for choice in (best.choice, *slower(best.choice, frequency, low)):
             made: Candidate | None = best
@@ -243,7 +246,7 @@ class _Hunt:
             if made is None:
                 self._note("time scale", _shown(choice.frequency), None, False)
                 continue
-            at = made.design.errors.scales.frequency(1.0)
+            at = made.design.errors.scales.frequency(unit)
             step = self.said.stage(f"ngspice, rung {RUNG}, {at:.4g} Hz at ω = 1", len(made.found))
             bench = self._bench(made.choice, made.found, made.design, LISTENED)
             heard = self.listen(bench, [s.stand for s in made.scored], step)

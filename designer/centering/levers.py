@@ -114,7 +114,8 @@ def variants(choice: DesignChoice, lever: str) -> Iterator[DesignChoice]:
 
 
 def slower(choice: DesignChoice, frequency: float, low: float) -> Iterator[DesignChoice]:
-    """The same at half of a frequency for ω = 1 [Hz], a quarter, and so on, not below ``low``."""
+    """The same with the model's own frequency at half of ``frequency`` [Hz], a quarter, and so on,
+    not below ``low``."""
     high = frequency / 2.0
     while high > low * math.sqrt(2.0):
         yield replace(choice, frequency=(high / math.sqrt(2.0), high))

@@ -117,7 +117,8 @@ def stretches(
     InputError : see ``check``; the model does not show a response anywhere in its range.
     """
     check(wanted)
-    omegas = _grid(spec.omega)
+    band = spec.band(model)
+    omegas = _grid(band)
     swept: dict[float, list[tuple[Steady, ...]]] = {}
 
     def at(b: float) -> list[tuple[Steady, ...]]:
@@ -138,7 +139,7 @@ def stretches(
             else:
                 found += _single(model, response, response.omega, b)
         if not found:
-            _refuse(number, response, spec)
+            _refuse(number, response, band)
         found.sort(key=lambda s: (-len(s.places), s.b, s.low))
         out.append(tuple(found))
     return tuple(out)
@@ -191,13 +192,13 @@ def _single(model: MechanicalModel, response: Response, omega: float, b: float) 
     return [Stretch((OperatingPoint(omega, b, found.orbit.start),))] if found.found else []
 
 
-def _refuse(number: int, response: Response, spec: SearchSpec) -> None:
+def _refuse(number: int, response: Response, band: tuple[float, float]) -> None:
     ranged = isinstance(response.b, tuple)
     field = "omega" if response.omega is None else "b" if ranged else "omega"
     found: object = "best" if response.omega is None else response.omega
     if field == "b":
         found = list(response.b) if isinstance(response.b, tuple) else response.b
-    where = f"ω from {spec.omega[0]:g} to {spec.omega[1]:g}" if response.omega is None else "it"
+    where = f"ω from {band[0]:g} to {band[1]:g}" if response.omega is None else "it"
     raise InputError(
         None,
         f"response[{number}].{field}",

@@ -103,7 +103,8 @@ class BoardSubject:
         frequency = self.design.errors.scales.frequency
         if parameter == "omega":
             return Family("omega", 0.0, GREATEST, lambda w: self._flow({"frequency": frequency(w)}))
-        stand = {"frequency": frequency(1.0)} if self.frequency is None else {}
+        own = self.design.model.second_order().own_frequency
+        stand = {"frequency": frequency(own)} if self.frequency is None else {}
         return Family(
             parameter, *SETTINGS[parameter], lambda value: self._flow({**stand, parameter: value})
         )

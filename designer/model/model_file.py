@@ -142,6 +142,7 @@ def parse_model_file(text: str, source: Path | None = None) -> ModelFile:
     try:
         tables = checked(table, data, file)
         model = tables.system
+        tables.search.band(model)
     except InputError as error:  # a model outside its domain does not know the file
         raise InputError(file, error.field, error.found, error.expected) from None
     si = tables.scales(data)

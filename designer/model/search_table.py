@@ -7,13 +7,18 @@ from typing import Annotated
 
 from designer.base.schema import Accepts, FileTable, choice, line, number, several, span
 from designer.model.circuit_table import DeadZone
+from designer.model.mechanics import MechanicalModel, check_omega
 
 DEAD_ZONES: tuple[DeadZone, ...] = ("saturation", "rectifier")
 
 
+BAND = (0.15, 2.0)
+"""Band in which a frequency is sought, over the model's own."""
+
+
 def _band() -> Accepts:
-    expected = "a range [low, high] of numbers from 0.001 to 1000, low < high"
-    both = span("", expected, lambda value: 1e-3 <= value <= 1e3)
+    expected = "a range [low, high] of numbers > 0, low < high"
+    both = span("", expected, lambda value: value > 0.0)
 
     def check(value: object) -> tuple[float, float]:
         low, high = both.check(value)
@@ -28,8 +33,8 @@ def _band() -> Accepts:
 class SearchSpec(FileTable):
     """What a search may change."""
 
-    omega: Annotated[tuple[float, float], _band()] = (0.15, 2.0)
-    """Dimensionless band in which ``omega = "best"`` is sought."""
+    omega: Annotated[tuple[float, float] | None, _band()] = None
+    """Band in which ``omega = "best"`` is sought, in the model's units; None for ``BAND``."""
     match_error: Annotated[
         float, number("", "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0)
     ] = 0.005
@@ -43,3 +48,17 @@ class SearchSpec(FileTable):
         several("a list of saturation, rectifier", choice(*DEAD_ZONES), least=1),
     ] = DEAD_ZONES
     """Kinds of dead-zone stage that may be tried."""
+
+    def band(self, model: MechanicalModel) -> tuple[float, float]:
+        """The band for a model.
+
+        Raises
+        ------
+        InputError : the file's leaves the range of frequencies that is computed.
+        """
+        if self.omega is None:
+            unit = model.second_order().own_frequency
+            return BAND[0] * unit, BAND[1] * unit
+        for end in self.omega:
+            check_omega("search.omega", end, model)
+        return self.omega

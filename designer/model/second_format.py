@@ -49,9 +49,6 @@ def second_format(modelfile: ModelFile) -> str:
         return modelfile.text
     scales = modelfile.si or SiScales()
     blocks = [_rewritten(block, modelfile, scales) for block in _blocks(modelfile.text)]
-    if any(r.omega is None for r in modelfile.responses) and not _has_search(blocks):
-        low, high = (w / scales.time_scale for w in modelfile.search.omega)
-        blocks.append(_Block("search", ("", "[search]", f"omega = [{low!r}, {high!r}]")))
     text = "\n".join(chain.from_iterable(block.lines for block in blocks)) + "\n"
     _check(modelfile, text, scales)
     return text
@@ -71,13 +68,6 @@ def _blocks(text: str) -> Iterator[_Block]:
         yield _Block(table, tuple(lines[:own]))
         table, lines = header[1], [*lines[own:], line]
     yield _Block(table, tuple(lines))
-
-
-def _has_search(blocks: list[_Block]) -> bool:
-    return any(
-        block.table == "search" and any(re.match(r"\s*omega\s*=", line) for line in block.lines)
-        for block in blocks
-    )
 
 
 def _rewritten(block: _Block, modelfile: ModelFile, scales: SiScales) -> _Block:

@@ -42,7 +42,7 @@ GLOSSARY = (
         "a response that repeats after n periods of the drive, with p impacts on the upper stop "
         "and q on the lower one in that time; n-q-p is its mirror twin",
     ),
-    ("ω", "frequency of the drive, dimensionless; ω = 1 is one radian per unit of model time"),
+    ("ω", "frequency of the drive; ω = 1 is one radian per unit of model time"),
     ("model", "the mechanical model, solved exactly piece by piece"),
     (
         "exact circuit",

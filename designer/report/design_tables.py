@@ -135,10 +135,13 @@ def error_table(design: Design) -> Table | None:
 
 
 def scale_table(design: Design, si: SiScales | None) -> Table | None:
-    scales = design.errors.scales
+    scales, own = design.errors.scales, design.model.second_order().own_frequency
     rows = [
         ("one unit of model time", words.quantity(scales.seconds, "s")),
-        ("generator frequency at ω = 1", words.quantity(scales.frequency(1.0), "Hz")),
+        (
+            f"generator frequency at ω = {words.number(own)}",
+            words.quantity(scales.frequency(own), "Hz"),
+        ),
     ]
     if si is not None:
         slow = si.time_scale / scales.seconds

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -115,11 +115,11 @@ def time_traces(
         else:
             axes.plot(cycles, x, **_look(name, orbits[name]))
     stops = _stops(checked, sides)
-    gaps = [gap for _, gap in stops]
-    limits = axis_limits(np.concatenate([*shown, [0.0]]), gaps)
+    places = [stop.place for stop in stops]
+    limits = axis_limits(np.concatenate([*shown, [0.0]]), places)
     axes.set_ylim(limits)
     axes.set_xlim(0.0, span)
-    shade_stops(axes, stops, limits, across=True)
+    shade_stops(axes, _shaded(stops), limits, across=True)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=span > 2))
     axes.yaxis.set_major_locator(MaxNLocator(4))
     length = f"{1e3 / checked.excitation.frequency:.3g} ms"
@@ -153,9 +153,29 @@ def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str
     }
 
 
-def _stops(checked: CheckedResponse, sides: Sequence[int]) -> tuple[tuple[int, float], ...]:
-    """(side, where it stands) of each stop, in model units."""
-    return tuple((side, side * checked.model.b) for side in sides)
+class _Stop(NamedTuple):
+    """A stop that the first mass meets, in model units."""
+
+    side: int
+    place: float
+    clearance: int
+
+
+def _stops(checked: CheckedResponse, sides: Sequence[int]) -> tuple[_Stop, ...]:
+    """The stops between the first mass and ground."""
+    if checked.design is None:
+        return tuple(_Stop(side, side * checked.model.b, 0) for side in sides)
+    clearances = checked.design.model.at(checked.model.b).second_order().clearances
+    return tuple(
+        _Stop(side, side * stop.gap, number)
+        for number, clearance in enumerate(clearances)
+        if clearance.mass == 0 and clearance.other is None
+        for side, stop in clearance.sides
+    )
+
+
+def _shaded(stops: Sequence[_Stop]) -> list[tuple[int, float]]:
+    return [(stop.side, stop.place) for stop in stops]
 
 
 def _portrait(
@@ -168,21 +188,23 @@ def _portrait(
         for states in [trace.states[:, :2]]
     }
     every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
-    xlim, ylim = axis_limits(every[:, 0], [gap for _, gap in stops]), axis_limits(every[:, 1], ())
-    shade_stops(axes, stops, xlim)
+    xlim = axis_limits(every[:, 0], [stop.place for stop in stops])
+    ylim = axis_limits(every[:, 1], ())
+    shade_stops(axes, _shaded(stops), xlim)
     for name, states in drawn.items():
         if name == "ngspice":
             scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
             states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
         axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
     model = checked.model.orbit
-    for side, gap in stops:
-        entry = model.impact_velocities[model.impact_sides == side]
+    for stop in stops:
+        here = (model.impact_sides == stop.side) & (model.impact_clearances == stop.clearance)
+        entry = model.impact_velocities[here]
         axes.plot(
-            np.full(len(entry), gap),
+            np.full(len(entry), stop.place),
             entry,
             ls="",
-            marker=">" if side > 0 else "<",
+            marker=">" if stop.side > 0 else "<",
             **_IMPACT,
             zorder=5,
             clip_on=False,

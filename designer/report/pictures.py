@@ -22,8 +22,8 @@ from designer.report.model_drawing import model_drawing
 from designer.report.system_drawing import system_drawing
 
 INTRO = (
-    "Displacement x₁ and velocity x₁′ of mass 1, dimensionless, over one response; below, x₁ over "
-    "time. The engines lie on each other where they agree."
+    "Displacement x₁ and velocity x₁′ of mass 1, in the model's units, over one response; below, "
+    "x₁ over time. The engines lie on each other where they agree."
 )
 KEY = (
     "Model: broad light line. Exact circuit: dashed line. ngspice: dots. Triangles: an impact "

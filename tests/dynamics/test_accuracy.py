@@ -1,6 +1,6 @@
 """Accuracy of both engines against 40-digit arithmetic, and of settling against long settling.
 
-The bound on the state after 20 periods: 1e-11 · max(1, largest ‖Φ(t, s)‖) · max(1, peak), where Φ
+The bound on the last state: 1e-11 · max(1, largest ‖Φ(t, s)‖) · max(1, peak), where Φ
 is the linearised flow between any two moments of the run: what rounding in one place may grow to.
 """
 
@@ -22,6 +22,8 @@ from designer.model.model import Dimensionless
 from tests.shared.oracles import Plain, integrate
 
 PERIODS = 20
+FEW = 10
+"""Of the paper's case, whose high responses have sixteen impacts a period."""
 MOST = 600
 """Mode changes that the reference follows: its speed is a few hundred a second."""
 START = np.array([0.1, -0.2, 0.05, 0.3])
@@ -41,7 +43,7 @@ def flow_of(problem: Problem, *, fast: bool = True) -> Flow:
 
 def excess(problem: Problem, exact: Truth, start: Array, *, fast: bool) -> float:
     """Error of the last state over the bound: at most 1 is right."""
-    run = flow_of(problem, fast=fast).run(start, PERIODS)
+    run = flow_of(problem, fast=fast).run(start, len(exact.strobes) - 1)
     assert run.status is FlowStatus.DONE
     error = float(np.abs(run.strobes[-1] - exact.strobes[-1]).max())
     return error / (1e-11 * max(1.0, exact.magnification()) * max(1.0, float(exact.peak.max())))
@@ -50,12 +52,12 @@ def excess(problem: Problem, exact: Truth, start: Array, *, fast: bool) -> float
 @pytest.mark.parametrize("omega", PAPER)
 def test_paper(omega: float) -> None:
     problem = Problem(omega)
-    exact = truth(problem, START, PERIODS)
+    exact = truth(problem, START, FEW)
     assert exact is not None
     assert exact.magnification() < 1e8
     for fast in (True, False):
         assert excess(problem, exact, START, fast=fast) <= 1.0
-        counts = flow_of(problem, fast=fast).run(START, PERIODS).counts[:, 0]
+        counts = flow_of(problem, fast=fast).run(START, FEW).counts[:, 0]
         np.testing.assert_array_equal(counts, exact.impacts)
 
 

@@ -29,6 +29,7 @@ from designer.verdicts.cross_check import ask_random
 from designer.verdicts.ngspice_runs import cross_checks
 from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study, plan_study
+from tests.shared.quick_folders import without_starts
 from tests.shared.stages import CATALOG, bought, one_sided, stage
 from tests.spice.test_rectifier_ngspice import LOW, SCALED
 
@@ -66,7 +67,10 @@ def design_of(modelfile: ModelFile, circuit: Circuit) -> Design:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_files_are_read_back_as_the_same_design(name: str, tmp_path: Path) -> None:
+def test_files_are_read_back_as_the_same_design(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_starts(monkeypatch)
     first = made(name, tmp_path)
     texts = design_files.texts(first)
     folder = Folder(tmp_path / "out")
@@ -86,7 +90,10 @@ def test_files_are_read_back_as_the_same_design(name: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["rectifier", "saturation, upper"])
-def test_the_deck_runs_in_plain_ngspice(name: str, tmp_path: Path) -> None:
+def test_the_deck_runs_in_plain_ngspice(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_starts(monkeypatch)
     deck = tmp_path / "circuit.cir"
     deck.write_text(design_files.texts(made(name, tmp_path))["circuit.cir"])
     done = subprocess.run(

@@ -29,10 +29,12 @@ from designer.model.model_file import parse_model_file
 from designer.model.response_table import Response
 from designer.report import compare_plots, compare_table, comparison
 from designer.report.comparison import OURS, DesignColumn, comparison_json
+from tests.shared.model_text import COARSE_CIRCUIT
 
 CATALOG = load_catalog()
 PAPER, SPEC = paper_values.MODEL, CircuitSpec()
-BASE = """\
+BASE = (
+    """\
 format = 1
 title = "small"
 [model]
@@ -46,9 +48,9 @@ b = 0.25
 [[response]]
 omega = 0.85
 expect = "1-2-2"
-[circuit]
-resistors = "E24"
 """
+    + COARSE_CIRCUIT
+)
 SMALL = BASE.format(k0=0.95)
 
 

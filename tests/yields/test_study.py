@@ -409,6 +409,7 @@ def test_the_exact_rung_needs_no_ngspice(
     """No program on the path, and a library that is not there."""
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("NGSPICE_LIBRARY_PATH", str(tmp_path / "none.so"))
+    without_starts(monkeypatch)
     assert entry.status([*_words(home, tmp_path / "out"), "--json", "-q"]) == 0
     answer = json.loads(capfd.readouterr().out)
     (response,) = answer["responses"]
@@ -472,9 +473,9 @@ def test_another_layer_asks_for_no_blame_again_and_other_boards_do(
     assert asked == []
     assert json.loads((out / "tolerance.json").read_text())["responses"][0]["blame"] == known
     # Other samples, another seed: other boards are to blame.
-    other = [*_words(home, out), "--blame-budget", "1", "--overwrite", "-q"]
+    other = ["tolerance", str(out), "--blame-budget", "1", "--overwrite", "-q"]
     assert entry.status([*other, "--samples", "14"]) == 0
-    assert entry.status([*other, "--seed", "2"]) == 0
+    assert entry.status([*other, "--samples", "12", "--seed", "2"]) == 0
     assert asked == [14, 12]
 
 
