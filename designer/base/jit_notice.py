@@ -23,8 +23,7 @@ PARTS = {
     "kernel_terms": "search for parts",
     "kernel_nodal": "equations of boards",
     "kernel_boards": "circuits",
-    "kernel_four_state": "circuits",
-    "kernel_mode_tables": "circuits",
+    "kernel_propagators": "circuits, and models of any size",
     "kernel_sweep": "sweeps",
 }
 """What a kernel's module is for; all others are for ``MOTION``."""

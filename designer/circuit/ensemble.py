@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from designer.base.arrays import Array, Index, Mask
+from designer.base.arrays import Array, Index
 from designer.base.threads import heed, parallel
 from designer.circuit import working_modes as working
 from designer.circuit.board_arrays import Boards
 from designer.circuit.reduction import FloatingCircuit, Reduction
-from designer.dynamics import attractors, kernel_boards as kernel, kernel_mode_tables, working_modes
+from designer.dynamics import attractors, kernel_boards as kernel, working_modes
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowResult
 from designer.dynamics.kernel_orbit import CHAOS, FOUND
 from designer.dynamics.orbit import Complex, Orbit, OrbitStatus, failed
@@ -52,11 +52,8 @@ class Ensemble:
         self.boards = boards
         self._fast = fast
         self._reductions: dict[int, Reduction] = {}
-        self._modes: kernel_mode_tables.Modes | None = None
-        self._good = np.zeros(len(boards), dtype=np.bool_)
-        self._keys = working.working_keys(boards.circuit)
-        if fast:
-            self._modes, self._good = _reduced(boards, jobs)
+        fits = len(boards.circuit.states) <= working_modes.MOST_STATES and len(boards) > 0
+        self._modes = _reduced(boards, jobs) if fast and fits else None
 
     def __len__(self) -> int:
         return len(self.boards)
@@ -190,70 +187,110 @@ class Ensemble:
         out: list[SettledBoard | None] = [None] * len(which)
         if self._modes is None:
             return out
-        asked = np.flatnonzero(self._good[which])
-        if not len(asked):
-            return out
-        given = np.array([[d.omega, d.amplitude, d.offset] for d in drives])
-        count = len(asked)
-        answers = kernel.Answers(
-            whole=np.zeros((count, 7), dtype=np.int64),
-            real=np.zeros((count, 32)),
-            when=np.zeros((count, kernel.IMPACTS)),
-            speed=np.zeros((count, kernel.IMPACTS)),
-            stop=np.zeros((count, kernel.IMPACTS), dtype=np.int64),
-            trace=np.zeros((count, kernel.LONGEST * kernel.POINTS)),
-        )
-        j = self.boards.circuit.states.index(self.boards.circuit.stops[0].state)
-        kernel.respond_all(
-            self._modes,
-            which[asked],
-            given[asked],
-            starts[asked],
-            MAX_EVENTS,
-            working_modes.ANCHORS,
-            j,
-            answers,
-        )
-        found = np.flatnonzero(answers.whole[:, 0] == FOUND)
-        multipliers = np.linalg.eigvals(answers.real[found, 4:20].reshape(-1, 4, 4)).astype(complex)
-        for e, multiplier in zip(found, multipliers, strict=True):
-            period = drives[int(asked[e])].period
-            out[int(asked[e])] = self._response(answers, int(e), period, multiplier, j)
+        asked = np.flatnonzero(self._modes.good[which])
+        boards, rows = np.unique(which[asked], return_inverse=True)
+        modes = self._modes.take(boards)
+        given = np.array([working_modes.drive_of(d, MAX_EVENTS) for d in drives]).reshape(-1, 4)
+        while len(asked):
+            answers = self._answers(modes, rows, given[asked], starts[asked])
+            code = answers.whole[:, kernel.CODE]
+            found = np.flatnonzero(code == FOUND)
+            multipliers = np.linalg.eigvals(answers.monodromy[found]).astype(complex)
+            for e, multiplier in zip(found, multipliers, strict=True):
+                k = int(asked[e])
+                out[k] = self._response(answers, int(e), drives[k].period, multiplier, modes)
+            missing = answers.whole[code == kernel.BUILD, kernel.MISSING :][:, :2]
+            modes.add(sorted({modes.targets.beyond(int(m), int(g)) for m, g in missing}))
+            asked, rows = asked[code == kernel.BUILD], rows[code == kernel.BUILD]
         return out
 
+    def _answers(
+        self, modes: working.BoardModes, rows: Index, drives: Array, starts: Array
+    ) -> kernel.Answers:
+        """What the compiled code says of boards ``rows`` of these modes."""
+        count, (_, _, clearances, wide) = len(rows), modes.modes.past.shape
+        n, watched = wide - 2, len(modes.modes.watched)
+        answers = kernel.Answers(
+            whole=np.zeros((count, kernel.COUNTED + 2 + 2 * clearances), dtype=np.int64),
+            start=np.zeros((count, n)),
+            monodromy=np.zeros((count, n, n)),
+            extremes=np.zeros((count, n + watched, 2)),
+            graze=np.zeros((count, clearances, 2)),
+            facts=np.zeros((count, 2)),
+            when=np.zeros((count, kernel.IMPACTS)),
+            speed=np.zeros((count, kernel.IMPACTS)),
+            stop=np.zeros((count, kernel.IMPACTS, 2), dtype=np.int64),
+            trace=np.zeros((count, kernel.LONGEST * kernel.POINTS)),
+        )
+        room = working_modes.driven(modes.modes, drives[0])
+        kernel.respond_all(
+            modes.modes,
+            rows,
+            drives,
+            starts,
+            working_modes.ANCHORS,
+            room.data,
+            room.ints,
+            room.width,
+            room.far,
+            room.unit,
+            answers,
+        )
+        return answers
+
     def _response(
-        self, answers: kernel.Answers, e: int, period: float, multipliers: Complex, j: int
+        self,
+        answers: kernel.Answers,
+        e: int,
+        period: float,
+        multipliers: Complex,
+        modes: working.BoardModes,
     ) -> SettledBoard:
         """Answer e in the normal form; the rules are those of ``attractors.describe``."""
-        n, p, q, spent, mode, met = (int(v) for v in answers.whole[e, 1:])
-        real = answers.real[e]
-        extremes = real[20:28].reshape(4, 2).copy()
-        penetration, miss = float(real[28]), float(real[29])
-        floor = attractors.ENGINE_ERROR * float(np.abs(extremes[j]).max())
-        grazing = min(penetration, miss) < floor or real[31] > 0.0
+        whole, facts = answers.whole[e], answers.facts[e]
+        mode, met = int(whole[kernel.BEGIN]), int(whole[kernel.MET])
+        n, spent, *counts = (int(v) for v in whole[kernel.COUNTED :])
+        first, *more = list(zip(counts[0::2], counts[1::2], strict=True)) or [(0, 0)]
+        graze, size = answers.graze[e], len(self.boards.circuit.states)
+        extremes = answers.extremes[e, :size].copy()
+        floors = attractors.ENGINE_ERROR * np.abs(self._spans(answers.extremes[e])).max(axis=1)
+        near = bool((graze.min(axis=1) < floors).any())
+        grazing = near or facts[kernel.UNDECIDED] > 0.0
         status = OrbitStatus.GRAZING if grazing else OrbitStatus.PERIODIC
         radius = float(np.abs(multipliers).max())
         once = answers.when[e, :met] < n * period
         orbit = Orbit(
             status=status,
             n=n,
-            p=p,
-            q=q,
-            start=real[:4].copy(),
-            mode=self._keys[mode],
+            p=first[0],
+            q=first[1],
+            more=tuple(more),
+            start=answers.start[e].copy(),
+            mode=modes.targets.keys[mode],
             extremes=extremes,
             impact_times=answers.when[e, :met][once],
             impact_velocities=answers.speed[e, :met][once],
-            impact_sides=answers.stop[e, :met][once].astype(float),
-            asymmetry=float(real[30]),
+            impact_sides=answers.stop[e, :met, 1][once].astype(float),
+            impact_clearances=answers.stop[e, :met, 0][once],
+            asymmetry=float(facts[kernel.ASYMMETRY]),
             multipliers=multipliers,
             lyapunov=float(np.log(radius) / (n * period)) if radius > 0.0 else -np.inf,
-            penetration=penetration,
-            miss=miss,
+            penetration=float(graze[:, 0].min(initial=np.inf)),
+            miss=float(graze[:, 1].min(initial=np.inf)),
             reason=f"while classifying period {n}" if grazing else "",
             periods=spent,
         )
         return SettledBoard(orbit, answers.trace[e, : n * kernel.POINTS].copy())
+
+    def _spans(self, extremes: Array) -> Array:
+        """(C, 2) extremes of the displacement in each clearance among those of what is watched."""
+        circuit = self.boards.circuit
+        further = iter(range(len(circuit.states), len(extremes)))
+        rows = [
+            circuit.states.index(stop.state) if stop.difference is None else next(further)
+            for stop in circuit.stops
+        ]
+        return extremes[rows] if rows else np.zeros((0, 2))
 
 
 def _faint(orbit: Orbit, drive: Drive) -> bool:
@@ -263,22 +300,14 @@ def _faint(orbit: Orbit, drive: Drive) -> bool:
     return orbit.status is OrbitStatus.NOT_SETTLED
 
 
-def _reduced(boards: Boards, jobs: int) -> tuple[kernel_mode_tables.Modes | None, Mask]:
-    """``working_modes.of_boards`` by ``jobs`` threads."""
+def _reduced(boards: Boards, jobs: int) -> working.BoardModes:
+    """The first working modes, by ``jobs`` threads."""
     count = len(boards)
     if count <= TOGETHER:
-        return working.of_boards(boards)
+        return working.BoardModes(boards)
     chunks = [range(k, min(k + TOGETHER, count)) for k in range(0, count, TOGETHER)]
-    found = list(parallel(lambda chunk: working.of_boards(boards.take(chunk)), chunks, jobs))
-    good = np.concatenate([each for _, each in found])
-    parts = [modes for modes, _ in found if modes is not None]
-    if not parts:
-        return None, good
-    of_each = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("A", "B", "d", "guard", "past")
-    }
-    return parts[0]._replace(**of_each), good
+    parts = list(parallel(lambda chunk: working.BoardModes(boards.take(chunk)), chunks, jobs))
+    return working.BoardModes.joined(boards, parts)
 
 
 def displacement(flow: Flow, orbit: Orbit) -> Array:

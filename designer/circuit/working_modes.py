@@ -2,34 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from designer.base.arrays import Array, Mask
+from designer.base.arrays import Array, Index, Mask
 from designer.circuit.board_arrays import Boards
 from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Circuit
 from designer.circuit.nodal import Exit, NodalEquations
 from designer.dynamics import kernel_mode_tables as kernel
-from designer.dynamics.piecewise_linear import ModeKey
-from designer.dynamics.working_modes import STATES, empty_modes
+from designer.dynamics.piecewise_linear import ModeKey, motion_of_states
+from designer.dynamics.working_modes import GuardTargets, empty_modes, grown
 
 
 def working_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
-    """Keys of the modes between which a good board moves: open, and on the way into each contact
-    one switch after the other. None where the fast path does not fit."""
-    if len(circuit.states) != STATES or len(circuit.stops) != 1:
-        return ()
-    names = circuit.switches
-    keys = [circuit.open]
-    for _, contact in circuit.stops[0].contacts:
-        key = list(circuit.open)
-        for switch, position in ((contact.switch, contact.position), *contact.others):
-            key[names.index(switch)] = position
-            keys.append(tuple(key))
-    return tuple(keys) if len(keys) <= kernel.MODES and len(set(keys)) == len(keys) else ()
+    """Keys of the modes between which a good board moves, the open one first: each clearance
+    open, or on the way into a contact one switch after the other, whatever the others do."""
+    ways = []
+    for stop in circuit.stops:
+        positions: list[dict[str, int]] = [{}]
+        for _, contact in stop.contacts:
+            turned: dict[str, int] = {}
+            for switch, position in ((contact.switch, contact.position), *contact.others):
+                turned = {**turned, switch: position}
+                positions.append(turned)
+        ways.append(positions)
+    return tuple(dict.fromkeys(_key(circuit, turned) for turned in product(*ways)))
+
+
+def first_keys(circuit: Circuit) -> tuple[ModeKey, ...]:
+    """Of those the ones in which at most one clearance is not open: others are solved for the
+    boards that enter them."""
+
+    def moved(key: ModeKey) -> int:
+        pairs = zip(circuit.switches, key, circuit.open, strict=True)
+        turned = {name for name, here, there in pairs if here != there}
+        return sum(not turned.isdisjoint(stop.switches) for stop in circuit.stops)
+
+    return tuple(key for key in working_keys(circuit) if moved(key) <= 1)
+
+
+def _key(circuit: Circuit, turned: Iterable[Mapping[str, int]]) -> ModeKey:
+    """The key with every clearance open, but for these switches."""
+    positions = dict(zip(circuit.switches, circuit.open, strict=True))
+    for each in turned:
+        positions |= each
+    return tuple(positions[name] for name in circuit.switches)
 
 
 @dataclass(frozen=True)
@@ -38,6 +59,7 @@ class _SolvedMode:
 
     rates: Array
     exits: list[Exit]
+    voltage: Mapping[str, Array]
     good: Mask
 
 
@@ -50,30 +72,107 @@ def _solved(equations: NodalEquations, key: ModeKey) -> _SolvedMode:
     good = (bad == 0) & np.isfinite(rates).all(axis=(1, 2))
     for way in exits:
         good &= np.isfinite(way.row).all(axis=1)
-    return _SolvedMode(rates, exits, good)
+    return _SolvedMode(rates, exits, solution.voltage, good)
 
 
-def of_boards(boards: Boards) -> tuple[kernel.Modes | None, Mask]:
-    """The working modes of N boards, and which boards (N,) have them all."""
-    keys = working_keys(boards.circuit)
-    if not keys:
-        return None, np.zeros(len(boards), dtype=np.bool_)
-    equations = NodalEquations(boards.circuit, boards.stacked)
-    modes = [_solved(equations, key) for key in keys]
-    out = empty_modes(len(boards), len(keys), max(len(mode.exits) for mode in modes))
-    # How far past a stop: what rest says of it.
-    beyond = {equations.sides(e.target)[0]: e.row for e in modes[0].exits if e.clearance == 0}
-    for k, (key, mode) in enumerate(zip(keys, modes, strict=True)):
-        out.A[:, k], out.B[:, k] = mode.rates[..., :STATES], mode.rates[..., STATES]
-        out.d[:, k] = mode.rates[..., STATES + 1]
-        out.guards[k], out.side[k] = len(mode.exits), equations.sides(key)[0]
-        if out.side[k]:
-            out.past[:, k] = beyond[int(out.side[k])]
+class BoardModes:
+    """Some of the working modes of N boards, in the form of the fast path."""
+
+    def __init__(self, boards: Boards, keys: Iterable[ModeKey] = ()) -> None:
+        circuit = boards.circuit
+        self._boards = boards
+        self.targets = GuardTargets(working_keys(circuit))
+        between = [c for c, stop in enumerate(circuit.stops) if stop.difference is not None]
+        self.modes = empty_modes(
+            len(boards), 0, len(circuit.states), len(circuit.stops), 0, between
+        )
+        self._beyond: dict[tuple[int, int], Array] = {}
+        self.add(keys or first_keys(circuit))
+
+    @property
+    def good(self) -> Mask:
+        """(N,) which boards have all of these modes."""
+        return np.asarray(self.modes.good.all(axis=1))
+
+    def take(self, which: Index) -> BoardModes:
+        """Those of some boards, for themselves: what is added to them is not added here."""
+        out = object.__new__(BoardModes)
+        out._boards, out.targets = self._boards.take(which), self.targets.copy()
+        parts = {name: getattr(self.modes, name)[which] for name in OF_EACH}
+        rest = {
+            name: value.copy()
+            for name, value in self.modes._asdict().items()
+            if name not in OF_EACH
+        }
+        out.modes = kernel.Modes(**parts, **rest)
+        out._beyond = {side: row[which] for side, row in self._beyond.items()}
+        return out
+
+    @classmethod
+    def joined(cls, boards: Boards, parts: Sequence[BoardModes]) -> BoardModes:
+        """Those of all boards together; all parts have the same modes."""
+        out = parts[0].take(np.arange(0))
+        out._boards = boards
+        of_each = {
+            name: np.concatenate([getattr(part.modes, name) for part in parts]) for name in OF_EACH
+        }
+        out.modes = out.modes._replace(**of_each)
+        out._beyond = {
+            side: np.concatenate([part._beyond[side] for part in parts])
+            for side in parts[0]._beyond
+        }
+        return out
+
+    def add(self, keys: Iterable[ModeKey]) -> None:
+        """Solve further modes; those that are there already are left as they are."""
+        new = [key for key in keys if key not in self.targets.numbers]
+        equations = NodalEquations(self._boards.circuit, self._boards.stacked)
+        solved = [_solved(equations, key) for key in new]
+        most = max((len(mode.exits) for mode in solved), default=0)
+        self.modes = grown(self.modes, len(self.targets.keys) + len(new), most)
+        for key, mode in zip(new, solved, strict=True):
+            self._write(equations, key, mode)
+
+    def _move(self, mode: _SolvedMode) -> None:
+        """Displacement and velocity in each clearance, as ``Reduction.system`` has them."""
+        circuit, out = self._boards.circuit, self.modes
+        n = len(circuit.states)
+        moving = [circuit.states.index(stop.state) for stop in circuit.stops]
+        rows = zip(*motion_of_states(n, moving), strict=True)
+        for c, (displacement, velocity) in enumerate(rows):
+            out.displacement[:, c], out.velocity[:, c] = displacement, velocity
+        for c, (stop, i) in enumerate(zip(circuit.stops, moving, strict=True)):
+            if stop.difference is not None:
+                net, sign = stop.difference
+                row = sign * mode.voltage[net]
+                A = mode.rates[..., :n]
+                out.displacement[:, c] = row
+                out.velocity[:, c, :n] = np.einsum("...i,...ij->...j", row[..., :n], A)
+                out.velocity[:, c, :n] /= A[..., i, i + 1][..., None]
+                out.velocity[:, c, n] = row[..., n]
+
+    def _write(self, equations: NodalEquations, key: ModeKey, mode: _SolvedMode) -> None:
+        out, n = self.modes, mode.rates.shape[1]
+        if not self.targets.keys:  # the open mode says how far a displacement is past a stop
+            self._move(mode)
+            self._beyond = {
+                (e.clearance, equations.sides(e.target)[e.clearance]): e.row
+                for e in mode.exits
+                if e.clearance >= 0
+            }
+        k = self.targets.add(out, key, [way.target for way in mode.exits])
+        out.A[:, k], out.B[:, k] = mode.rates[..., :n], mode.rates[..., n]
+        out.d[:, k], out.good[:, k] = mode.rates[..., n + 1], mode.good
+        out.side[k] = equations.sides(key)
+        for c, side in enumerate(equations.sides(key)):
+            if side:
+                out.past[:, k, c] = self._beyond[c, side]
         for g, way in enumerate(mode.exits):
-            out.guard[:, k, g] = way.row
-            out.target[k, g] = keys.index(way.target) if way.target in keys else -1
-            out.begins[k, g] = way.clearance >= 0
-    return out, np.logical_and.reduce([mode.good for mode in modes])
+            out.guard[:, k, g], out.clearance[k, g] = way.row, way.clearance
+
+
+OF_EACH = ("A", "B", "d", "guard", "past", "good", "displacement", "velocity")
+"""What of ``kernel.Modes`` has an axis of boards."""
 
 
 def at_rest(boards: Boards) -> tuple[Array, Mapping[int, Array]]:

@@ -2,7 +2,6 @@ from . import (
     attractors as attractors,
     harmonics as harmonics,
     kernel_boards as kernel_boards,
-    kernel_four_state as kernel_four_state,
     kernel_modal as kernel_modal,
     kernel_mode_tables as kernel_mode_tables,
     modal_tables as modal_tables,
@@ -94,6 +93,11 @@ from .turning_points import (
     heights as heights,
 )
 from .working_modes import (
-    STATES as STATES,
+    ANCHORS as ANCHORS,
+    MOST_STATES as MOST_STATES,
+    GuardTargets as GuardTargets,
+    drive_of as drive_of,
+    driven as driven,
     empty_modes as empty_modes,
+    grown as grown,
 )

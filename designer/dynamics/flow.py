@@ -4,7 +4,8 @@ The general engine: any number of states and modes, constant terms, guards that 
 step is a matrix exponential; boundaries are found to rounding error and grazing ones are proved
 absent or found (see ``dynamics.kernel_general``). Four states with one stop pair take the modal
 fast path (``dynamics.modal_tables``) where only strobes, impact counts and tangents are asked for;
-a circuit that keeps to its working modes takes that of ``dynamics.kernel_four_state``.
+every other system of few states, and a circuit that keeps to its working modes, takes that of
+``dynamics.kernel_propagators``.
 """
 
 from __future__ import annotations
@@ -22,19 +23,20 @@ from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.threads import heed
 from designer.dynamics import (
-    kernel_four_state,
     kernel_general as kernel,
     kernel_modal,
     kernel_orbit,
+    kernel_propagators,
     modal_tables,
     mode_tables,
     working_modes,
 )
-from designer.dynamics.kernel_four_state import RunTrail
 from designer.dynamics.kernel_general import Log, ModeTables
 from designer.dynamics.kernel_modal import ModalTables
+from designer.dynamics.kernel_propagators import RunTrail
 from designer.dynamics.piecewise_linear import Drive, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
+from designer.dynamics.working_modes import MOST_STATES, TabulatedModes
 
 MAX_EVENTS = 10_000
 """Mode changes in one drive period past which the flow stops: chattering ends with a status."""
@@ -122,7 +124,8 @@ class Flow:
         self.system = system
         self.drive = drive
         self._modal = modal_tables.tables(system, drive) if fast and not system.working else None
-        self._working = working_modes.tables(system, drive) if fast else None
+        tabulated = fast and self._modal is None and system.size <= MOST_STATES
+        self._tabulated = TabulatedModes(system, drive) if tabulated else None
         self._index: dict[ModeKey, int] = {}
         self._keys: list[ModeKey] = []
         alone = zip(system.displacement, system.state_in, strict=True)
@@ -149,10 +152,13 @@ class Flow:
 
     @property
     def kernel(self) -> str:
-        """Which kernel carries it as long as all is usual: "modal", "circuit" or "general"."""
+        """Which kernel carries it as long as all is usual: "modal", "tabulated" ("circuit" for one
+        that keeps to its working modes) or "general"."""
         if self._modal is not None:
             return "modal"
-        return "general" if self._working is None else "circuit"
+        if self._tabulated is None:
+            return "general"
+        return "circuit" if self.system.working else "tabulated"
 
     def run(
         self,
@@ -187,9 +193,9 @@ class Flow:
         if self._modal is not None and plain and (self.system.continuous or not phi.size):
             return self._run_modal(self._modal, x, periods, key, phi, max_events)
         room = 8 + 16 * periods if measure else 0
-        if self._working is not None and key in self.system.working:
-            result = self._run_working(
-                self._working,
+        if self._tabulated is not None and self._tabulated.targets.may_enter(key):
+            result = self._run_tabulated(
+                self._tabulated,
                 x,
                 stretches,
                 points,
@@ -278,9 +284,9 @@ class Flow:
         code, done = self._in_chunks(advance, log, cursor, self._chunk(), 1)
         return self._result(code, log, done, 0, keys[int(cursor[0])], phi)
 
-    def _run_working(
+    def _run_tabulated(
         self,
-        tables: tuple[Array, Index],
+        modes: TabulatedModes,
         x: Array,
         stretches: int,
         points: int,
@@ -291,20 +297,41 @@ class Flow:
         *,
         measure: bool,
     ) -> FlowResult | None:
-        """The same by the fast path of circuits; None where the run leaves the working modes."""
-        keys = self.system.working
-        cursor = np.array([keys.index(key), 0, measure], dtype=np.int64)
+        """The same by the tabulated fast path; None where the run leaves the working modes."""
+        try:
+            cursor = np.array([modes.number(key), 0, measure, 0], dtype=np.int64)
+        except ArithmeticError:
+            return None
         log, met = self._log(x, stretches, room), np.zeros(1, dtype=np.int64)
-        graze = np.array([np.inf, np.inf, 0.0])
-        trail = RunTrail(log.extremes, graze, log.when, log.at, log.stop[:, 1].copy(), met)
+        undecided = np.zeros(1)
+        trail = RunTrail(log.extremes, log.graze, undecided, log.when, log.at, log.stop, met)
         anchor = working_modes.anchors(points)
-        drive = np.array([self.drive.omega, self.drive.period, max_events])
 
         def advance(part: slice, start: Array) -> int:
-            strobes, counts = log.strobes[part.start : part.stop + 1], log.impacts[part, 0]
-            return kernel_four_state.advance(
-                *tables, start, cursor, drive, anchor, phi, strobes, counts, trail
-            )
+            strobes = log.strobes[part.start : part.stop + 1]
+            counts = log.impacts[part].reshape(len(strobes) - 1, -1)
+            begin, before = cursor.copy(), phi.copy()
+            while True:
+                code = kernel_propagators.advance(
+                    modes.limited(max_events),
+                    start,
+                    cursor,
+                    self.drive.period,
+                    anchor,
+                    phi,
+                    strobes,
+                    counts,
+                    trail,
+                )
+                if code != kernel_orbit.UNKNOWN_MODE:
+                    return code
+                try:
+                    modes.enter(int(cursor[0]), int(cursor[3]))
+                except ArithmeticError:
+                    return kernel_orbit.LEFT
+                # From the start of the part again, now with this mode.
+                cursor[:], phi[:], counts[:], met[0], undecided[0] = begin, before, 0, 0, 0.0
+                log.extremes[:], log.graze[:] = [np.inf, -np.inf], np.inf
 
         chunk = stretches if measure else self._chunk() * points
         before = phi.copy()
@@ -312,13 +339,14 @@ class Flow:
         if code == kernel_orbit.LEFT:
             return None
         if met[0] > room and measure:  # more impacts than room: again, with room for all
-            return self._run_working(
-                tables, x, stretches, points, key, before, max_events, int(met[0]), measure=True
+            return self._run_tabulated(
+                modes, x, stretches, points, key, before, max_events, int(met[0]), measure=True
             )
-        log.stop[:, 1] = trail.stop
         if measure:
-            log.graze[0], log.tangencies[0] = graze[:2], graze[2]
-        return self._result(code, log, done, int(met[0]), keys[int(cursor[0])], phi)
+            log.tangencies[0] = int(undecided[0])
+        else:
+            log.graze[:] = np.inf
+        return self._result(code, log, done, int(met[0]), modes.targets.keys[int(cursor[0])], phi)
 
     def _log(self, x: Array, stretches: int, room: int) -> Log:
         """Room for what a run writes; the fast paths write a part of it."""
@@ -355,7 +383,7 @@ class Flow:
             code = advance(part, log.strobes[done].copy())
             if code == kernel_orbit.LEFT:
                 break
-            self._charge(budget, log.impacts[done : done + int(cursor[1]), 0], points)
+            self._charge(budget, log.impacts[done : done + int(cursor[1])], points)
             done += int(cursor[1])
         return code, done
 
@@ -365,7 +393,7 @@ class Flow:
         return max(1, min(CHUNK, int(periods)))
 
     def _charge(self, budget: Budget, counts: NDArray[np.int64], points: int = 1) -> None:
-        """Take from the budget what a fast path ran; counts : (stretches, 2) impacts."""
+        """Take from the budget what a fast path ran; counts : impacts, a row a stretch."""
         a_period = FAST_PERIOD + FAST_STEP * self.steps_a_period
         budget.take(len(counts) / points * a_period + FAST_IMPACT * float(counts.sum()))
 

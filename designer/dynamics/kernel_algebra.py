@@ -65,26 +65,27 @@ def substitute(a: Float, order: Int, r: Float, y: Float) -> None:
 
 @callee
 def spectral_radius(M: Float, doublings: int) -> float:
-    """‖M^(2^k)‖ to the power 2^-k for k = ``doublings``, M (4, 4): the largest modulus of an
-    eigenvalue, within a few per cent for 5 and to rounding for 48."""
-    power, square, total, weight = M.copy(), np.zeros((4, 4)), 0.0, 1.0
+    """‖M^(2^k)‖ to the power 2^-k for k = ``doublings``: the largest modulus of an eigenvalue,
+    within a few per cent for 5 and to rounding for 48."""
+    n = len(M)
+    power, square, total, weight = M.copy(), np.zeros((n, n)), 0.0, 1.0
     for _ in range(doublings + 1):
         size = 0.0
-        for i in range(4):
-            for j in range(4):
+        for i in range(n):
+            for j in range(n):
                 size += power[i, j] * power[i, j]
         size = np.sqrt(size)
         if not (size > 0.0 and size < np.inf):
             return 0.0 if size == 0.0 else np.inf
         total += weight * np.log(size)
         weight *= 0.5
-        for i in range(4):
-            for j in range(4):
+        for i in range(n):
+            for j in range(n):
                 power[i, j] /= size
-        for i in range(4):
-            for j in range(4):
+        for i in range(n):
+            for j in range(n):
                 entry = 0.0
-                for k in range(4):
+                for k in range(n):
                     entry += power[i, k] * power[k, j]
                 square[i, j] = entry
         power, square = square, power

@@ -9,15 +9,16 @@ the cubic Hermite interpolant and M4; where that fails, the step is halved.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee
+from designer.base.jit import callee, inlined
 
 Float = NDArray[np.float64]
-Expand = Callable[[Float, int, float, Float], float]
-FindCrossing = Callable[..., float]
+Expand = Callable[[Float, Any, float, Float], float]
+FindCrossing = Callable[..., tuple[float, int]]
 TurningValues = Callable[..., int]
 
 BLOCK_STEP = 0.4
@@ -35,7 +36,7 @@ FINEST = 1e-10
 """Of a step: below it an undecided tangency is taken for none."""
 
 # Places in the scratch array.
-NOW, POINT, SMALL, COEF, F, D, BOX, STACK = 0, 8, 16, 24, 32, 32 + NODES, 48, 112
+NOW, POINT, SMALL, COEF, F, D, STACK = 0, 16, 32, 40, 48, 48 + NODES, 64
 ROOM = 84
 """Intervals that the bisection may hold."""
 SCRATCH = STACK + 6 * (ROOM + 2)
@@ -80,12 +81,12 @@ def suspect_step(
 def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
     """The compiled searches of a path that expands its functions by ``expand``.
 
-    ``expand(data, m, t, work)`` writes the Taylor series of function m about the part nearest to t
-    into COEF and returns that part's time.
+    ``expand(data, m, t, work)`` writes the Taylor series of the function that the path knows as m
+    about the part nearest to t into COEF and returns that part's time.
     """
 
     @callee
-    def halve(data: Float, m: int, target: float, sign: float, work: Float, o: int) -> None:
+    def halve(data: Float, m: Any, target: float, sign: float, work: Float, o: int) -> None:
         """Put both halves of the interval at o on the stack, the earlier one on top."""
         a, b, t = work[o], work[o + 1], 0.5 * (work[o] + work[o + 1])
         f, d, _ = series_value(work, t - expand(data, m, t, work))
@@ -94,9 +95,9 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
         work[o + 8], work[o + 9], work[o + 10], work[o + 11] = work[o + 2], work[o + 3], f, d
         work[o], work[o + 1], work[o + 2], work[o + 3] = t, b, f, d
 
-    @callee
+    @inlined
     def newton(
-        data: Float, m: int, o: int, h: float, target: float, sign: float, work: Float
+        data: Float, m: Any, o: int, h: float, target: float, sign: float, work: Float
     ) -> float:
         """Root in the interval at o, where it rises: the cubic's, then the Taylor polynomial's."""
         o &= 0xFFFF
@@ -109,8 +110,11 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
         for _ in range(2):
             s -= (fa + s * (w * da + s * (c2 + s * c3))) / (w * da + s * (2.0 * c2 + 3.0 * s * c3))
         t = a + min(max(s, 0.0), 1.0) * w
+        near = np.inf
         for _ in range(60):
-            f, d, e = series_value(work, t - expand(data, m, t, work))
+            if abs(t - near) > h / (2 * PARTS):
+                near = expand(data, m, t, work)
+            f, d, e = series_value(work, t - near)
             f, d, e = sign * (f - target), sign * d, sign * e
             a, b = (a, t) if f > 0.0 else (t, b)
             step = f / d
@@ -124,22 +128,18 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
             t = u
         return float(t)
 
-    @callee
-    def find_crossing(
-        data: Float, m: int, k: int, h: float, m4: float, target: float, sign: float,
+    @inlined
+    def first_rise(
+        data: Float, m: Any, k: int, h: float, m4: float, target: float, sign: float,
         tangency: float, undecided: Float, work: Float,
     ) -> float:  # fmt: skip
-        """First time in step k at which sign · (f - target) rises through 0, or -1.
-
-        tangency : an interval over which the function is smaller than this is not halved any more;
-        undecided[-1] counts those.
-        """
+        """First time in step k at which sign · (f - target) rises through 0, or -1."""
         k &= 7
         # Rows of the stack: a, b, f(a), f'(a), f(b), f'(b).
         work[STACK], work[STACK + 1] = k * h, (k + 1) * h
         work[STACK + 2], work[STACK + 3] = sign * (work[F + k] - target), sign * work[D + k]
         work[STACK + 4], work[STACK + 5] = sign * (work[F + k + 1] - target), sign * work[D + k + 1]
-        top = 1
+        top, time = 1, -1.0
         while top > 0:
             top -= 1
             o = STACK + 6 * (top & 127)
@@ -157,9 +157,8 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
             if min(min(da, db), middle) - slack > 0.0:
                 if fb <= 0.0:
                     continue
-                if fa > 0.0:
-                    return float(a)
-                return newton(data, m, o, h, target, sign, work)
+                time = a if fa > 0.0 else newton(data, m, o, h, target, sign, work)
+                break
             if max(max(da, db), middle) + slack < 0.0:
                 continue
             nothing = max(max(abs(fa), abs(b1)), max(abs(b2), abs(fb))) + rest < tangency
@@ -169,11 +168,30 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
                 continue
             halve(data, m, target, sign, work, o)
             top += 2
-        return -1.0
+        return float(time)
+
+    @inlined
+    def find_crossing(
+        data: Float, m: Any, k: int, h: float, m4: float, low: float, high: float,
+        tangency: float, undecided: Float, work: Float,
+    ) -> tuple[float, int]:  # fmt: skip
+        """First time in step k at which f leaves [low, high], or -1, and the side, 1 above.
+
+        tangency : an interval over which the function is nearer than this to a limit is not halved
+        any more; undecided[-1] counts those. An infinite limit is not looked at.
+        """
+        first, through = -1.0, 0
+        for side in (1.0, -1.0):
+            target = high if side > 0.0 else low
+            if abs(target) < np.inf:
+                time = first_rise(data, m, k, h, m4, target, side, tangency, undecided, work)
+                if time >= 0.0 and (first < 0.0 or time < first):
+                    first, through = time, int(side)
+        return first, through
 
     @callee
     def turning_value(
-        data: Float, m: int, low: float, high: float, t: float, rate: float, h: float,
+        data: Float, m: Any, low: float, high: float, t: float, rate: float, h: float,
         work: Float,
     ) -> float:  # fmt: skip
         """Value where the rate changes its sign in [low, high], by Newton from t."""
@@ -192,7 +210,7 @@ def searches(expand: Expand) -> tuple[FindCrossing, TurningValues]:
 
     @callee
     def turning_values(
-        data: Float, m: int, end: float, h: float, m4: float, work: Float,
+        data: Float, m: Any, end: float, h: float, m4: float, work: Float,
         values: Float,
     ) -> int:  # fmt: skip
         """How many times function m turns within [0, end]; F and D hold its nodes.

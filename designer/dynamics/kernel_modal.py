@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from designer.base.jit import callee, compiled
+from designer.base.jit import callee, compiled, inlined
 from designer.dynamics.kernel_crossing import (
     COEF,
     LAST,
@@ -228,7 +228,7 @@ def mode_of(data: Float, x: Float) -> int:
 _find_crossing, _turning_values = searches(_expand)
 
 
-@callee
+@inlined
 def _first_crossing(
     data: Float, m: int, m4: float, left: float, undecided: Float, work: Float
 ) -> tuple[float, int]:
@@ -239,15 +239,7 @@ def _first_crossing(
     count, rest = min(STEPS, int(left / h) + 1), m4 * data[o + REST]
     first, side, k = -1.0, 0, suspect_step(h, rest, low, high, count, work, 0)
     while k < count:
-        if high < np.inf:
-            first, side = (
-                _find_crossing(data, m, k, h, m4, high, 1.0, 0.0, undecided, work),
-                1,
-            )
-        if low > -np.inf:
-            other = _find_crossing(data, m, k, h, m4, low, -1.0, 0.0, undecided, work)
-            if other >= 0.0 and (first < 0.0 or other < first):
-                first, side = other, -1
+        first, side = _find_crossing(data, m, k, h, m4, low, high, 0.0, undecided, work)
         if first >= 0.0:
             break
         k = suspect_step(h, rest, low, high, count, work, k + 1)

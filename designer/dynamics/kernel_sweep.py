@@ -196,7 +196,7 @@ def classify(
     growth : of a tangent vector per period over ``span`` periods. patience : periods that may be
     added where it is neither periodic nor chaotic. orbit : (4,) a strobe of it, or where the motion
     was left. facts : (3,) spectral radius, asymmetry half a period later, growth per period.
-    counted : (4,) n, p, q, and the periods that it is charged. cursor : (2,) mode and code at the
+    counted : (4,) as ``dynamics.kernel_orbit`` has it. cursor : (2,) mode and code at the
     end.
     """
     if _periodic(model, strobes, peak, orbit, facts, counted):

@@ -219,7 +219,10 @@ def _by_kernel(
         cursor,
     )
     stopped = code == kernel.STOPPED
-    n, p, q = (int(v) if code == kernel.PERIODIC else 0 for v in counted[:3])
+    n, p, q = (
+        int(counted[place]) if code == kernel.PERIODIC else 0
+        for place in (0, kernel_orbit.UPPER, kernel_orbit.LOWER)
+    )
     return Steady(
         status=_STOPPED[int(cursor[1])] if stopped else _STATUS[code],
         n=n,

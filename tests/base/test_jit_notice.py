@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from numba.core import event
 
 from designer.base.jit_notice import MOTION, PARTS, announced
-from designer.dynamics import kernel_four_state, kernel_general, kernel_modal
+from designer.dynamics import kernel_general, kernel_modal, kernel_propagators
 
 
 def _dispatcher(module: object) -> object:
@@ -28,8 +28,8 @@ def test_each_part_is_announced_once_and_by_name() -> None:
         for module in (
             kernel_general,
             kernel_modal,
-            kernel_four_state,
-            kernel_four_state,
+            kernel_propagators,
+            kernel_propagators,
             kernel_general,
         ):
             _compile(module)
@@ -38,5 +38,5 @@ def test_each_part_is_announced_once_and_by_name() -> None:
     _compile("designer.dynamics.kernel_sweep")
     assert len(said) == 2
     assert MOTION in said[0]
-    assert PARTS["kernel_four_state"] in said[1]
+    assert PARTS["kernel_propagators"] in said[1]
     assert all("first use of this part" in line and "busy machine" in line for line in said)

@@ -10,7 +10,7 @@ import pytest
 
 from designer.base import jit
 from designer.circuit import kernel_nodal
-from designer.dynamics import kernel_boards, kernel_four_state, kernel_mode_tables
+from designer.dynamics import kernel_boards, kernel_propagators
 from designer.jobs import compile_ahead
 from designer.jobs.compile_ahead import compile_circuits, compiling_ahead
 
@@ -80,8 +80,7 @@ def test_it_compiles_what_a_circuit_needs() -> None:
     compile_circuits()
     kernels: list[Any] = [
         kernel_nodal.solve_all,
-        kernel_four_state.advance,
+        kernel_propagators.advance,
         kernel_boards.respond_all,
-        kernel_mode_tables.fill,
     ]
     assert all(kernel.signatures for kernel in kernels)

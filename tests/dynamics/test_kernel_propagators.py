@@ -13,7 +13,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.kernel_nodal import solve_all
 from designer.circuit.netlist import Board, Circuit, nominal_board
 from designer.circuit.reduction import Reduction
-from designer.dynamics import kernel_four_state as kernel, working_modes
+from designer.dynamics import kernel_propagators as kernel, working_modes
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.kernel_orbit import DONE
 from designer.dynamics.piecewise_linear import Drive
@@ -29,10 +29,11 @@ CIRCUITS = {"saturation": SATURATION, "rectifier": RECTIFIER, "upper": UPPER}
 SPREAD = Spread(0.05, 0.05, 3e-3, 10e-3)
 NO_TRAIL = kernel.RunTrail(
     np.zeros((4, 2)),
-    np.zeros(3),
+    np.zeros((1, 2)),
+    np.zeros(1),
     np.zeros(0),
     np.zeros((0, 4)),
-    np.zeros(0, dtype=np.int64),
+    np.zeros((0, 2), dtype=np.int64),
     np.zeros(1, dtype=np.int64),
 )
 VOLTS = {"saturation": 0.1, "rectifier": 6.0, "upper": 1.6}
@@ -99,17 +100,17 @@ def test_the_fast_path_serves_good_boards(kind: str) -> None:
     served = 0
     for index in range(20):
         system = Reduction(circuit, draw(circuit, SPREAD, 2, index)).system()
-        tables = working_modes.tables(system, drive)
-        assert tables is not None
-        cursor, strobes = np.zeros(3, dtype=np.int64), np.zeros((6, 4))
+        modes = working_modes.TabulatedModes(system, drive)
+        for key in system.working:
+            modes.number(key)
         code = kernel.advance(
-            *tables,
+            modes.limited(1000),
             np.zeros(4),
-            cursor,
-            np.array([drive.omega, drive.period, 1000.0]),
+            np.array([0, 0, 0, 0]),
+            drive.period,
             working_modes.anchors(1),
             np.zeros((0, 0)),
-            strobes,
+            np.zeros((6, 4)),
             np.zeros((5, 2), dtype=np.int64),
             NO_TRAIL,
         )
@@ -130,10 +131,10 @@ def test_a_run_that_clips_is_left_to_the_general_kernel() -> None:
 def test_boards_reduced_together_are_the_single_reductions(kind: str) -> None:
     circuit = CIRCUITS[kind]
     boards = draw_many(circuit, SPREAD, 5, range(6))
-    modes, good = working.of_boards(boards)
-    assert modes is not None
-    assert good.all()
-    keys = working.working_keys(circuit)
+    found = working.BoardModes(boards)
+    assert found.good.all()
+    keys, modes = working.working_keys(circuit), found.modes
+    assert found.targets.keys == list(keys)
     for index in range(len(boards)):
         system = Reduction(circuit, boards.board(index)).system()
         for k, key in enumerate(keys):
@@ -143,7 +144,7 @@ def test_boards_reduced_together_are_the_single_reductions(kind: str) -> None:
             for got, want in ((modes.B[index, k], mode.B), (modes.d[index, k], mode.d)):
                 np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-12 * scale)
             assert int(modes.guards[k]) == len(mode.guards)
-            assert int(modes.side[k]) == mode.sides[0]
+            assert tuple(modes.side[k]) == mode.sides
             for g, guard in enumerate(mode.guards):
                 row = np.concatenate([guard.C, [guard.D, guard.e]])
                 size = float(np.abs(row).max())
@@ -174,11 +175,13 @@ def test_elimination_is_numpy_s() -> None:
 
 def test_ideal_op_amps_do_without_the_fast_path() -> None:
     """Between two diodes nothing closes the loop then: that mode cannot be built."""
-    flow = Flow(Reduction(RECTIFIER, nominal_board(RECTIFIER, ideal=True)).system(), Drive(1e3))
-    assert flow._working is None
+    system = Reduction(RECTIFIER, nominal_board(RECTIFIER, ideal=True)).system()
+    modes = working_modes.TabulatedModes(system, Drive(1e3))
+    with pytest.raises(ArithmeticError):
+        _ = [modes.number(key) for key in system.working]
     one = replace(nominal_board(RECTIFIER), inverse_gain=0.0)
-    _, good = working.of_boards(Boards.of(RECTIFIER, [nominal_board(RECTIFIER), one]))
-    assert good.tolist() == [True, False]
+    together = working.BoardModes(Boards.of(RECTIFIER, [nominal_board(RECTIFIER), one]))
+    assert together.good.tolist() == [True, False]
 
 
 def test_an_ideal_board_that_clips_comes_back() -> None:
