@@ -289,8 +289,9 @@ def modes_at(system: PiecewiseLinearSystem, x: Array, u: Array, keys: list[ModeK
         if not moved:
             return at
         unsettled = np.concatenate(moved)
-    for i in unsettled:
-        at[i] = number(system.mode_at(x[i], float(u[i])))
+    for i in np.sort(unsettled):  # neighbours in time are mostly in one mode
+        near = keys[int(at[i - 1])] if i else None
+        at[i] = number(system.mode_at(x[i], float(u[i]), near))
     return at
 
 
