@@ -84,6 +84,7 @@ class TermSearch:
         limit = max(limit, EXACT)
         rules, (terms, states) = self._rules(limit), self._size
         best, met, t, steps, room = parts, [parts], -np.inf, 0, 8
+        known = set[bytes]()
         while t < np.inf and steps * CANDIDATE < patience:
             self._tell(limit, rules, t)
             rows = np.zeros((room, terms + states), dtype=np.int64)
@@ -91,7 +92,11 @@ class TermSearch:
             t, count, taken = choices(rules, limit, t, left, *self.cost(best), rows)
             before = best
             for row in rows[:count][:, self._by_name]:
-                if self.cost(row) < self.cost(best) and self._good(row, limit):
+                if row.tobytes() in known or self.cost(row) >= self.cost(best):
+                    continue
+                known.add(row.tobytes())
+                taken += FRESH
+                if self._good(row, limit):
                     best = row
                     met.append(row)
             room = room * 4 if count == room and best is before else 8
