@@ -16,14 +16,17 @@ def bifurcation(
         option(
             "--over",
             "NAME",
-            "omega (default), b, k0, zeta, m, k, c or f20; with --circuit frequency in Hz "
-            "(default), omega, amplitude or offset in V; with --basins a state.",
+            "omega (default), b, k0, zeta, m, k, c or f20; of format 2 a number of an element, "
+            "such as A.upper; with --circuit frequency in Hz (default), omega, amplitude or "
+            "offset in V; with --basins a state.",
         ),
     ] = None,
     from_: Annotated[
         str | None,
         option(
-            "--from", "A", 'One end of the sweep; of a [mechanical] model also "10 Hz" or "0.5 mm".'
+            "--from",
+            "A",
+            'One end of the sweep; of a file with SI values also "10 Hz" or "0.5 mm".',
         ),
     ] = None,
     to: Annotated[str | None, option("--to", "B", "The other end.")] = None,

@@ -221,14 +221,14 @@ def simulate(
     model: Source,
     omega: Annotated[
         list[float] | None,
-        option("--omega", "W", "Dimensionless frequency; may be repeated."),
+        option("--omega", "W", "Frequency in the model's own units; may be repeated."),
     ] = None,
     frequency: Annotated[
         list[str] | None,
         option(
             "--frequency",
             "F",
-            'Frequency of a [mechanical] model, such as "10 Hz" or "62.8 rad/s"; may be repeated.',
+            'Of a model file with SI values, such as "10 Hz" or "62.8 rad/s"; may be repeated.',
         ),
     ] = None,
     engine: Annotated[
