@@ -183,8 +183,7 @@ def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
     """An orbit in model units; with ``si`` also its extremes and impacts in SI units."""
 
     known = len(orbit.extremes) > 0
-    columns = (orbit.impact_times, orbit.impact_sides, orbit.impact_velocities)
-    met = zip(*columns, orbit.impact_clearances, strict=True)
+    met = zip(orbit.impact_times, orbit.impact_sides, orbit.impact_velocities, strict=True)
     return {
         "response": orbit.response,
         "status": str(orbit.status),
@@ -200,13 +199,8 @@ def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
         "extremes": _by_state(orbit.extremes) if known else None,
         "impact_velocities": orbit.impact_velocities,
         "impacts": [
-            {
-                "time": t,
-                "side": "upper" if side > 0 else "lower",
-                "velocity": v,
-                **({"clearance": int(k)} if orbit.more else {}),
-            }
-            for t, side, v, k in met
+            {"time": t, "side": "upper" if side > 0 else "lower", "velocity": v}
+            for t, side, v in met
         ],
         "multipliers": list(orbit.multipliers.astype(complex)),
         "lyapunov": orbit.lyapunov,
