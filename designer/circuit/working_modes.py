@@ -176,17 +176,19 @@ OF_EACH = ("A", "B", "d", "guard", "past", "good", "displacement", "velocity")
 
 
 def at_rest(boards: Boards) -> tuple[Array, Mapping[int, Array]]:
-    """v1 (N,) [V] at which each board rests inside the clearance with the generator off, and v1 at
-    which fv leaves zero, by side: 1 upper, -1 lower. nan for a board without a rest point."""
+    """v1 (N,) [V] at which each board rests with the generator off, inside the clearance or against
+    a preloaded stop, and v1 at which fv leaves zero, by side: 1 upper, -1 lower. nan for a board
+    without a rest point."""
     circuit = boards.circuit
     equations, n = NodalEquations(circuit, boards.stacked), len(circuit.states)
     mode = _solved(equations, circuit.rest)
+    still = mode if circuit.rest == circuit.open else _solved(equations, circuit.open)
     A = np.where(mode.good[:, None, None], mode.rates[..., :n], np.eye(n))
     x = np.linalg.solve(A, -mode.rates[..., n + 1][..., None])[..., 0]
     j = circuit.states.index(circuit.stops[0].state) if circuit.stops else 0
     stops = {
         equations.sides(way.target)[0]: -way.row[..., n + 1] / way.row[..., j]
-        for way in mode.exits
+        for way in still.exits
         if way.clearance == 0
     }
     return np.where(mode.good, x[:, j], np.nan), stops

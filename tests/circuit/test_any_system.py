@@ -11,10 +11,12 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
+from designer.circuit.board_arrays import Boards
 from designer.circuit.coefficients import coefficient_errors
 from designer.circuit.dead_zone_parts import DeadZoneStage, idle_limits
 from designer.circuit.netlist import Circuit, Section, nominal_board
 from designer.circuit.reduction import Reduction
+from designer.circuit.working_modes import at_rest
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 from designer.model.mechanics import Clearance, SecondOrderSystem, Side
@@ -266,3 +268,18 @@ def test_what_the_saturating_stage_cannot_make_is_refused(clearance: Clearance, 
     with pytest.raises(InputError) as caught:
         exact_circuit(system, SCALE, DeadZoneStage())
     assert text in str(caught.value)
+
+
+def test_a_preloaded_board_rests_against_its_stop() -> None:
+    """Where the springs and the stop balance; contact begins and ends at the gaps."""
+    stops = Clearance("A", 0, None, Side(-0.1, 5.0), Side(0.4, 5.0))
+    system = two(clearances=(stops,))
+    circuit = exact_circuit(system, SCALE)
+    ideal = replace(nominal_board(circuit), inverse_gain=1e-9, bias={})
+    rest, ends = at_rest(Boards.of(circuit, [ideal]))
+    stiffness = system.stiffness.copy()
+    stiffness[0, 0] += 5.0
+    x1 = float(np.linalg.solve(stiffness, np.array([-0.5, 0.0]))[0])
+    assert rest[0] == pytest.approx(x1 * SCALE.volts[0], rel=1e-5)
+    assert ends[1][0] == pytest.approx(-0.1 * SCALE.volts[0], rel=1e-5)
+    assert ends[-1][0] == pytest.approx(-0.4 * SCALE.volts[0], rel=1e-5)
