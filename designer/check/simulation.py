@@ -284,7 +284,8 @@ def _twin(flow: Flow, orbit: Orbit) -> Orbit | None:
 def _exact_settings(flow: Flow, orbit: Orbit, unit: float) -> dict[str, Any]:
     """kernel : which one carries the strobes. undecided_below : contacts shallower and misses
     nearer than this, in units of x1, count as grazing."""
-    peak = float(np.abs(orbit.extremes[0]).max()) if len(orbit.extremes) else float("nan")
+    moving = flow.system.moving
+    peak = float(np.abs(orbit.extremes[moving]).max()) if len(orbit.extremes) else float("nan")
     return {"kernel": flow.kernel, "undecided_below": attractors.ENGINE_ERROR * peak / unit}
 
 
@@ -321,8 +322,7 @@ def _on_circuit(
     r, flow, orbits = _circuit_orbits(made, spec, scan)
     volts, seconds = made.design.volts(r.b), made.design.errors.scales.seconds
     measured = [_measured(flow, o) for o in orbits]
-    moving = _moving(made.modelfile.model)
-    shown = [dimensionless(o, volts, seconds, moving) for o in measured]
+    shown = [made.design.in_model_units(o, volts) for o in measured]
     kept = [i for i in _distinct(shown) if i == 0 or shown[i].status in ANSWERS]
     known = _attractors([measured[i] for i in kept])
     model = made.modelfile.model.at(r.b)
@@ -331,7 +331,7 @@ def _on_circuit(
     more = [_measured(flow, b.orbit) for b in met.basins[len(known) :]]
     kept += range(len(measured), len(measured) + len(more))
     measured += more
-    shown += [dimensionless(o, volts, seconds, moving) for o in more]
+    shown += [made.design.in_model_units(o, volts) for o in more]
     twins = {i: _twin(flow, measured[i]) for i in kept}
     return Simulated(
         r.omega,
@@ -340,11 +340,9 @@ def _on_circuit(
         shown[0],
         tuple(shown[i] for i in kept[1:]),
         0.0,
-        tuple(
-            None if t is None else dimensionless(t, volts, seconds, moving) for t in twins.values()
-        ),
+        tuple(None if t is None else made.design.in_model_units(t, volts) for t in twins.values()),
         r.b,
-        settings=_exact_settings(flow, measured[0], float(volts[0])),
+        settings=_exact_settings(flow, measured[0], float(volts[made.design.moving])),
         traces=_traces(flow, (measured[0], twins[0]), volts, seconds) if traces else (),
         trust=trust.of_orbit(flow, measured[0]),
         coexistence=met,
@@ -386,7 +384,7 @@ def _in_ngspice(
         gates = [next(results) for _ in range(count)]
         answers = [CheckedResponse(r, r.orbit, excitation, g).ngspice for g in gates]
         orbits = [o for o in answers if o is not None] or [Orbit(OrbitStatus.FAILED)]
-        shown = [dimensionless(o, volts, scale, _moving(made.modelfile.model)) for o in orbits]
+        shown = [made.design.in_model_units(o, volts) for o in orbits]
         out.append(
             Simulated(
                 r.omega,
@@ -411,11 +409,6 @@ def _unmoved(model: MechanicalModel, orbits: Sequence[Orbit]) -> tuple[Array, ..
     none."""
     moved = ground_of(model).any()
     return tuple(np.zeros((0, 2)) if moved else orbit.extremes for orbit in orbits)
-
-
-def _moving(model: MechanicalModel) -> list[int]:
-    """The mass that moves in each clearance."""
-    return [stop.mass for stop in model.second_order().clearances]
 
 
 def _gate_settings(result: numerics_gate.GateResult) -> dict[str, Any]:
@@ -454,24 +447,3 @@ def _measured(flow: Flow, orbit: Orbit) -> Orbit:
     with flow.within(Budget(step_budget.SETTLING)):
         run_ = flow.run(orbit.start, 200, measure=True)
     return orbit if run_.status is not FlowStatus.DONE else replace(orbit, extremes=run_.extremes)
-
-
-def dimensionless(orbit: Orbit, volts: Array, seconds: float, moving: Sequence[int] = ()) -> Orbit:
-    """An orbit in volts and seconds, in model units: volts (states,) per unit, seconds per unit
-    of model time.
-
-    moving : the mass that moves in each clearance, in whose volts a circuit has the motion there;
-    the least penetration and the nearest miss are taken to be in the first one's.
-    """
-    first = 2 * moving[0] if moving else 0
-    speeds = 2 * np.array([*moving, 0])[orbit.impact_clearances] + 1
-    return replace(
-        orbit,
-        start=orbit.start / volts if len(orbit.start) else orbit.start,
-        extremes=orbit.extremes / volts[:, None] if len(orbit.extremes) else orbit.extremes,
-        impact_times=orbit.impact_times / seconds,
-        impact_velocities=orbit.impact_velocities / volts[speeds],
-        lyapunov=orbit.lyapunov * seconds,
-        penetration=orbit.penetration / float(volts[first]),
-        miss=orbit.miss / float(volts[first]),
-    )

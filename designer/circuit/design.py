@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from designer.base.frames import frame, table_html
 from designer.circuit.coefficients import CoefficientErrors
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite, composites_of
+from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import MechanicalModel
 
@@ -130,6 +131,33 @@ class Design:
     def _repr_html_(self) -> str:
         note = f"largest coefficient error {self.errors.max_error:.3g}, {self.certificate.status}"
         return table_html("Parts", self._parts(), note)
+
+    @property
+    def moving(self) -> int:
+        """Index of the displacement in the first clearance, or of the first one."""
+        stops = self.model.second_order().clearances
+        return 2 * stops[0].mass if stops else 0
+
+    def impact_volts(self, orbit: Orbit, volts: Array) -> Array:
+        """(k,) volts per unit of the model's velocity at each impact of a board's orbit, by the
+        mass that moves in its clearance. volts (states,) : ``volts``."""
+        stops = self.model.second_order().clearances
+        rates = np.array([2 * stop.mass + 1 for stop in stops], dtype=np.intp)
+        return np.asarray(volts[rates[orbit.impact_clearances]])
+
+    def in_model_units(self, orbit: Orbit, volts: Array) -> Orbit:
+        """An orbit of a board, in volts and seconds, in model units. volts : as of ``volts``."""
+        seconds, moving = self.errors.scales.seconds, float(volts[self.moving])
+        return replace(
+            orbit,
+            start=orbit.start / volts if len(orbit.start) else orbit.start,
+            extremes=orbit.extremes / volts[:, None] if len(orbit.extremes) else orbit.extremes,
+            impact_times=orbit.impact_times / seconds,
+            impact_velocities=orbit.impact_velocities / self.impact_volts(orbit, volts),
+            lyapunov=orbit.lyapunov * seconds,
+            penetration=orbit.penetration / moving,
+            miss=orbit.miss / moving,
+        )
 
     def volts(self, b: float | None = None) -> Array:
         """(states,) volts per unit of each model state at clearance ``b``."""

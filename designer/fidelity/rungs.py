@@ -22,6 +22,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.check.synthesis_result import Synthesis
 from designer.circuit import nominal
+from designer.circuit.design import Design
 from designer.circuit.ensemble import displacement
 from designer.circuit.netlist import Excitation
 from designer.circuit.nominal import on_circuit
@@ -106,6 +107,7 @@ class _Asked:
 
     response: ModelResponse
     model: MechanicalModel
+    design: Design
     volts: Array
     subject: GateSubject
 
@@ -132,7 +134,7 @@ def measured(
     pool : for what ngspice answers; clock : of another pool, of one worker, for what it costs.
     """
     one = subject(made, r)
-    asked = _Asked(r, made.design.model.at(r.b), made.design.volts(r.b), one)
+    asked = _Asked(r, made.design.model.at(r.b), made.design, made.design.volts(r.b), one)
     entries = [*_exact(asked), *_spice(asked, pool, clock, levels)]
     entrants = [entrant for _, entrant in entries]
     settings = None
@@ -179,8 +181,8 @@ def _exact(asked: _Asked) -> Iterator[tuple[RungAnswer, Entrant]]:
             CIRCUIT,
             "exact",
             {},
-            _in_model_units(own, asked.volts),
-            _drawn(on, own, float(asked.volts[0])),
+            _in_model_units(own, asked),
+            _drawn(on, own, float(asked.volts[on.system.moving])),
         ),
         here(CIRCUIT, lambda n: on.run(begin, n), BASELINE),
     )
@@ -222,7 +224,7 @@ def _runge_kutta(
         keep=True,
     )
     found = read(Waveforms(time, signals, "", 0.0), reading)
-    return found.orbit, _traced(found, 1.0)
+    return found.orbit, _traced(found, 1.0, system.moving)
 
 
 def _spice(
@@ -258,8 +260,9 @@ def _spice(
             if isinstance(found, SimulationFailed):
                 orbit, shown = Orbit(OrbitStatus.FAILED, reason=found.reason), np.zeros(0)
             else:
-                orbit = _in_model_units(found.orbit, asked.volts)
-                shown = _traced(found, float(asked.volts[0]))
+                orbit = _in_model_units(found.orbit, asked)
+                moving = one.system.moving
+                shown = _traced(found, float(asked.volts[moving]), moving)
             yield (
                 RungAnswer(
                     one.rung, names[k], said, orbit, shown, reason=orbit.reason, gate=passed
@@ -281,8 +284,9 @@ def _timed(subject: GateSubject, settings: SolverSettings, clock: SpiceClock) ->
     return clock.entrant(subject.rung, gate.job(short, settings), gate.length(short))
 
 
-def _in_model_units(orbit: Orbit, volts: Array) -> Orbit:
-    return replace(orbit, impact_velocities=orbit.impact_velocities / volts[1])
+def _in_model_units(orbit: Orbit, asked: _Asked) -> Orbit:
+    volts = asked.design.impact_volts(orbit, asked.volts)
+    return replace(orbit, impact_velocities=orbit.impact_velocities / volts)
 
 
 def _drawn(flow: Flow, orbit: Orbit, volts: float) -> Array:
@@ -291,14 +295,14 @@ def _drawn(flow: Flow, orbit: Orbit, volts: float) -> Array:
     return displacement(flow, orbit) / volts
 
 
-def _traced(found: Read, volts: float) -> Array:
+def _traced(found: Read, volts: float, moving: int) -> Array:
     """(n · POINTS,) first displacement of a run's last n periods."""
     if not found.orbit.n or found.trace is None:
         return np.zeros(0)
     time, states = found.trace
     count = found.orbit.n * POINTS
     grid = time[-1] * np.arange(count) / count
-    return np.asarray(np.interp(grid, time, states[:, 0])) / volts
+    return np.asarray(np.interp(grid, time, states[:, moving])) / volts
 
 
 def companions(settings: SolverSettings) -> tuple[SolverSettings, SolverSettings]:

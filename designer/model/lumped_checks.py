@@ -55,6 +55,11 @@ def _check_names(system: Elements) -> None:
             _refuse(f"{field}.name", name, "a name that no other mass or clearance has")
         if name in RESERVED:
             _refuse(f"{field}.name", name, f"a name other than {', '.join(RESERVED)}")
+    nets = Counter(gap.name.casefold().removesuffix("_out") for gap in system.gaps)
+    for gap in system.gaps:  # nets of the circuit bear them, and SPICE knows no capitals
+        if nets[gap.name.casefold().removesuffix("_out")] > 1:
+            expected = "a name that differs from the others in more than capitals or an _out"
+            _refuse("clearance.name", gap.name, expected)
     for kind, between in _joints(system):
         for name in between:
             if name not in (*system.names, GROUND):

@@ -196,6 +196,12 @@ WRONG: list[tuple[str, str, str]] = [
     ),
     (HAMMER.replace("[[clearance]]", "[[clearence]]"), "clearence", 'did you mean "clearance"?'),
     ("format = 2\n", "mass", "at least one table"),
+    (
+        HAMMER + '[[clearance]]\nname = "a"\nbetween = ["casing", "ground"]\nupper = 1.0\n'
+        "stiffness = 2.0\n",
+        "clearance.name",
+        "more than capitals",
+    ),
 ]
 
 
