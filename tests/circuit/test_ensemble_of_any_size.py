@@ -1,0 +1,58 @@
+"""Boards of three masses and two clearances: the compiled way is the general one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from designer.circuit.ensemble import Ensemble
+from designer.circuit.netlist import nominal_board
+from designer.circuit.reduction import Reduction
+from designer.dynamics.attractors import settle
+from designer.dynamics.flow import Flow
+from designer.dynamics.orbit import OrbitStatus
+from designer.dynamics.piecewise_linear import Drive
+from designer.model.mechanics import Clearance, SecondOrderSystem, Side
+from designer.spread.spread import Spread, draw_many
+from tests.shared.exact_circuits import Scale, exact_circuit
+
+STIFFNESS = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
+SYSTEM = SecondOrderSystem(
+    mass=np.ones(3),
+    damping=0.2 * STIFFNESS,
+    stiffness=STIFFNESS,
+    force=np.array([1.5, 0.0, 0.0]),
+    clearances=(
+        Clearance.even(0, 9.0, 0.3),
+        Clearance("B", 2, None, Side(0.15, 5.0), Side(0.2, 7.0)),
+    ),
+)
+SCALE = Scale(1e-3, np.full(6, 6.0), 1.3)
+COUNT = 6
+
+
+def test_every_clearance_is_counted_as_by_the_general_kernel() -> None:
+    circuit = exact_circuit(SYSTEM, SCALE)
+    drive = Drive(1.1 / SCALE.seconds, -SCALE.generator)
+    nominal = Flow(Reduction(circuit, nominal_board(circuit)).system(), drive)
+    start = settle(nominal, np.zeros(6)).start
+    boards = draw_many(circuit, Spread(0.01, 0.01, 1e-3, 4e-3), 7, range(COUNT))
+    starts = np.tile(start, (COUNT, 1))
+    fast, slow = Ensemble(boards), Ensemble(boards, fast=False)
+    asked = range(COUNT), [drive] * COUNT, starts
+    for a, b in zip(fast.settle(*asked), slow.settle(*asked), strict=True):
+        assert a.status is b.status is OrbitStatus.PERIODIC
+        assert a.counts == b.counts
+        assert len(a.more) == 1
+        assert a.counts.total > 0
+        peak = np.abs(b.extremes).max(axis=1)
+        assert np.abs((a.start - b.start) / peak).max() < 1e-10
+        assert np.abs((a.extremes - b.extremes) / peak[:, None]).max() < 1e-10
+        assert a.radius == pytest.approx(b.radius, rel=1e-6)
+        assert a.penetration == pytest.approx(b.penetration, rel=1e-8)
+        assert a.miss == pytest.approx(b.miss, rel=1e-8)
+        np.testing.assert_array_equal(a.impact_clearances, b.impact_clearances)
+        np.testing.assert_array_equal(a.impact_sides, b.impact_sides)
+        speed = np.abs(b.impact_velocities).max()
+        assert np.abs(a.impact_velocities - b.impact_velocities).max() < 1e-8 * speed
+    assert len(fast._reductions) <= 1, "the compiled way serves all but what settles slowly"
