@@ -18,7 +18,7 @@ from markupsafe import Markup
 
 from designer.base.defaults import cores
 from designer.base.errors import DesignerError
-from designer.base.page import Page, PageSection
+from designer.base.page import Block, Page, PageSection, Verbatim
 from designer.base.progress import Progress, progress_for
 from designer.catalog.catalog import load_catalog
 from designer.examples import (
@@ -31,11 +31,14 @@ from designer.examples import (
     weight,
 )
 from designer.examples.board_part import board_part
-from designer.examples.evidence import Evidence, Show
+from designer.examples.evidence import Evidence, Show, figure_block
 from designer.examples.frequency_sweep import frequency_sweep
 from designer.jobs.origin import provenance
+from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile, read_model_file
+from designer.model.system_equations import equations_of, number_of
 from designer.paper.report_files import write_files
+from designer.report import system_drawing
 
 FORMAT = 1
 SAMPLES, SEED = 1000, 71
@@ -73,7 +76,7 @@ def report(
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     file = read_model_file(model)
-    parts = evidence(file, model.stem, jobs, progress)
+    parts = [_system(file), *evidence(file, model.stem, jobs, progress)]
     numbers = {"samples": samples, "seed": seed, "circuit": circuit}
     if circuit:
         parts.append(board_part(model, out, samples, seed, jobs, progress))
@@ -86,6 +89,18 @@ def report(
     }
     figures = {name: figure for part in parts for name, figure in part.figures.items()}
     write_files(out, (DATA, document), _page(file, model, out, numbers, parts), figures)
+
+
+def _system(file: ModelFile) -> Evidence:
+    """The part about what the system is."""
+    assert isinstance(file.model, LumpedSystem)
+    figure = system_drawing.system_drawing(file.model, si=file.si is not None)
+    blocks: list[Block] = [
+        _opening(file),
+        figure_block("system", "The system with its values."),
+        Verbatim(equations_of(file.model, number_of)),
+    ]
+    return Evidence("The system", blocks, {"system": figure})
 
 
 def evidence(file: ModelFile, name: str, jobs: int, progress: Progress) -> list[Evidence]:
@@ -104,10 +119,7 @@ def _page(
 ) -> Page:
     command = f"python -m designer.examples.example_report {model} {out}"
     command += f" --samples {numbers['samples']} --seed {numbers['seed']}"
-    head = [
-        Markup(f"Made by `{command}` from `{model}`; the numbers are in `{DATA}`."),
-        _opening(file),
-    ]
+    head = [Markup(f"Made by `{command}` from `{model}`; the numbers are in `{DATA}`.")]
     return Page(file.title, head, [PageSection(part.title, part.blocks) for part in parts])
 
 

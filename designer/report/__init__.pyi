@@ -5,6 +5,7 @@ from . import (
     comparison as comparison,
     measured_table as measured_table,
     simulate_plots as simulate_plots,
+    system_drawing as system_drawing,
 )
 from .bifurcation_plots import (
     BLACK as BLACK,
