@@ -30,7 +30,7 @@ from designer.synthesis.term_conditions import TermConditions
 from designer.synthesis.term_order import TermOrder, order_of
 from designer.synthesis.term_program import TermProgram
 
-CANDIDATE = 40
+CANDIDATE = 20
 """Steps of a search that one candidate of the compiled loops counts for."""
 FRESH = 2000
 """Candidates that the linear program of one choice counts for."""

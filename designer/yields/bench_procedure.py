@@ -7,7 +7,7 @@ circuit says what the response really is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.dynamics.counts import Counts
 from designer.dynamics.flow import Flow, FlowStatus
+from designer.dynamics.orbit import Orbit
 from designer.dynamics.piecewise_linear import PiecewiseLinearSystem
 from designer.model.tuning_bands import Bands
 from designer.verdicts.verdict import Question
@@ -92,12 +93,12 @@ class _Person:
         rng: np.random.Generator,
     ) -> None:
         self.system, self.question, self.bands, self.rng = system, question, bands, rng
-        self.moving = system.moving
-        peak = float(np.abs(question.start.extremes[self.moving]).max())
+        peak = float(np.abs(question.start.extremes[system.moving]).max())
         self.step = SCREEN * peak / 2**BITS
-        self.stops = _stops(system)
-        inside = min((abs(v) for v in self.stops.values()), default=peak)
-        self.low_pulse = SEEN * max(peak - inside, 0.0)
+        self.stages = [
+            _Stage.of(system, index, question.start) for index in range(len(system.clearances))
+        ]
+        self.stops = dict(self.stages[0].stops) if self.stages else {}
         self.state = question.start.start
         self.setting = AS_BUILT
         self.high = self.low = 0.0
@@ -117,9 +118,11 @@ class _Person:
             self.state = self.question.start.start  # switched off and on again
             return False
         self.state = shown.strobes[-1]
-        trace = shown.strobes[:-1, self.moving]
+        states = shown.strobes[:-1]
+        trace = states[:, self.system.moving]
         self.high, self.low = self._read(float(trace.max())), self._read(float(trace.min()))
-        return self._shows(trace, wanted.n)
+        wave = flow.drive.amplitude * np.sin(2.0 * np.pi * np.arange(len(states)) / POINTS)
+        return self._shows(trace, np.column_stack([states, wave + flow.drive.offset]), wanted.n)
 
     def centre(self) -> bool:
         """Turn the DC offset until the peaks of v1 stand equally far beyond the stops, by the rule
@@ -151,8 +154,11 @@ class _Person:
         centred = self.setting.offset
         return any(self.look(setting) for setting in _snake(centred, self.bands))
 
-    def _shows(self, trace: Array, wanted: int) -> bool:
-        """Whether v1 over whole multiples of the wanted period is the wanted pattern to the eye."""
+    def _shows(self, trace: Array, seen: Array, wanted: int) -> bool:
+        """Whether v1 over whole multiples of the wanted period is the wanted pattern to the eye.
+
+        seen : (k, states + 1) states and generator, of which the stages' outputs are made.
+        """
         laps = trace.reshape(-1, POINTS)
         n = next(
             (
@@ -164,19 +170,12 @@ class _Person:
         )
         if n != wanted:
             return False
-        pulses = [self._pulses(trace, side) for side in (1, -1)]
+        pulses = [stage.pulses(seen) for stage in self.stages] or [(0, 0)]
         shown = len(laps) // n
-        if any(count % shown for count in pulses):
+        if any(count % shown for pair in pulses for count in pair):
             return False
-        p, q = (count // shown for count in pulses)
-        return self.question.wanted.accepts(Counts(n, ((p, q),)))
-
-    def _pulses(self, trace: Array, side: int) -> int:
-        """How often v1 goes far enough beyond a stop to be seen on fv; the trace is a loop."""
-        if side not in self.stops:
-            return 0
-        beyond = side * (trace - self.stops[side]) > self.low_pulse
-        return int((beyond & ~np.roll(beyond, 1)).sum())
+        counts = tuple((upper // shown, lower // shown) for upper, lower in pulses)
+        return self.question.wanted.accepts(Counts(n, counts))
 
     def _read(self, volts: float) -> float:
         """The mean of a few readings, each off by up to one step of the screen, in whole steps."""
@@ -184,12 +183,42 @@ class _Person:
         return float(np.round(noisy).mean() * self.step)
 
 
-def _stops(system: PiecewiseLinearSystem) -> dict[int, float]:
-    """The first displacement [V] at which fv leaves zero, by side: 1 upper, -1 lower."""
-    if not system.clearances:
-        return {}
-    rows = system.contact_rows(0)
-    return {side: -float(row[-1] / row[system.moving]) for side, row in rows.items()}
+@dataclass(frozen=True)
+class _Stage:
+    """A clearance's dead-zone stage on the screen.
+
+    row : (states + 1,) the displacement [V] over states and generator. stops : where its output
+    leaves zero [V], by side. low_pulse : how far beyond that it has to go to be seen [V].
+    """
+
+    row: Array
+    stops: Mapping[int, float]
+    low_pulse: float
+
+    @classmethod
+    def of(cls, system: PiecewiseLinearSystem, index: int, orbit: Orbit) -> _Stage:
+        row = system.displacement[index][:-1]
+        largest = int(np.argmax(np.abs(row)))
+        stops = {
+            side: -float(contact[-1] * row[largest] / contact[largest])
+            for side, contact in system.contact_rows(index).items()
+        }
+        peak = float(np.abs(row[:-1]) @ np.abs(orbit.extremes).max(axis=1))
+        inside = min((abs(place) for place in stops.values()), default=peak)
+        return cls(row, stops, SEEN * max(peak - inside, 0.0))
+
+    def pulses(self, seen: Array) -> tuple[int, int]:
+        """How often the displacement goes far enough beyond the upper and the lower stop to be seen
+        on the stage's output; the trace is a loop."""
+        trace = seen @ self.row
+
+        def count(side: int) -> int:
+            if side not in self.stops:
+                return 0
+            beyond = side * (trace - self.stops[side]) > self.low_pulse
+            return int((beyond & ~np.roll(beyond, 1)).sum())
+
+        return count(1), count(-1)
 
 
 def _snake(offset: float, bands: Bands) -> Iterator[Adjustment]:
