@@ -141,9 +141,9 @@ table_places, function_places = callee(places), callee(row_places)
 
 
 @callee
-def _times(row: Float, M: Float, w: float, out: Float) -> None:
+def _times(unit: Unit, row: Float, M: Float, w: float, out: Float) -> None:
     """out (wide,) = row · the generator (wide, wide) whose upper rows are M (n, wide)."""
-    n = M.shape[0]
+    n = len(unit)
     for j in range(n + 3):
         out[j] = 0.0
     for k in range(n):
@@ -154,8 +154,9 @@ def _times(row: Float, M: Float, w: float, out: Float) -> None:
 
 
 @callee
-def _along(row: Float, jump: Float, n: int, out: Float) -> None:
+def _along(unit: Unit, row: Float, jump: Float, out: Float) -> None:
     """out (wide,) = row · the propagator of a table line."""
+    n = len(unit)
     for j in range(n + 3):
         total = 0.0
         for k in range(n):
@@ -169,25 +170,33 @@ def _along(row: Float, jump: Float, n: int, out: Float) -> None:
 
 @callee
 def _moduli(
-    row: Float, M: Float, w: float, jump: Float, order: int, half: float, work: Float, bound: Float
+    unit: Unit,
+    row: Float,
+    M: Float,
+    w: float,
+    jump: Float,
+    order: int,
+    half: float,
+    work: Float,
+    bound: Float,
 ) -> None:
     """bound (wide,) ← at least an entrywise bound of |row · M^order · exp(M t)| within ``half`` of
     the time of ``jump``. work : (3, wide)."""
-    wide = M.shape[1]
+    wide = len(unit) + 3
     now, then, total = work[0], work[1], work[2]
     for j in range(wide):
         now[j], total[j] = row[j], 0.0
     for _ in range(order):
-        _times(now, M, w, then)
+        _times(unit, now, M, w, then)
         for j in range(wide):
             now[j] = then[j]
-    _along(now, jump, M.shape[0], then)
+    _along(unit, now, jump, then)
     for j in range(wide):
         now[j] = then[j]
     for k in range(TAIL):
         for j in range(wide):
             total[j] += abs(now[j])
-        _times(now, M, w, then)
+        _times(unit, now, M, w, then)
         for j in range(wide):
             now[j] = then[j] * half / (k + 1)
     for j in range(wide):
@@ -196,42 +205,42 @@ def _moduli(
 
 @callee
 def _function(
-    table: Float, o: int, row: Float, M: Float, w: float, jumps: Float, work: Float
+    unit: Unit, table: Float, o: int, row: Float, M: Float, w: float, jumps: Float, work: Float
 ) -> None:
     """Tables of the linear function row · z, at o; no limits. work : (4, wide)."""
-    n, wide = M.shape
+    n, wide = len(unit), len(unit) + 3
     local, fourth, limits = function_places(n)
     now, then = work[0], work[1]
     for j in range(wide):
         now[j] = row[j]
     for v in range(2):
         for k in range(NODES):
-            _along(now, jumps[k * PARTS], n, work[2])
+            _along(unit, now, jumps[k * PARTS], work[2])
             for j in range(wide):
                 table[o + SCAN + 2 * NODES * j + NODES * v + k] = work[2, j]
-        _times(row, M, w, now)
+        _times(unit, row, M, w, now)
     for j in range(wide):
         now[j] = row[j]
     for k in range(TERMS):
         for j in range(wide):
             table[o + local + TERMS * j + k] = now[j]
-        _times(now, M, w, then)
+        _times(unit, now, M, w, then)
         for j in range(wide):
             now[j] = then[j] / (k + 1)
     for j in range(wide):
         work[3, j] = 0.0
-    _moduli(row, M, w, jumps[LAST // 2], 4, 0.5 * STEPS * table[H], work, work[3])
+    _moduli(unit, row, M, w, jumps[LAST // 2], 4, 0.5 * STEPS * table[H], work, work[3])
     for j in range(wide):
         table[o + fourth + j] = work[3, j]
     table[o + limits + LOW], table[o + limits + HIGH] = -np.inf, np.inf
 
 
 @callee
-def _propagators(M: Float, w: float, part: float, jumps: Float, work: Float) -> None:
+def _propagators(unit: Unit, M: Float, w: float, part: float, jumps: Float, work: Float) -> None:
     """jumps (LAST + 1, ·) ← the propagator over each number of parts; each from two of half its
     length. Until the end they stand there less the identity, whose rounding would grow with their
     number. work : (2, wide)."""
-    n, wide = M.shape
+    n, wide = len(unit), len(unit) + 3
     turn = n * wide
     row, other = work[0], work[1]
     for k in range(LAST + 1):
@@ -242,20 +251,23 @@ def _propagators(M: Float, w: float, part: float, jumps: Float, work: Float) -> 
         for j in range(wide):
             row[j] = 1.0 if i == j else 0.0
         for k in range(1, 14):
-            _times(row, M, w, other)
+            _times(unit, row, M, w, other)
             for j in range(wide):
                 row[j] = other[j] * part / k
                 jumps[1, n * j + i] += row[j]
     for k in range(2, LAST + 1):
-        _join(jumps[k // 2], jumps[k - k // 2], np.sin(0.5 * (k - k // 2) * part * w), n, jumps[k])
+        _join(
+            unit, jumps[k // 2], jumps[k - k // 2], np.sin(0.5 * (k - k // 2) * part * w), jumps[k]
+        )
     for k in range(LAST + 1):
         for i in range(n):
             jumps[k, n * i + i] += 1.0
 
 
 @callee
-def _join(a: Float, b: Float, half: float, n: int, out: Float) -> None:
+def _join(unit: Unit, a: Float, b: Float, half: float, out: Float) -> None:
     """out ← the propagator over b, then a, all less the identity. half : sine of half b's turn."""
+    n = len(unit)
     turn, sine, cosine = n * (n + 3), n * n, n * (n + 1)
     less = -2.0 * half * half
     for j in range(n + 3):
@@ -302,7 +314,8 @@ def table_of(driven: DrivenModes, m: int) -> Float:
 @callee
 def fill(driven: DrivenModes, m: int) -> int:
     """Tables of mode m; DONE, or LEFT if they do not fit."""
-    n, modes, board = len(driven.unit), driven.modes, driven.board
+    unit, modes, board = driven.unit, driven.modes, driven.board
+    n = len(unit)
     wide, omega = n + 3, driven.drive[0]
     if modes.good[board, m] == 0:
         return LEFT
@@ -316,39 +329,41 @@ def fill(driven: DrivenModes, m: int) -> int:
     jump, _, _, rows, one = table_places(n)
     count = wide * n + 2
     jumps = table[jump : jump + (LAST + 1) * count].reshape((LAST + 1, count))
-    _propagators(M, omega, h / PARTS, jumps, work)
+    _propagators(unit, M, omega, h / PARTS, jumps, work)
     for i in range(n):
-        _state(table, i, M, omega, jumps, row, work)
+        _state(unit, table, i, M, omega, jumps, row, work)
     depths = n + len(modes.watched)
     for r in range(len(modes.watched)):
         displacement = modes.displacement[board, modes.watched[r]]
         _over(displacement, driven.drive[1], driven.drive[2], row)
-        _function(table, rows + (n + r) * one, row, M, omega, jumps, work)
+        _function(unit, table, rows + (n + r) * one, row, M, omega, jumps, work)
     for c in range(modes.side.shape[1]):
         if modes.side[m, c] != 0:
             _over(modes.past[board, m, c], driven.drive[1], driven.drive[2], row)
-            _function(table, rows + (depths + c) * one, row, M, omega, jumps, work)
+            _function(unit, table, rows + (depths + c) * one, row, M, omega, jumps, work)
     _guards(driven, m, M, jumps, row, work)
     driven.ints[m, FILLED] = 1
     return DONE
 
 
 @callee
-def _state(table: Float, i: int, M: Float, w: float, jumps: Float, row: Float, work: Float) -> None:
+def _state(
+    unit: Unit, table: Float, i: int, M: Float, w: float, jumps: Float, row: Float, work: Float
+) -> None:
     """Tables of state i."""
-    n, wide = M.shape
+    n, wide = len(unit), len(unit) + 3
     _, way, second, rows, one = table_places(n)
     local, _, _ = function_places(n)
     for j in range(wide):
         row[j] = 1.0 if i == j else 0.0
-    _function(table, rows + i * one, row, M, w, jumps, work)
+    _function(unit, table, rows + i * one, row, M, w, jumps, work)
     bound, half = work[3], 0.5 * table[H]
     for j in range(wide):
         bound[j] = 0.0
         for k in range(TERMS):
             table[NEAR + (TERMS * j + k) * n + i] = table[rows + i * one + local + TERMS * j + k]
     for k in range(STEPS):
-        _moduli(row, M, w, jumps[PARTS * k + PARTS // 2], 2, half, work, bound)
+        _moduli(unit, row, M, w, jumps[PARTS * k + PARTS // 2], 2, half, work, bound)
     for j in range(wide):
         table[second + n * j + i] = bound[j] * table[H] * table[H] / 8.0
         for k in range(STEPS - 1):
@@ -363,6 +378,7 @@ def _guards(driven: DrivenModes, m: int, M: Float, jumps: Float, row: Float, wor
     )  # fmt: skip
     _, _, _, rows, one = table_places(n)
     _, _, limits = function_places(n)
+    unit = driven.unit
     amplitude, offset, w = driven.drive[1], driven.drive[2], driven.drive[0]
     first = rows + (n + len(modes.watched) + modes.side.shape[1]) * one
     count, distant = 0, 0
@@ -382,7 +398,7 @@ def _guards(driven: DrivenModes, m: int, M: Float, jumps: Float, row: Float, wor
             ints[GUARDS + 2 * other + LOW] = g
             continue
         _over(guard, amplitude, offset, row)
-        _function(table, first + count * one, row, M, w, jumps, work)
+        _function(unit, table, first + count * one, row, M, w, jumps, work)
         table[first + count * one + limits + HIGH] = 0.0
         ints[GUARDS + 2 * count + HIGH], ints[GUARDS + 2 * count + LOW] = g, -1
         count += 1
