@@ -24,14 +24,14 @@ from benchmarks.bench_flow import commit, machine, table
 from designer.base.arrays import Array, Index
 from designer.base.errors import InputError
 from designer.base.eseries import series_values
+from designer.linear_network.kernel_linear import Rules, Values
+from designer.linear_network.linear_block import PARTS, catalogue, rules_of
+from designer.linear_network.linear_search import best
+from designer.linear_network.linear_terms import ANY, Bounds, LinearBlock, Targets
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
 from designer.model.model_file import ModelFile
 from designer.model.response_table import Response
-from designer.synthesis.kernel_linear import Rules, Values
-from designer.synthesis.linear_block import PARTS, catalogue, rules_of
-from designer.synthesis.linear_search import best
-from designer.synthesis.linear_terms import ANY, Bounds, LinearBlock, Targets
 
 TARGETS, SEED = 20, 2026
 SERIES = {"E24": ("E24",), "E96": ("E96",), "E192": ("E192",), "E24 ∪ E96": ("E24", "E96")}

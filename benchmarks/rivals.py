@@ -12,14 +12,14 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.synthesis.kernel_linear import Rules, Values
-from designer.synthesis.linear_block import SCALES, elementary
-from designer.synthesis.tie_break import residuals
+from designer.linear_network.kernel_linear import Rules, Values
+from designer.linear_network.linear_block import SCALES, elementary
+from designer.linear_network.tie_break import residuals
 
 CENTRE = float(np.log(3e4))
 """ln of the resistance around which the continuous solution is laid."""
 TO_TEN = np.zeros((10, 10))
-"""The ten numbers of ``synthesis.linear_block`` from the offsets of the ten errors."""
+"""The ten numbers of ``linear_network.linear_block`` from the offsets of the ten errors."""
 for _row, _terms in enumerate(
     [
         {0: -1.0}, {1: -1.0}, {2: -1.0}, {3: -1.0}, {4: -0.5, 5: 0.5}, {6: -0.5, 7: 0.5},
@@ -54,7 +54,7 @@ def nearest(table: Array, wanted: Array) -> Index:
 def rounded(values: Values, rules: Rules, scales: Array, capacitors: Index) -> Index:
     """(k, 14): the exact resistors for (k, 4) scales and (k, 4) capacitors, each to the nearest.
 
-    scales : ln of time scale, then p, q1, q3 of ``synthesis.linear_block``.
+    scales : ln of time scale, then p, q1, q3 of ``linear_network.linear_block``.
     """
     tau, p, q1, q3 = scales.T
     c1, c2, c3, c4 = values.c[capacitors].T

@@ -16,7 +16,7 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.synthesis.milp import SOLVER, chosen_row
+from designer.linear_network.milp import SOLVER, chosen_row
 
 SLACK = 1e-7
 """Of a demand's room: what the solver's tolerance may exceed it by."""

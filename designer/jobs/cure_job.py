@@ -40,8 +40,8 @@ from designer.jobs.design_source import (
 from designer.jobs.options import Options, given
 from designer.jobs.origin import provenance
 from designer.jobs.stage_runner import write_design
+from designer.linear_network.milp import SOLVER
 from designer.model.model_file import naming, need_responses
-from designer.synthesis.milp import SOLVER
 
 if TYPE_CHECKING:
     import pandas as pd

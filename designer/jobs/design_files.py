@@ -28,12 +28,12 @@ from designer.jobs import board_files
 from designer.jobs.bench_tables import scales_csv, setup_csv, start_recipes
 from designer.jobs.json_answers import synthesis_json
 from designer.jobs.origin import provenance
+from designer.linear_network.milp import SOLVER
 from designer.model.find_responses import find, peaks
 from designer.model.measured_values import MEASURED
 from designer.model.model_file import ModelFile, naming
 from designer.spice import deck
 from designer.spread.part_grades import better_grades
-from designer.synthesis.milp import SOLVER
 
 SETUP = "setup.csv"
 

@@ -35,12 +35,12 @@ from designer.jobs.study_folder import (
     study_files,
 )
 from designer.jobs.study_json import study_json
+from designer.linear_network.milp import SOLVER
 from designer.report import measured_table
 from designer.spice import equation_check
 from designer.spice.equation_check import EquationCheck
 from designer.spice.pool import SpicePool, require_ngspice
 from designer.spice.simulator import SimulationFailed
-from designer.synthesis.milp import SOLVER
 from designer.yields.blame_analysis import BlameStage
 from designer.yields.blame_replay import BUDGET
 from designer.yields.layers import Here, Runner

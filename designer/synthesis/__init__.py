@@ -1,7 +1,7 @@
 """From a model to the best parts that can be bought, with a proof of how good they are.
 
-The linear block by compiled joins and mixed-integer optimisation, the dead zone by tables, side
-conditions (swing, load, bandwidth) on the finished circuit.
+The dead zones by tables beside a linear network (``designer.linear_network``), side conditions
+(swing, load, bandwidth) on the finished circuit.
 """
 
 import lazy_loader

@@ -9,10 +9,6 @@ from .limits import (
     bandwidth_limit as bandwidth_limit,
     guaranteed as guaranteed,
 )
-from .milp import (
-    SOLVER as SOLVER,
-    chosen_row as chosen_row,
-)
 from .output_loads import (
     REST as REST,
     Load as Load,

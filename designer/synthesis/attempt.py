@@ -20,15 +20,16 @@ from designer.circuit.dead_zone_reading import CutShort
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
 from designer.circuit.terms import entry_resistor
+from designer.linear_network import linear_search
+from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks
 from designer.model.mechanics import MechanicalModel
-from designer.synthesis import all_stages, linear_search
+from designer.synthesis import all_stages
 from designer.synthesis.all_stages import StageQuestion
 from designer.synthesis.dead_zone_target import DeadZone
 from designer.synthesis.equal_parts import equal_parts
 from designer.synthesis.limits import GENERATOR_PEAK, NO_AIMS, Aims, ConditionLimits
-from designer.synthesis.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.part_checks import (
     buyable,
     drive_resistors,

@@ -22,8 +22,8 @@ from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT, CoefficientErrors
 from designer.circuit.netlist import Circuit
 from designer.circuit.resistors import Composite
+from designer.linear_network.milp import NODES, SOLVER
 from designer.synthesis.attempt import Attempt, Order
-from designer.synthesis.milp import NODES, SOLVER
 from designer.synthesis.part_checks import matching_resistors
 
 REACH = 3.0

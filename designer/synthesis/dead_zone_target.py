@@ -15,11 +15,11 @@ from scipy.optimize import linprog
 from designer.catalog.diode_curve import diode_model
 from designer.circuit.dead_zone_parts import DeadZoneStage, Kind
 from designer.circuit.scale_fit import minimax
+from designer.linear_network.linear_block import errors_of
+from designer.linear_network.linear_terms import Targets
 from designer.model.find_responses import Peaks, Reach
 from designer.model.mechanics import MechanicalModel, Sides
 from designer.synthesis.limits import ConditionLimits, depth
-from designer.synthesis.linear_block import errors_of
-from designer.synthesis.linear_terms import Targets
 
 LEAST_GAIN = 1.25
 """Of the saturating path, so that it does saturate where the clearance is never closed."""

@@ -16,10 +16,10 @@ from designer.circuit.build import constant_resistor
 from designer.circuit.dead_zone_parts import DeadZoneStage, half_parts
 from designer.circuit.dead_zone_place import DeadZonePlace
 from designer.circuit.scale_fit import minimax
+from designer.linear_network.linear_block import errors_of
+from designer.linear_network.linear_terms import Targets
 from designer.model.mechanics import SecondOrderSystem
 from designer.synthesis.dead_zone_target import REFERENCE_MARGIN, DeadZoneTarget
-from designer.synthesis.linear_block import errors_of
-from designer.synthesis.linear_terms import Targets
 from designer.synthesis.stop_halves import (
     ChosenHalves,
     HalfRules,

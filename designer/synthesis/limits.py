@@ -13,9 +13,9 @@ from designer.catalog.fields import Figure
 from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
+from designer.linear_network.linear_terms import Bounds, Targets
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach
-from designer.synthesis.linear_terms import Bounds, Targets
 
 SWING_SHARE = 0.85
 """Of the op-amp's limit: what the peaks of an output may use; the rest is for spread."""

@@ -21,13 +21,13 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Certificate, ConditionCheck, Design
 from designer.circuit.netlist import nominal_board
 from designer.circuit.reduction import Reduction
+from designer.linear_network.linear_terms import LinearBlock, Shortfall, Targets
 from designer.model.circuit_table import SIDE_CONDITIONS, CircuitSpec
 from designer.model.find_responses import ModelResponse, Peaks
 from designer.model.mechanics import MechanicalModel
 from designer.synthesis import composites, output_loads, side_conditions
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import NO_AIMS, Aims, ConditionLimits, limits
-from designer.synthesis.linear_terms import LinearBlock, Shortfall, Targets
 from designer.synthesis.part_checks import check_choices
 
 ROUNDS = 4

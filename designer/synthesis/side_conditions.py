@@ -13,6 +13,7 @@ from designer.circuit.design import ConditionCheck, Design
 from designer.circuit.netlist import Circuit
 from designer.circuit.noise_gains import stages
 from designer.circuit.resistors import effective
+from designer.linear_network.linear_terms import Targets
 from designer.model.find_responses import Peaks
 from designer.synthesis.limits import (
     GENERATOR_PEAK,
@@ -26,7 +27,6 @@ from designer.synthesis.limits import (
     bandwidth_limit,
     guaranteed,
 )
-from designer.synthesis.linear_terms import Targets
 from designer.synthesis.output_loads import Load, Loads
 
 

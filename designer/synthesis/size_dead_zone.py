@@ -11,11 +11,11 @@ from collections.abc import Mapping
 
 from designer.base.arrays import Array
 from designer.circuit.coefficients import EXACT
+from designer.linear_network.linear_terms import ANY
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis import rectifier_stage, saturating_search
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
 from designer.synthesis.equal_parts import equal_parts
-from designer.synthesis.linear_terms import ANY
 from designer.synthesis.value_program import Ranking
 
 

@@ -15,7 +15,7 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.synthesis.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
+from designer.linear_network.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 from designer.synthesis.value_tables import ValueTable, new_values
 
 ERROR_WEIGHT = 1e-4

@@ -34,7 +34,7 @@ def test_each_part_is_announced_once_and_by_name() -> None:
         ):
             _compile(module)
         with event.trigger_event("numba:compile", {"dispatcher": _dispatcher(kernel_general)}):
-            _compile("designer.synthesis.kernel_linear")  # a callee: no part of its own
+            _compile("designer.linear_network.kernel_linear")  # a callee: no part of its own
     _compile("designer.dynamics.kernel_sweep")
     assert len(said) == 2
     assert MOTION in said[0]

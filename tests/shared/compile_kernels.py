@@ -37,10 +37,10 @@ def use_models() -> None:
     from designer.dynamics.flow import Flow
     from designer.dynamics.piecewise_linear import Drive
     from designer.jobs.bifurcation_job import bifurcation
+    from designer.linear_network.linear_search import best
     from designer.model.model_file import parse_model_file
-    from designer.synthesis.linear_search import best
+    from tests.linear_network.test_linear_block import OPEN, targets_of
     from tests.shared.model_text import PAPER_TABLE, dimensionless
-    from tests.synthesis.test_linear_block import OPEN, targets_of
 
     read = parse_model_file(f'format = 1\ntitle = "compiled"\n{PAPER_TABLE}')
     model = dimensionless(read.model)

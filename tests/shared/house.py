@@ -17,6 +17,7 @@ ORDER = (
     "catalog",
     "model",
     "circuit",
+    "linear_network",
     "synthesis",
     "spread",
     "spice",

@@ -21,7 +21,7 @@ _VECTORS = elementary_vectors(_SCALES)
 
 @dataclass(frozen=True)
 class Conditions:
-    """As ``synthesis.linear_block.Bounds``, and a model file's preferences."""
+    """As ``linear_network.linear_block.Bounds``, and a model file's preferences."""
 
     seconds: tuple[float, float] = (0.0, math.inf)
     level: float = math.inf

@@ -28,7 +28,7 @@ def term_name(masses: int, state: int, source: int) -> str:
 
 @dataclass(frozen=True)
 class Limits:
-    """As ``synthesis.linear_terms.Bounds``, and a model file's preferences."""
+    """As ``linear_network.linear_terms.Bounds``, and a model file's preferences."""
 
     seconds: tuple[float, float] = (0.0, np.inf)
     level: float = np.inf

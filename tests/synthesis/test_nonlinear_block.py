@@ -14,13 +14,14 @@ import pytest
 from designer.base.eseries import series_values
 from designer.catalog.catalog import load_catalog
 from designer.circuit.dead_zone_parts import dead_zone_stage
+from designer.linear_network import linear_search
+from designer.linear_network.linear_terms import Targets
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach
 from designer.model.model import Dimensionless
-from designer.synthesis import linear_search, rectifier_stage, saturating_search, size_dead_zone
+from designer.synthesis import rectifier_stage, saturating_search, size_dead_zone
 from designer.synthesis.dead_zone_target import DeadZoneTarget, slope_interval, target_of
 from designer.synthesis.limits import limits
-from designer.synthesis.linear_terms import Targets
 from designer.synthesis.parts_choice import FREES
 from designer.synthesis.size_dead_zone import size
 from tests.shared.oracles import Plain, coefficient_error

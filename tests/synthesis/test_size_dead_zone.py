@@ -13,9 +13,9 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.base.eseries import series_values
+from designer.linear_network.linear_terms import ANY
 from designer.model.circuit_table import CircuitSpec
 from designer.synthesis.dead_zone_target import DeadZone, DeadZoneTarget, parts_of
-from designer.synthesis.linear_terms import ANY
 from designer.synthesis.size_dead_zone import size
 from tests.shared.dead_zone_enumeration import (
     Ranges,

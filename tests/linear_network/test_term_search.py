@@ -15,14 +15,14 @@ from designer.base.eseries import series_values
 from designer.circuit.coefficients import EXACT
 from designer.circuit.scale_fit import minimax
 from designer.circuit.terms import terms
+from designer.linear_network import linear_search
+from designer.linear_network.linear_block import errors_of
+from designer.linear_network.linear_search import best
+from designer.linear_network.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
+from designer.linear_network.term_search import TermSearch
 from designer.model.circuit_table import CircuitSpec
-from designer.synthesis import linear_search
 from designer.synthesis.attempt import _in_ratio
 from designer.synthesis.dead_zone_target import slope_interval
-from designer.synthesis.linear_block import errors_of
-from designer.synthesis.linear_search import best
-from designer.synthesis.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
-from designer.synthesis.term_search import TermSearch
 from tests.shared.term_enumeration import Everything, Limits, everything, term_name
 
 CLOSE = 1e-7

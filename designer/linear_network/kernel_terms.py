@@ -21,7 +21,7 @@ import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
 from designer.base.jit import callee, compiled
-from designer.synthesis.kernel_linear import TINY, below
+from designer.linear_network.kernel_linear import TINY, below
 
 CELL = 0.5
 """Width of a cell of T over the level of error."""

@@ -14,9 +14,9 @@ import cvxpy as cp
 import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
-from designer.synthesis.linear_terms import Targets, scale_columns
-from designer.synthesis.milp import NODES, PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
-from designer.synthesis.term_conditions import TermConditions
+from designer.linear_network.linear_terms import Targets, scale_columns
+from designer.linear_network.milp import NODES, PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
+from designer.linear_network.term_conditions import TermConditions
 
 MOST = 12
 """Choices whose values are mixed: the last ones, which are the best."""

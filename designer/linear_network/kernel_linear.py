@@ -1,8 +1,8 @@
 """Compiled loops of two masses with all terms: the catalogue's tables, joining ratios.
 
 Everything is in logarithms and all loops are exhaustive: what they leave out cannot reach the
-level or breaks a condition. The mathematics and the conditions stand in ``synthesis.linear_block``;
-parts are numbered as in its ``PARTS``.
+level or breaks a condition. The mathematics and the conditions stand in
+``linear_network.linear_block``; parts are numbered as in its ``PARTS``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Two masses with all terms: levels of error searched by joins.
 
-At each level every ratio choice that can reach it is joined (``synthesis.linear_block``) and
+At each level every ratio choice that can reach it is joined (``linear_network.linear_block``) and
 completed to values, best first. Among the choices of least error cvxpy and HiGHS choose those with
-the fewest distinct values and the lowest price (``synthesis.tie_break``).
+the fewest distinct values and the lowest price (``linear_network.tie_break``).
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numpy as np
 
 from designer.base.arrays import Index
 from designer.base.progress import doing
-from designer.synthesis.kernel_completions import complete
-from designer.synthesis.kernel_linear import Rules, Values
-from designer.synthesis.linear_block import PARTS, catalogue, rules_of, slice_from
-from designer.synthesis.linear_terms import Levels, LinearQuestion
-from designer.synthesis.tie_break import ROOM, error_of, fewest_values
+from designer.linear_network.kernel_completions import complete
+from designer.linear_network.kernel_linear import Rules, Values
+from designer.linear_network.linear_block import PARTS, catalogue, rules_of, slice_from
+from designer.linear_network.linear_terms import Levels, LinearQuestion
+from designer.linear_network.tie_break import ROOM, error_of, fewest_values
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import pytest
 
 from designer.catalog.catalog import load_catalog
 from designer.circuit.coefficients import EXACT
+from designer.linear_network.linear_terms import Shortfall
 from designer.model.circuit_table import CircuitSpec
 from designer.model.find_responses import Peaks, Reach, find, peaks
 from designer.model.model import Dimensionless
@@ -18,7 +19,6 @@ from designer.model.model_file import read_model_file
 from designer.synthesis import parts_choice
 from designer.synthesis.attempt import Attempt, Order, attempt, linear_block
 from designer.synthesis.limits import limits
-from designer.synthesis.linear_terms import Shortfall
 from designer.synthesis.parts_choice import _beside, best_beside
 
 # What each side condition costs is asked where a test is about it: it doubles the time.

@@ -31,9 +31,8 @@ from itertools import combinations
 import numpy as np
 
 from designer.base.arrays import Array, Index, Mask
-from designer.model.circuit_table import CircuitSpec
-from designer.synthesis.kernel_linear import Rules, Values, join
-from designer.synthesis.linear_terms import (
+from designer.linear_network.kernel_linear import Rules, Values, join
+from designer.linear_network.linear_terms import (
     Bounds,
     LinearErrors,
     Targets,
@@ -42,6 +41,7 @@ from designer.synthesis.linear_terms import (
     preferred_logs,
     sums,
 )
+from designer.model.circuit_table import CircuitSpec
 
 PARTS = ("R1", "R2", "R3", "R4", "R5", "R7", "R8", "R9", "R10", "R11", "C1", "C2", "C3", "C4")
 """The parts of the linear block, in the order of the compiled loops."""

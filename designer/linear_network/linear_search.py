@@ -2,10 +2,10 @@
 
 Levels of error grow from below. A level at which no choice can be completed is a lower bound; at
 the first level where one can, the least error among them is the optimum. Two masses with all terms
-are searched by joins (``synthesis.pair_search``), every other pattern of terms by a tree of choices
-(``synthesis.term_search``). Among the choices that reach the optimum, cvxpy and HiGHS choose those
-with the fewest distinct values and the lowest price. Work is limited by count, never by time; where
-it runs out, the last empty level is what the certificate says.
+are searched by joins (``linear_network.pair_search``), every other pattern of terms by a tree of
+choices (``linear_network.term_search``). Among the choices that reach the optimum, cvxpy and HiGHS
+choose those with the fewest distinct values and the lowest price. Work is limited by count, never
+by time; where it runs out, the last empty level is what the certificate says.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.progress import part
 from designer.circuit.coefficients import EXACT
-from designer.model.circuit_table import CircuitSpec
-from designer.synthesis.linear_terms import (
+from designer.linear_network.linear_terms import (
     ANY,
     Bounds,
     Levels,
@@ -29,8 +28,9 @@ from designer.synthesis.linear_terms import (
     Shortfall,
     Targets,
 )
-from designer.synthesis.pair_search import PairSearch
-from designer.synthesis.term_search import TermSearch
+from designer.linear_network.pair_search import PairSearch
+from designer.linear_network.term_search import TermSearch
+from designer.model.circuit_table import CircuitSpec
 
 LAST_LEVEL = 0.1
 """The last level of error that is searched."""

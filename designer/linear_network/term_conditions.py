@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array, Index
-from designer.synthesis.linear_terms import Bounds, Targets, scale_columns
+from designer.linear_network.linear_terms import Bounds, Targets, scale_columns
 
 ROUNDING = 1e-9
 """Allowance for rounding in the comparison of logarithms."""

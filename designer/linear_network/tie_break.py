@@ -17,10 +17,10 @@ import numpy as np
 from designer.base.arrays import Array, Index
 from designer.base.progress import doing
 from designer.circuit.scale_fit import minimax
-from designer.synthesis.kernel_completions import gather
-from designer.synthesis.kernel_linear import Rules, Values
-from designer.synthesis.linear_block import PARTS, residuals_of, slice_from
-from designer.synthesis.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
+from designer.linear_network.kernel_completions import gather
+from designer.linear_network.kernel_linear import Rules, Values
+from designer.linear_network.linear_block import PARTS, residuals_of, slice_from
+from designer.linear_network.milp import PRICE_WEIGHT, SOLVER, chosen_row, distinct_values
 
 ROOM, GROUPS, COMPLETIONS = 1 << 13, 1 << 12, 1 << 14
 """Completions of one mass that are held for one group; groups and completions in all."""

@@ -10,10 +10,9 @@ from hypothesis import given, settings, strategies as st
 
 from designer.base.arrays import Array
 from designer.circuit.scale_fit import minimax
-from designer.model.model import Dimensionless
-from designer.synthesis import linear_block
-from designer.synthesis.kernel_linear import Rules, Values
-from designer.synthesis.linear_block import (
+from designer.linear_network import linear_block
+from designer.linear_network.kernel_linear import Rules, Values
+from designer.linear_network.linear_block import (
     PARTS,
     SCALES,
     catalogue,
@@ -21,8 +20,9 @@ from designer.synthesis.linear_block import (
     rules_of,
     slice_from,
 )
-from designer.synthesis.linear_terms import ANY, Bounds, Targets
-from designer.synthesis.tie_break import error_of, residuals
+from designer.linear_network.linear_terms import ANY, Bounds, Targets
+from designer.linear_network.tie_break import error_of, residuals
+from designer.model.model import Dimensionless
 from tests.shared import oracles
 from tests.shared.linear_enumeration import CAPACITOR
 

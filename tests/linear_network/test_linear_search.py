@@ -11,14 +11,14 @@ from hypothesis import given, settings, strategies as st
 from designer.base.arrays import Array
 from designer.base.eseries import series_values
 from designer.circuit.coefficients import EXACT
+from designer.linear_network import linear_search
+from designer.linear_network.linear_search import best
+from designer.linear_network.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model import Dimensionless
-from designer.synthesis import linear_search
-from designer.synthesis.linear_search import best
-from designer.synthesis.linear_terms import ANY, Bounds, LinearBlock, Shortfall, Targets
+from tests.linear_network.test_linear_block import OPEN, random_model, targets_of, wanted_of
 from tests.shared.linear_enumeration import Choices, Conditions, every_choice
 from tests.shared.oracles import LINEAR_NAMES
-from tests.synthesis.test_linear_block import OPEN, random_model, targets_of, wanted_of
 
 CLOSE = 1e-7
 """Of two errors: the reported one is by linear programming, whose tolerance this is."""

@@ -1,9 +1,10 @@
 """Any number of masses and any pattern of terms: levels of error searched by a tree of choices.
 
-At each level the compiled loops (``synthesis.kernel_terms``) go through every choice that can reach
-it; the error of what they return is computed afresh by linear programming. The side conditions hold
-on nominal scales, which need no solver: the least squares of the errors. At error eps those are
-within a fixed multiple of eps of any scales with that error, and by so much the loops are wider.
+At each level the compiled loops (``linear_network.kernel_terms``) go through every choice that can
+reach it; the error of what they return is computed afresh by linear programming. The side
+conditions hold on nominal scales, which need no solver: the least squares of the errors. At error
+eps those are within a fixed multiple of eps of any scales with that error, and by so much the loops
+are wider.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from designer.base.arrays import Array, Index, Mask
 from designer.base.progress import doing
 from designer.circuit.coefficients import EXACT
 from designer.circuit.scale_fit import least_largest
-from designer.synthesis.kernel_terms import TermRules, choices
-from designer.synthesis.linear_terms import (
+from designer.linear_network.kernel_terms import TermRules, choices
+from designer.linear_network.linear_terms import (
     Levels,
     LinearQuestion,
     equal_values,
@@ -26,9 +27,9 @@ from designer.synthesis.linear_terms import (
     scale_columns,
     sums,
 )
-from designer.synthesis.term_conditions import TermConditions
-from designer.synthesis.term_order import TermOrder, order_of
-from designer.synthesis.term_program import TermProgram
+from designer.linear_network.term_conditions import TermConditions
+from designer.linear_network.term_order import TermOrder, order_of
+from designer.linear_network.term_program import TermProgram
 
 CANDIDATE = 20
 """Steps of a search that one candidate of the compiled loops counts for."""

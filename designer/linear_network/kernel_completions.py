@@ -1,7 +1,7 @@
 """Compiled loops of two masses with all terms: completing joined ratios to values.
 
-All loops are exhaustive, as in ``synthesis.kernel_linear``; the mathematics stands in
-``synthesis.linear_block``.
+All loops are exhaustive, as in ``linear_network.kernel_linear``; the mathematics stands in
+``linear_network.linear_block``.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from designer.base.arrays import Array, Index
 from designer.base.jit import callee, compiled
-from designer.synthesis.kernel_linear import (
+from designer.linear_network.kernel_linear import (
     C1,
     C2,
     C3,
