@@ -119,6 +119,7 @@ def _page(
 ) -> Page:
     command = f"python -m designer.examples.example_report {model} {out}"
     command += f" --samples {numbers['samples']} --seed {numbers['seed']}"
+    command += "" if numbers["circuit"] else " --no-circuit"
     head = [Markup(f"Made by `{command}` from `{model}`; the numbers are in `{DATA}`.")]
     return Page(file.title, head, [PageSection(part.title, part.blocks) for part in parts])
 
