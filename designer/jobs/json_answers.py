@@ -242,7 +242,7 @@ def _dead_zone(modelfile: ModelFile, design: Design) -> dict[str, Any] | None:
     if not design.circuit.stops:
         return None
     errors = design.errors
-    slopes = [error for name, error in errors.errors.items() if name.endswith("stop slope")]
+    slopes = [error for name, error in errors.errors.items() if "stop slope" in name]
     return {
         "kind": modelfile.circuit.dead_zone,
         "saturation": design.circuit.saturation,
