@@ -88,6 +88,15 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
                 "0 for a circuit: a force that jumps at the contact has no stage; the dissipation "
                 "of short contacts is near that of larger [[damper]] values",
             )
+        preloads = [stop.preload for _, stop in clearance.sides if stop.preload]
+        if preloads:
+            raise InputError(
+                None,
+                f"clearance {clearance.name}.preload",
+                preloads[0],
+                "0 for a circuit: a force that jumps at the contact has no stage; a negative gap "
+                "is a stop in contact at rest, which the rectifier makes",
+            )
         if system.fixed_stops and system.base and clearance.other is None:
             raise InputError(
                 None,
@@ -108,16 +117,12 @@ def check_system(model: MechanicalModel, spec: CircuitSpec) -> None:
 
 
 def _check_clearances(clearances: Sequence[Clearance], spec: CircuitSpec) -> None:
-    """What the stage of this kind cannot make; names that nets cannot tell apart."""
+    """What the stage of this kind cannot make."""
     stage = DeadZoneStage(spec.dead_zone)
-    for number, clearance in enumerate(clearances):
+    for clearance in clearances:
         refusal = stage.refused(clearance)
         if refusal is not None:
             raise refusal
-        for other in clearances[:number]:
-            if other.name.lower() == clearance.name.lower():
-                expected = f"a name that differs from {other.name} in more than capitals"
-                raise InputError(None, "clearance.name", clearance.name, expected)
     if len(clearances) > 1 and spec.dead_zone == "saturation":
         raise InputError(
             None,

@@ -32,8 +32,9 @@ from designer.synthesis.part_checks import check_choices
 
 ROUNDS = 4
 """How often limits are tightened before the search gives up."""
-BESIDE = 10
-"""Linear blocks that are tried beside the first."""
+BESIDE, BESIDE_TREE = 10, 2
+"""Linear blocks that are tried beside the first: where joins find them, and where a tree of choices
+does, which is slower by far."""
 EMPTY = 1e-9
 """Relative: so far below a bound there is no choice, where at the bound there may be one."""
 ASIDE = 1e-6
@@ -327,7 +328,8 @@ def best_beside(
     """
     best = first
     left = deque(_beside(linear, (0.0, float("inf")), order.stiffness))
-    for number in range(BESIDE):
+    most = BESIDE if Targets.of(order.model).fully_coupled_pair else BESIDE_TREE
+    for number in range(most):
         if (
             not left
             or not order.model.second_order().clearances
@@ -335,7 +337,7 @@ def best_beside(
         ):
             break
         between = left.popleft()
-        with part(f"beside the first linear block ({number + 1} of at most {BESIDE})"):
+        with part(f"beside the first linear block ({number + 1} of at most {most})"):
             other = linear_block(order, within, between=between, level=linear.least)
             if isinstance(other, Shortfall) or other.least > linear.least + EXACT:
                 continue

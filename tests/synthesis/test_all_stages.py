@@ -81,11 +81,11 @@ def test_two_unequal_clearances_one_between_masses_and_a_weight() -> None:
     ("change", "field", "text"),
     [
         (("stiffness = 4.0", "stiffness = 4.0\ndamping = 0.1"), "clearance B.damping", "damper"),
+        (("stiffness = 4.0", "stiffness = 4.0\npreload = 0.1"), "clearance B.preload", "jumps"),
         (("[[response]]", "[base]\namplitude = 0.1\n[[response]]"), "base.amplitude", "ratio"),
         (('"rectifier"', '"saturation"'), "circuit.dead_zone", "unequal stops in clearance A"),
         (("stiffness = 4.0", 'law = "hertz"\nconstant = 9.0\ndepth = 0.2'),
          "clearance B", "one [[clearance]] for each step"),
-        (('name = "B"', 'name = "a"'), "clearance.name", "capitals"),
     ],
 )  # fmt: skip
 def test_what_no_circuit_can_do_is_refused(change: tuple[str, str], field: str, text: str) -> None:
