@@ -614,7 +614,8 @@ def test_trade_measures_a_design_and_keeps_it(
     assert by["ideal"][-1]["numerical_error"] < 1e-3
     assert [r["gate"] for r in by["rk4"] + by["model"]] == [None] * 5
     assert by["ideal"][2]["gate"]  # the paper's case passes at the gate's first step
-    assert {r["response"] for r in rows} == {"1-1-1"}
+    # At the coarsest settings rounding decides whether a run has settled; the gate refuses them.
+    assert {r["response"] for r in rows if r["gate"] is not False} == {"1-1-1"}
     questions = {(c["question"], c["of"]) for c in answer["cheapest"]}
     assert questions == {*product((RESPONSE, IMPACT, WAVE), (BOARD, EQUATIONS)), (SHARE, IDEAL)}
     assert entry.status(["trade", str(out), "--boards", "2", "--json", "-q"]) == 0
