@@ -315,8 +315,8 @@ def test_simulate_a_folder(
     assert max(response["impact_velocities"]) == pytest.approx(0.6, abs=0.3)
 
 
-def test_simulate_from_rest(home: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    model = _model(home)
+def test_simulate_from_rest(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    model = _model(tmp_path)
     assert (
         entry.status(["simulate", str(model), "--omega", "1.55", "--omega", "0.85", "--json"]) == 0
     )
@@ -549,10 +549,10 @@ def test_folders_that_cannot_be_written(tmp_path: Path, capfd: pytest.CaptureFix
     assert _tree(foreign) == {"bom.csv": b"mine"}
 
 
-def test_missing_ngspice_is_exit_3(home: Path, tmp_path: Path) -> None:
+def test_missing_ngspice_is_exit_3(tmp_path: Path) -> None:
     out = tmp_path / "out"
     environment = {**os.environ, "PATH": str(tmp_path), "PYTHONPATH": str(ROOT)}
-    process = _process("run", _model(home), "--out", out, "--json", env=environment)
+    process = _process("run", _model(tmp_path), "--out", out, "--json", env=environment)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 3
     assert stdout == ""
@@ -562,7 +562,7 @@ def test_missing_ngspice_is_exit_3(home: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["too old", "no library", "a library that crashes"])
-def test_an_ngspice_that_will_not_do_is_exit_3(home: Path, tmp_path: Path, what: str) -> None:
+def test_an_ngspice_that_will_not_do_is_exit_3(tmp_path: Path, what: str) -> None:
     """Clear, before any long work, and nothing is written."""
     out, environment = tmp_path / "out", {**os.environ, "PYTHONPATH": str(ROOT)}
     if what == "too old":
@@ -580,7 +580,7 @@ def test_an_ngspice_that_will_not_do_is_exit_3(home: Path, tmp_path: Path, what:
         (tmp_path / "PySpice" / "__init__.py").write_text("import os\nos.kill(os.getpid(), 11)\n")
         environment["PYTHONPATH"] = f"{tmp_path}:{ROOT}"
         said = ("simulation workers do not start", "died (exit -11)")
-    process = _process("run", _model(home), "--out", out, "--json", env=environment)
+    process = _process("run", _model(tmp_path), "--out", out, "--json", env=environment)
     stdout, stderr = process.communicate(timeout=120)
     assert process.returncode == 3
     assert stdout == ""
