@@ -10,7 +10,7 @@ from designer.base.plain_json import FORMAT
 from designer.centering.cure_trial import Cure, Trial
 from designer.centering.cure_upgrade import Upgrades
 
-COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades")
+COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
 
 
 def cure_json(found: Cure, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
@@ -85,6 +85,7 @@ def front_csv(found: Cure) -> str:
                 "high": f"{high:.5g}",
                 "samples": str(t.worst.counts.samples),
                 "upgrades": "; ".join(words(t.upgrades)),
+                "failed": str(t.worst.counts.failed),
             }
         )
     return csv_text(COLUMNS, rows)

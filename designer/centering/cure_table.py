@@ -59,4 +59,5 @@ def _rate(m: Mapping[str, Any]) -> float:
 def _yield(m: Mapping[str, Any]) -> str:
     if m["rate"] is None:
         return "not shown"
-    return f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
+    text = f"{m['rate']:.4f} ({m['low']:.4f} to {m['high']:.4f})"
+    return text + (f", {m['failed']} failed" if m["failed"] else "")

@@ -149,7 +149,7 @@ def _further(answer: Mapping[str, Any]) -> None:
         (
             {
                 **_asked(r, rows),
-                **{kind: _percent((of(r) or {}).get("rate")) for kind, of in shown.items()},
+                **{kind: _decided(of(r) or {}) for kind, of in shown.items()},
                 **(_both_engines(r) if both else {}),
             }
             for r in rows
@@ -459,6 +459,12 @@ def _share(counted: Mapping[str, Any]) -> str:
 
 def _percent(rate: float | None) -> str:
     return "-" if rate is None else f"{100 * rate:.1f}"
+
+
+def _decided(counted: Mapping[str, Any]) -> str:
+    """A yield, and how many boards had no answer, if any."""
+    failed = counted.get("failed")
+    return _percent(counted.get("rate")) + (f" ({failed} failed)" if failed else "")
 
 
 def _sigmas(distance: float | None) -> str:

@@ -4,7 +4,8 @@ Settle for 20 drive periods, look for the period n at which the strobe nearly re
 Newton's method on the n-period map and accept only what converged, is stable, lies where the
 settling had arrived and draws the settling trajectory in; otherwise settle longer (40, 140, 800,
 4000 periods in all). Newton at once would be faster and wrong: it also lands on unstable orbits and
-on other attractors.
+on other attractors. What has neither a short period nor chaos after 800 periods is looked at for
+longer periods, and after 4000 for whether it has settled at all.
 """
 
 from __future__ import annotations
@@ -32,6 +33,12 @@ from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.step_budget import Budget
 
 STAGES = (20, 20, 100, 660, 3200)
+LONG_PERIOD = 4 * MAX_PERIOD
+"""Longest period that is looked for where there is neither one up to ``MAX_PERIOD`` nor chaos."""
+STATIONARY = 0.01
+"""Change of how far a motion is from repeating, over half of the last stage, below which it has
+settled. What approaches an orbit of multiplier ρ changes by 1 - ρ^1600, so only ρ > 0.999994 may be
+taken for settled."""
 ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
 
@@ -74,15 +81,44 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
                 return Orbit(
                     OrbitStatus.APERIODIC, start=x, mode=mode, lyapunov=exponent, periods=spent
                 )
+            found, cost = long_orbit(flow, x, mode)
+            spent += cost
+            if found is not None:
+                return replace(found, periods=spent)
+    still = is_stationary(run.strobes)
+    reason = f"no period up to {LONG_PERIOD} and no chaos after {spent} drive periods: "
     return Orbit(
-        OrbitStatus.NOT_SETTLED,
+        OrbitStatus.APERIODIC if still else OrbitStatus.NOT_SETTLED,
         start=x,
         mode=mode or (),
         lyapunov=exponent,
-        reason=f"no period up to {MAX_PERIOD} and no chaos after {spent} drive periods: "
-        "quasi-periodic, of a longer period, or very slow",
+        reason=reason + ("quasi-periodic, or of a longer period" if still else "very slow"),
         periods=spent,
     )
+
+
+def long_orbit(flow: Flow, x: Array, mode: ModeKey | None = None) -> tuple[Orbit | None, int]:
+    """The stable orbit of a period above ``MAX_PERIOD``, up to ``LONG_PERIOD``, that the motion
+    through x (states,) is on or near, if any; also the drive periods that this cost."""
+    run = flow.run(x, LONG_PERIOD, mode=mode)
+    if run.status is not FlowStatus.DONE:
+        return None, len(run.strobes) - 1
+    found, cost = _polish(flow, run, range(MAX_PERIOD + 1, LONG_PERIOD + 1))
+    return found, LONG_PERIOD + cost
+
+
+def is_stationary(strobes: Array) -> bool:
+    """Whether a motion has settled, though without a period: for every n up to ``LONG_PERIOD`` the
+    strobes (k, states), k > 8 ``LONG_PERIOD``, repeat after n periods no better at the end than in
+    the middle. What approaches a periodic orbit repeats ever better."""
+    peak = np.maximum(np.abs(strobes).max(axis=0), 1e-300)
+    scaled, quarter = strobes / peak, len(strobes) // 4
+    for n in range(1, LONG_PERIOD + 1):
+        gap = np.abs(scaled[n:] - scaled[:-n]).max(axis=1)
+        middle, end = float(gap[quarter : 2 * quarter].max()), float(gap[-quarter:].max())
+        if end <= STROBE_TOLERANCE or abs(end - middle) > STATIONARY * middle:
+            return False
+    return True
 
 
 def _too_long(flow: Flow, spent: int, budget: Budget) -> str:
@@ -308,11 +344,14 @@ def twin(flow: Flow, orbit: Orbit) -> Orbit | None:
     return None if found is None else describe(flow, found[0], orbit.n, found[1])
 
 
-def _polish(flow: Flow, run: FlowResult) -> tuple[Orbit | None, int]:
-    """Try to turn the end of a settling run into a periodic orbit; also what it cost."""
+def _polish(
+    flow: Flow, run: FlowResult, periods: range = range(1, MAX_PERIOD + 1)
+) -> tuple[Orbit | None, int]:
+    """Try to turn the end of a settling run into an orbit of one of these periods; also what it
+    cost."""
     strobes, cost = run.strobes, 1
     peak = peaks_near(flow, strobes[-1], run.mode)
-    for n in range(1, min(MAX_PERIOD, len(strobes) - 1) + 1):
+    for n in (n for n in periods if n < len(strobes)):
         gap = np.abs(strobes[-1] - strobes[-1 - n]) / peak
         if gap.max() > WORTH:
             continue

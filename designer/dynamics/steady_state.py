@@ -22,7 +22,7 @@ from designer.dynamics.counts import MAX_PERIOD, Pairs
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.dynamics.kernel_modal import ModalTables, Watch
 from designer.dynamics.kernel_orbit import CHAOS, WORTH
-from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Motion, OrbitStatus
+from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Motion, Orbit, OrbitStatus
 
 SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
@@ -118,7 +118,7 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
     """By the general flow, period after period."""
     exponent, state = float("nan"), np.array(x, dtype=float)
     free = course.settle - course.tangents
-    spent, status = course.settle + course.keep, OrbitStatus.NOT_SETTLED
+    spent = course.settle + course.keep
     if free:
         run = flow.run(state, free)
         if run.status is not FlowStatus.DONE:
@@ -135,38 +135,37 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
         minima.append(float((run.spans if len(run.spans) else run.extremes)[0, 0]))
         upper = (run.impacts.side > 0) & (run.impacts.clearance == 0)
         velocities += run.impacts.velocity[upper].tolist()
-    end = strobes[-1]
-    n = p = q = 0
-    more: Pairs = ()
-    symmetric, radius, start = None, float("nan"), end
+    end, found = strobes[-1], (np.array(minima), np.array(velocities))
     growth = exponent * flow.drive.period
     if course.tangents >= kernel.SPAN and growth > CHAOS and not _repeats(flow, strobes):
-        status = OrbitStatus.APERIODIC
+        orbit = Orbit(OrbitStatus.APERIODIC, start=end, lyapunov=exponent)
     else:
         orbit = settle(flow, end)
-        if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
-            orbit = replace(orbit, status=OrbitStatus.PERIODIC)
-        status, spent = orbit.status, spent + orbit.periods
-        if status is OrbitStatus.PERIODIC:
-            n, p, q, more = orbit.n, orbit.p, orbit.q, orbit.more
-            symmetric, radius = orbit.symmetric, orbit.radius
-        if np.isfinite(orbit.lyapunov):
-            exponent = orbit.lyapunov
-        start = orbit.start if len(orbit.start) else end
+        if not np.isfinite(orbit.lyapunov):
+            orbit = replace(orbit, lyapunov=exponent)
+    return _of_orbit(orbit, end, found, spent)
+
+
+def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, Array], spent: int) -> Steady:
+    """An orbit as what was ``found`` before it leads to: minima and velocities, after ``spent``
+    periods."""
+    if orbit.status is OrbitStatus.GRAZING:  # a count near a tangency is given as it was run
+        orbit = replace(orbit, status=OrbitStatus.PERIODIC)
+    periodic = orbit.status is OrbitStatus.PERIODIC
     return Steady(
-        status,
-        n,
-        p,
-        q,
-        symmetric,
-        exponent,
-        radius,
-        start,
-        end,
-        np.array(minima),
-        np.array(velocities),
-        spent,
-        more,
+        status=orbit.status,
+        n=orbit.n if periodic else 0,
+        p=orbit.p if periodic else 0,
+        q=orbit.q if periodic else 0,
+        symmetric=orbit.symmetric,
+        lyapunov=orbit.lyapunov,
+        radius=orbit.radius if periodic else float("nan"),
+        start=orbit.start if len(orbit.start) else end,
+        end=end,
+        minima=found[0],
+        velocities=found[1],
+        periods=spent + orbit.periods,
+        more=orbit.more if periodic else (),
     )
 
 
@@ -218,6 +217,10 @@ def _by_kernel(
         counted,
         cursor,
     )
+    found = watch.minima, watch.velocities[:entries].copy()
+    spent += int(counted[kernel_orbit.SPENT])
+    if code == kernel.NOT_SETTLED and course.patience:  # a long period, or none, but settled
+        return _of_orbit(settle(flow(), orbit), strobes[-1], found, spent)
     stopped = code == kernel.STOPPED
     n, p, q = (
         int(counted[place]) if code == kernel.PERIODIC else 0
@@ -233,9 +236,9 @@ def _by_kernel(
         radius=float(facts[0]) if n else float("nan"),
         start=orbit,
         end=strobes[-1],
-        minima=watch.minima,
-        velocities=watch.velocities[:entries].copy(),
-        periods=spent + int(counted[kernel_orbit.SPENT]),
+        minima=found[0],
+        velocities=found[1],
+        periods=spent,
     )
 
 

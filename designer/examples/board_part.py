@@ -51,9 +51,10 @@ def _responses(answers: list[Mapping[str, Any]]) -> Any:
         rate = counted["ok"] / max(counted["samples"] - counted["failed"], 1)
         interval = f"{counted['low']:.3f} to {counted['high']:.3f}"
         engines = (str(each[name]) for name in ("model", "circuit", "ngspice"))
-        rows.append((f"{each['omega']:.4g}", *engines, f"{rate:.3f}", interval))
-    head = ("ω", "model", "exact circuit", "ngspice", "yield", "95 % interval")
-    return table(head, rows, numeric=(0, 4))
+        failed = str(counted["failed"])
+        rows.append((f"{each['omega']:.4g}", *engines, f"{rate:.3f}", interval, failed))
+    head = ("ω", "model", "exact circuit", "ngspice", "yield", "95 % interval", "failed")
+    return table(head, rows, numeric=(0, 4, 6))
 
 
 def _facts(outcome: JobOutcome, counts: Mapping[str, int]) -> list[str]:

@@ -367,7 +367,9 @@ def offset_grid(pieces: Sequence[Piece]) -> Figure:
             decided = sum(counted.values()) - counted["failed"]
             share = counted["ok"] / decided if decided else float("nan")
             fill = NO_RUN if not r["there"] else _between(LOST, KEPT, share)
-            _cell(axes, j, i, "not there" if not r["there"] else f"{100.0 * share:.3g} %", fill)
+            text = f"{100.0 * share:.3g} %" if r["there"] else "not there"
+            text += f"\n{counted['failed']} failed" if r["there"] and counted["failed"] else ""
+            _cell(axes, j, i, text, fill)
     _table(axes, heads, names)
     return figure
 

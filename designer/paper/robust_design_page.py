@@ -113,7 +113,8 @@ def _yields(cases: Sequence[Case]) -> list[Block]:
         "Per cent, with the two-sided 95 % interval. The goal is reached where the lower end is at "
         "99 % or above, missed where the upper end is below, else undecided. Tuned and powered-up "
         "boards are more where the first ones left it undecided; such a second look has a chance "
-        "of its own to be wrong."
+        "of its own to be wrong. Boards without an answer are left out of a yield, and how many "
+        "stands beside it."
     ]
     for kind in KINDS:
         shown = [c for c in cases if any(kind in r for r in c["responses"])]
@@ -217,7 +218,8 @@ def _cell(counted: Mapping[str, Any] | None) -> str:
     if counted is None or counted["rate"] is None:
         return NONE
     rate, low, high = (100.0 * counted[name] for name in ("rate", "low", "high"))
-    return f"{rate:.2f} ({low:.2f} to {high:.2f})"
+    text = f"{rate:.2f} ({low:.2f} to {high:.2f})"
+    return text + (f", {counted['failed']} failed" if counted["failed"] else "")
 
 
 def _goal(counts: Mapping[str, Mapping[str, Any] | None]) -> str:

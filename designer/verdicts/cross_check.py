@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from designer.dynamics.counts import MAX_PERIOD, read_counts
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.model.response_table import Response
 from designer.verdicts.verdict import Answer, Question, Verdict
@@ -103,10 +104,11 @@ class CrossCheck(Ask):
     def agrees(self, answer: Answer) -> bool | None:
         """Whether ngspice names the response that the exact rung names; None without an answer.
         Two step sizes that name different ones both differ from a third."""
+        exact = name_in_ngspice(answer.response)
         if is_answer(self.response):
-            return self.response == answer.response
+            return self.response == exact
         both = _both(self.either)
-        return False if both and answer.response not in both else None
+        return False if both and exact not in both else None
 
     def outcome(self, answer: Answer) -> NgspiceVerdict:
         """`FAILED` where there is no answer at all."""
@@ -144,6 +146,14 @@ def is_answer(response: str) -> bool:
     """Whether ngspice named a response or a status of one: "" is no answer, nor is a run that
     failed or has not settled, or two that differ."""
     return response not in ("", OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED, UNDECIDED)
+
+
+def name_in_ngspice(response: str) -> str:
+    """What ngspice calls a response of the exact rung: of a period above `MAX_PERIOD`, which is not
+    looked for there, aperiodic."""
+    counts = read_counts(response)
+    long = counts is not None and counts.n > MAX_PERIOD
+    return str(OrbitStatus.APERIODIC) if long else response
 
 
 def margin_share(answer: Answer, nominal: Orbit) -> float:
@@ -230,7 +240,7 @@ def ask_all(answers: Iterable[Answer]) -> list[Ask]:
 
 
 def _ask_own(answer: Answer) -> list[Ask]:
-    if answer.sample >= OWN_SAMPLES or answer.response == OrbitStatus.APERIODIC:
+    if answer.sample >= OWN_SAMPLES or name_in_ngspice(answer.response) == OrbitStatus.APERIODIC:
         return []
     return [Ask(answer.sample, answer.question, StartKind.OWN, Why.RANDOM)]
 

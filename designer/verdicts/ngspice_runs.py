@@ -30,7 +30,15 @@ from designer.spice.pool import SpicePool
 from designer.spice.read_orbit import Read
 from designer.spice.simulator import SimulationFailed
 from designer.verdicts import exact_rung
-from designer.verdicts.cross_check import OR, UNDECIDED, Ask, CrossCheck, StartKind, is_answer
+from designer.verdicts.cross_check import (
+    OR,
+    UNDECIDED,
+    Ask,
+    CrossCheck,
+    StartKind,
+    is_answer,
+    name_in_ngspice,
+)
 from designer.verdicts.verdict import StudyPlan
 
 T = TypeVar("T")
@@ -190,7 +198,8 @@ def _queries(
         elif rung != "ideal":
             subject = replace(subject, discard=way_to_rung(subject.orbit))
         subject = replace(subject, rung=rung, brief=True)
-        yield ask, Query(subject, question.settings, subject.orbit.response, halvings)
+        expected = name_in_ngspice(subject.orbit.response)
+        yield ask, Query(subject, question.settings, expected, halvings)
 
 
 def _subjects(

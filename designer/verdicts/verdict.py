@@ -134,10 +134,14 @@ class StudyPlan:
 
 
 def judge(orbit: Orbit, spec: Response, nominal: Orbit) -> tuple[Verdict, str]:
-    """Verdict and reason. Without an expectation the nominal circuit's own response is wanted."""
+    """Verdict and reason. Without an expectation the nominal circuit's own response is wanted.
+
+    Whatever a board does, if it is not what is wanted it is lost; failed is only what has no
+    answer: a computation that broke off, or a motion that has not settled.
+    """
     if orbit.status is OrbitStatus.GRAZING:
         return Verdict.GRAZING, orbit.reason
-    if orbit.status in (OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED, OrbitStatus.DIVERGED):
+    if orbit.status in (OrbitStatus.FAILED, OrbitStatus.NOT_SETTLED):
         return Verdict.FAILED, orbit.reason or str(orbit.status)
     if orbit.status is not OrbitStatus.PERIODIC:
         return Verdict.LOST, str(orbit.status)

@@ -6,15 +6,17 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from scipy.optimize import brentq
 
 from designer.base.arrays import Array
 from designer.base.errors import InputError
 from designer.dynamics.attractors import (
+    LONG_PERIOD,
     asymmetry,
     coexisting,
     describe,
+    is_stationary,
     lyapunov,
     mirrored_strobes,
     same,
@@ -28,6 +30,7 @@ from designer.dynamics.flow import Flow
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import Drive
 from designer.model.find_responses import find
+from designer.model.mechanics import SecondOrderSystem
 from designer.model.model import Dimensionless
 from designer.model.response_table import Response
 from tests.shared.oracles import Plain, integrate, response_amplitude
@@ -113,6 +116,44 @@ def test_orbit_repeats_in_the_reference_integrator() -> None:
         assert truth.times == pytest.approx(orbit.impact_times, abs=1e-9)
         assert truth.velocities == pytest.approx(orbit.impact_velocities, abs=1e-9)
         assert truth.sides.tolist() == orbit.impact_sides.tolist()
+
+
+def test_a_long_period_is_found_and_repeats_in_the_reference_integrator() -> None:
+    omega = 0.625734293717487
+    orbit = settle(flow_at(omega), REST)
+    assert (orbit.response, orbit.radius < 1.0) == ("20-44-44", True)
+    truth = integrate(Plain(0.5, 0.5, 0.95, 0.5, 0.1, 0.0, 0.25), omega, list(orbit.start), orbit.n)
+    assert len(truth.times) == orbit.p + orbit.q
+    gap = np.abs(truth.strobes - orbit.start).max(axis=1)
+    assert gap[-1] < 1e-8
+    assert gap[1:-1].min() > 1e-4, "the least period"
+
+
+def test_an_undamped_motion_has_settled_without_a_period() -> None:
+    """x'' + x = sin ωt swings with 1 and ω, which have no common period: it never settles on one,
+    and nothing of it dies out. With a little damping it is on its way for thousands of periods."""
+
+    def orbit(damping: float) -> Orbit:
+        system = SecondOrderSystem(
+            np.eye(1), np.array([[damping]]), np.eye(1), np.ones(1), ()
+        ).piecewise_linear()
+        return settle(Flow(system, Drive(np.sqrt(2.0))), np.array([0.7, 0.1]))
+
+    free, slow = orbit(0.0), orbit(3e-5)
+    assert (free.status, abs(free.lyapunov) < 1e-3) == (OrbitStatus.APERIODIC, True)
+    assert "quasi-periodic" in free.reason
+    assert (slow.status, slow.reason.endswith("very slow")) == (OrbitStatus.NOT_SETTLED, True)
+
+
+@given(
+    turn=st.floats(0.01, 0.49), radius=st.sampled_from([1.0, 0.9995, 0.999]), seed=st.integers(0, 9)
+)
+def test_a_circle_is_stationary_and_a_spiral_is_not(turn: float, radius: float, seed: int) -> None:
+    """Strobes of a torus and of a focus that takes thousands of periods, in closed form."""
+    assume(min(abs(n * turn - round(n * turn)) for n in range(1, LONG_PERIOD + 1)) > 1e-3)
+    angle = 2.0 * np.pi * turn * np.arange(3201) + seed
+    circle = radius ** np.arange(3201.0)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    assert is_stationary(circle) is (radius == 1.0)
 
 
 def test_linear_orbit_is_the_frequency_response() -> None:
@@ -338,8 +379,6 @@ def test_a_start_in_contact_is_the_same_response() -> None:
 
 
 def test_failures_are_orbits_with_a_reason() -> None:
-    from designer.model.mechanics import SecondOrderSystem
-
     system = SecondOrderSystem(
         np.array([1.0]), np.array([[-0.5]]), np.array([[1.0]]), np.array([1.0]), ()
     ).piecewise_linear()

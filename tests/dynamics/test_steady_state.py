@@ -180,6 +180,16 @@ def test_chaos_shows_the_slow_version_for_a_while(omega: float) -> None:
     assert motion.lyapunov * 2 * np.pi / omega > 0.3
 
 
+@pytest.mark.parametrize("omega", [0.625734293717487, 0.38073229291716687])
+def test_long_periods_are_found_by_both_engines(omega: float) -> None:
+    fast = setting(omega).steady(np.zeros(4), Course())
+    slow = by_flow(flow(omega), np.zeros(4), Course())
+    assert fast.response == slow.response == attractors.settle(flow(omega), np.zeros(4)).response
+    assert fast.n > MAX_PERIOD
+    hurried = setting(omega).steady(np.zeros(4), Course(patience=0))
+    assert hurried.status is OrbitStatus.NOT_SETTLED
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.12, 1.8))
 def test_names_what_settling_names(omega: float) -> None:

@@ -148,6 +148,10 @@ def test_agreement_and_survival() -> None:
         assert replace(HEARD, response=said).outcome(BLANK) == outcome
     third = replace(HEARD, response="undecided", either="1-1-1 or 1-2-2")
     assert third.agrees(replace(BLANK, response="1-3-3")) is False
+    # Nor does it look for periods above 16: there the two say the same in other words.
+    chaos = replace(HEARD, response="aperiodic")
+    assert chaos.agrees(replace(BLANK, response="22-44-46")) is True
+    assert chaos.agrees(replace(BLANK, response="16-44-46")) is False
     assert third.survives(question()) is None
     twin = replace(HEARD, response="1-2-1")
     assert twin.survives(question("1-1-2")) is True

@@ -64,7 +64,8 @@ NOMINAL = periodic(1, 1, 2, 0.3)
         (Orbit(OrbitStatus.CLIPPED, n=1, p=1, q=1), wanted("1-1-1"), Verdict.LOST),
         (Orbit(OrbitStatus.GRAZING, n=1, p=1, q=1), wanted("1-1-1"), Verdict.GRAZING),
         (Orbit(OrbitStatus.NOT_SETTLED), wanted("1-1-1"), Verdict.FAILED),
-        (Orbit(OrbitStatus.DIVERGED), wanted("1-1-1"), Verdict.FAILED),
+        (Orbit(OrbitStatus.DIVERGED), wanted("1-1-1"), Verdict.LOST),
+        (periodic(22, 44, 44), wanted("1-2-2"), Verdict.LOST),
         (Orbit(OrbitStatus.FAILED, reason="why"), wanted("1-1-1"), Verdict.FAILED),
     ],
 )
@@ -79,6 +80,8 @@ def test_lost_says_to_what() -> None:
     assert judge(periodic(3, 4, 4), wanted("1-1-1"), NOMINAL)[1] == "to 3-4-4"
     clipped = Orbit(OrbitStatus.CLIPPED, n=1, p=1, q=1)
     assert judge(clipped, wanted("1-1-1"), NOMINAL)[1] == "clipped"
+    assert judge(Orbit(OrbitStatus.DIVERGED), wanted("1-1-1"), NOMINAL)[1] == "diverged"
+    assert judge(periodic(22, 44, 46), wanted("1-2-2"), NOMINAL)[1] == "to 22-44-46"
 
 
 def test_symmetry_of_even_periods() -> None:
