@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from designer.base.errors import DesignerError, InputError
 from designer.base.progress import Progress, progress_for
@@ -23,10 +24,31 @@ VERBS = tuple(
     "run synthesise synthesize simulate bifurcation tolerance search trade export rules reproduce "
     "catalog new".split()
 )
+GROUPS = ("Design", "Study", "Explore", "Make")
+"""The headings of the verbs in the help, in their order."""
+
+
+class GroupedVerbs(typer.core.TyperGroup):
+    """The verbs, under headings in the help."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write each group with the first sentence of each of its verbs."""
+        verbs = [self.commands[name] for name in self.list_commands(ctx)]
+        for group in GROUPS:
+            rows = [
+                (str(each.name), each.get_short_help_str(limit=200))
+                for each in verbs
+                if not each.hidden and getattr(each, "rich_help_panel", None) == group
+            ]
+            with formatter.section(group):
+                formatter.write_dl(rows)
+
+
 app = typer.Typer(
     name="designer",
+    cls=GroupedVerbs,
     help="Op-amp circuits for mechanical models with clearances, and how many boards will work.",
-    add_completion=False,
+    epilog="designer VERB --help says more, with an example.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -47,9 +69,9 @@ Samples = Annotated[
     int | None,
     option("--samples", "N", "Boards in the study [200, all of a list, or the folder's own]."),
 ]
-Seed = Annotated[int, option("--seed", "N", "Of the random numbers.")]
+Seed = Annotated[int, option("--seed", "N", "Seed of the random numbers.")]
 OwnSeed = Annotated[
-    int | None, option("--seed", "N", "Of the random numbers [1, or the folder's own].")
+    int | None, option("--seed", "N", "Seed of the random numbers [1, or the folder's own].")
 ]
 _SHARED: dict[str, tuple[Any, Any]] = {
     "jobs": (int | None, option("--jobs", "N", "Workers at a time [default: all cores].")),
@@ -57,14 +79,14 @@ _SHARED: dict[str, tuple[Any, Any]] = {
         bool,
         option("--overwrite", None, "Replace files that the folder's manifest.json lists."),
     ),
-    "resume": (bool, option("--resume", None, "Go on with unfinished work.")),
+    "resume": (bool, option("--resume", None, "Go on with work that was interrupted.")),
     "json": (bool, option("--json", None, "Print one JSON object on standard output.")),
     "verbose": (
         bool,
-        option("-v --verbose", None, "Say more; show where a defect of the tool is."),
+        option("-v --verbose", None, "Show where in the code a defect of the tool is."),
     ),
-    "quiet": (bool, option("-q --quiet", None, "Say nothing but errors.")),
-    "log": (Path | None, option("--log", "FILE", "Append what happens to a file.")),
+    "quiet": (bool, option("-q --quiet", None, "Print nothing but errors.")),
+    "log": (Path | None, option("--log", "FILE", "Append a log of the work to this file.")),
 }
 """Type and declaration of the options that verbs share; off, or None, where nothing is said."""
 
@@ -75,7 +97,7 @@ Show = Callable[[Mapping[str, Any]], None]
 
 @dataclass(frozen=True)
 class Output:
-    """What a verb has to say."""
+    """The answer of a verb, in the ways in which it can be printed."""
 
     json: Mapping[str, Any]
     """The object for ``--json``."""
@@ -107,14 +129,15 @@ class Session:
 
 
 def verb(
-    *shared: str, json: bool = True, computes: bool = True
+    group: str, example: str, *shared: str, json: bool = True, computes: bool = True
 ) -> Callable[[Callable[..., Output]], Callable[..., int]]:
     """Register a function as a verb.
 
     The function takes a ``Session``, its own options, and the values of ``shared`` as keywords.
     Its verb has, after its own options, the shared ones and those of every verb.
 
-    json : whether it has a JSON object. computes : whether it may need the exact engine, whose
+    group : one of ``GROUPS``. example : a command line, which the help shows. json : whether the
+    verb has a JSON object. computes : whether it may need the exact engine, whose
     compilation is then announced.
     """
     every = ("json", "verbose", "quiet", "log") if json else ("verbose", "quiet", "log")
@@ -140,7 +163,7 @@ def verb(
         parameters = [*own, *(_parameter(name) for name in (*shared, *every))]
         command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         command.__annotations__ = {p.name: p.annotation for p in parameters}
-        app.command()(command)
+        app.command(rich_help_panel=group, epilog=f"\b\nExample:\n  {example}")(command)
         return command
 
     return register

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 from designer.cli.app import Out, Output, Session, Source, option, verb
 
 
-@verb("jobs", "overwrite", "resume")
+@verb(
+    "Explore",
+    "designer bifurcation model.toml --over omega --from 0.2 --to 1 --steps 200 --out out/sweep",
+    "jobs",
+    "overwrite",
+    "resume",
+)
 def bifurcation(
     session: Session,
     model: Source,
@@ -69,7 +75,7 @@ def bifurcation(
     out: Out = None,
     **shared: Any,
 ) -> Output:
-    """Bifurcation diagrams, maps of n-p-q over two parameters, basins of attraction."""
+    """Draw bifurcation diagrams, maps of n-p-q over two parameters, or basins of attraction."""
     from designer.cli import bifurcation_tables
     from designer.jobs import bifurcation_job
 

@@ -13,7 +13,7 @@ from designer.base.errors import InputError
 from designer.cli.app import Output, Session, option, verb
 
 
-@verb(computes=False)
+@verb("Design", "designer catalog --check TL074", computes=False)
 def catalog(
     session: Session,
     check: Annotated[
@@ -21,7 +21,7 @@ def catalog(
     ] = None,
     **_: Any,
 ) -> Output:
-    """What can be bought: part families, op-amps, diodes, references, trimmers, headers."""
+    """List what can be bought (part families, op-amps, diodes, …), or check an op-amp's model."""
     from designer.catalog.catalog import load_catalog
     from designer.cli import tables
 
@@ -43,7 +43,7 @@ def catalog(
     )
 
 
-@verb(computes=False)
+@verb("Design", "designer new hammer.toml --format 2", computes=False)
 def new(
     _session: Session,
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The file to write.")] = Path(
@@ -51,14 +51,14 @@ def new(
     ),
     from_: Annotated[
         Path | None,
-        option("--from", "OLD", "Rewrite this model file in format 2, its other tables as it is."),
+        option("--from", "OLD", "Rewrite this model file in format 2; its other tables stay."),
     ] = None,
     format_: Annotated[
-        int | None, option("--format", "1|2", "Of the commented file: 2 for any system [1].")
+        int | None, option("--format", "1|2", "Format of the commented file: 2 for any system [1].")
     ] = None,
     **_: Any,
 ) -> Output:
-    """Write a commented model file to start from; an existing file is left alone."""
+    """Write a commented model file to start from; an existing file is never replaced."""
     from designer.model.template import new as write_model_file
 
     if format_ not in (None, 1, 2):
@@ -68,7 +68,7 @@ def new(
     return Output(answer, lambda: print(f"written: {path}", file=sys.stderr))
 
 
-@verb("jobs", "resume", json=False)
+@verb("Study", "designer reproduce dynamics --out out/paper-dynamics", "jobs", "resume", json=False)
 def reproduce(
     session: Session,
     what: Annotated[
@@ -80,14 +80,15 @@ def reproduce(
         option(
             "--out",
             "DIR",
-            "Where to [default: reports/paper-dynamics, reports/paper-circuit, reports/tolerance].",
+            "The folder to write [reports/paper-dynamics, reports/paper-circuit or "
+            "reports/tolerance].",
         ),
     ] = None,
     samples: Annotated[int | None, option("--samples", "N", "Boards a case (tolerance).")] = None,
-    seed: Annotated[int | None, option("--seed", "N", "Of the boards (tolerance).")] = None,
+    seed: Annotated[int | None, option("--seed", "N", "Seed of the boards (tolerance).")] = None,
     **shared: Any,
 ) -> Output:
-    """The paper's figures and statements, measured again."""
+    """Measure the paper's figures and statements again."""
     from designer.paper import paper_reports
 
     paper_reports.reproduce(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import platform
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from designer.base.defaults import DRAWN_STARTS, SEARCH_SAMPLES, SEED, TRADE_BOARDS
-from designer.base.errors import MISSING, InputError
+from designer.base.defaults import DRAWN_STARTS, SEARCH_SAMPLES, SEED, TRADE_BOARDS, cores
+from designer.base.errors import MISSING, EnvironmentMissing, InputError
 from designer.base.version import __version__
 from designer.cli.app import (
     Out,
@@ -65,23 +66,43 @@ class DeckName(StrEnum):
 
 WithBlame = Annotated[
     bool | None,
-    option("--blame/--no-blame", None, "Which part is to blame [yes, or as the folder has]."),
+    option("--blame/--no-blame", None, "Say which part is to blame [yes, or as the folder has]."),
 ]
 BlameBudget = Annotated[
-    int | None, option("--blame-budget", "STEPS", "Of the work on the blame [20000].")
+    int | None, option("--blame-budget", "STEPS", "Most steps of the work on the blame [20000].")
 ]
 
 
 @app.callback(invoke_without_command=True)
 def _designer(
-    version: Annotated[bool, option("--version", None, "Print the version.")] = False,
+    version: Annotated[
+        bool, option("--version", None, "Print the version, and what it works with here.")
+    ] = False,
 ) -> None:
     if version:
         print(f"designer {__version__}")
+        for name, found in _surroundings():
+            print(f"{name:8} {found}")
         raise typer.Exit
 
 
-@verb("jobs", "overwrite", "resume")
+def _surroundings() -> Iterator[tuple[str, str]]:
+    """The programs that verbs call and the cores that they use, as they are on this machine."""
+    from designer.design_rules.kicad_drc import kicad_version
+    from designer.spice.batch_backend import program_version
+
+    yield "Python", platform.python_version()
+    try:
+        yield "ngspice", program_version()
+    except EnvironmentMissing as missing:
+        yield "ngspice", str(missing)
+    yield "KiCad", kicad_version() or "none (kicad-cli 9 checks boards in designer rules)"
+    yield "cores", str(cores())
+
+
+@verb(
+    "Design", "designer run model.toml --out out/model --samples 200", "jobs", "overwrite", "resume"
+)
 def run(
     session: Session,
     model: Source,
@@ -92,7 +113,7 @@ def run(
     seed: OwnSeed = None,
     **shared: Any,
 ) -> Output:
-    """Everything: parts, circuit, check in ngspice, yield, report."""
+    """Do the whole job: parts, circuit, check in ngspice, yield, report."""
     from designer.cli import tables
     from designer.jobs import study_job
 
@@ -110,13 +131,13 @@ def run(
     return _output(outcome, outcome.answer, tables.run)
 
 
-@verb("jobs", "overwrite", "resume")
+@verb("Design", "designer synthesise model.toml --out out/model", "jobs", "overwrite", "resume")
 def synthesise(
     session: Session,
     model: Source,
     out: Out = None,
     compare: Annotated[
-        bool, option("--compare", None, "Beside the paper's values; needs no --out.")
+        bool, option("--compare", None, "Set the design beside the paper's values; needs no --out.")
     ] = False,
     seed: Seed = SEED,
     **shared: Any,
@@ -131,10 +152,20 @@ def synthesise(
     return _output(outcome, outcome.answer, tables.synthesised)
 
 
-app.command("synthesize", hidden=True)(synthesise)
+app.command(
+    "synthesize",
+    hidden=True,
+    epilog="\b\nExample:\n  designer synthesise model.toml --out out/model",
+)(synthesise)
 
 
-@verb("jobs", "overwrite", "resume")
+@verb(
+    "Study",
+    "designer tolerance out/model --samples 2000 --rung exact",
+    "jobs",
+    "overwrite",
+    "resume",
+)
 def tolerance(
     session: Session,
     model: Source,
@@ -162,7 +193,7 @@ def tolerance(
         option("--map", None, "Also the yield over this setting; may be repeated."),
     ] = None,
     measured: Annotated[
-        Path | None, option("--measured", "FILE", "Of the boards in this list instead (CSV).")
+        Path | None, option("--measured", "FILE", "Study the boards in this list instead (CSV).")
     ] = None,
     cluster: Annotated[
         str | None, option("--cluster", "tcp://…", "A Dask scheduler that shares the work.")
@@ -172,7 +203,7 @@ def tolerance(
     seed: OwnSeed = None,
     **shared: Any,
 ) -> Output:
-    """How many boards will work; writes into the design folder (a model file needs --out)."""
+    """Count the boards that will work, into the design folder; a model file needs --out."""
     from designer.cli import tables
     from designer.jobs import study_job
 
@@ -215,7 +246,7 @@ def _output(outcome: JobOutcome, answer: Mapping[str, Any], table: Any) -> Outpu
     return Output(answer, show, outcome.satisfied)
 
 
-@verb("jobs")
+@verb("Explore", "designer simulate model.toml --omega 0.85 --plots pictures", "jobs")
 def simulate(
     session: Session,
     model: Source,
@@ -250,8 +281,8 @@ def simulate(
     ] = False,
     **shared: Any,
 ) -> Output:
-    """The responses: those that the model file wants, or what is reached from rest at --omega
-    and --frequency."""
+    """Name the responses: those that the model file wants, or those reached from rest at
+    --omega and --frequency."""
     from designer.cli import tables
     from designer.jobs import simulate_job
 
@@ -277,7 +308,7 @@ def simulate(
     return Output(result.answer, show, result.satisfied)
 
 
-@verb("jobs", "overwrite", "resume")
+@verb("Design", "designer search model.toml --out out/robust", "jobs", "overwrite", "resume")
 def search(
     session: Session,
     model: Source,
@@ -288,13 +319,15 @@ def search(
     wanted: Annotated[
         float | None, option("--yield", "Y", "Cure this design folder: the yield wanted.")
     ] = None,
-    budget: Annotated[float | None, option("--budget", "PRICE", "Of a cure, at most.")] = None,
+    budget: Annotated[
+        float | None, option("--budget", "PRICE", "The most that a cure may cost.")
+    ] = None,
     without: Annotated[
         list[str] | None,
         option(
             "--without",
             "KIND",
-            f"Of a cure, no upgrade of this kind: {', '.join(KINDS)}; may be repeated.",
+            f"A cure without upgrades of this kind: {', '.join(KINDS)}; may be repeated.",
         ),
     ] = None,
     rung: Annotated[
@@ -306,7 +339,7 @@ def search(
     seed: OwnSeed = None,
     **shared: Any,
 ) -> Output:
-    """The design of the highest yield for a model file; with --yield the cure of a folder."""
+    """Find the design of the highest yield; with --yield, the cheapest cure of a design folder."""
     shared |= {"seed": seed, "progress": session.progress}
     if not model.exists():
         raise InputError(model, "MODEL|DIR", MISSING, "a model file or a design folder")
@@ -335,7 +368,7 @@ def _refuse(given: Mapping[str, object], expected: str) -> None:
             raise InputError(None, name, value, expected)
 
 
-@verb("jobs", "overwrite", "resume")
+@verb("Study", "designer trade out/model --boards 100", "jobs", "overwrite", "resume")
 def trade(
     session: Session,
     model: Source,
@@ -352,7 +385,7 @@ def trade(
     seed: OwnSeed = None,
     **shared: Any,
 ) -> Output:
-    """Time and error of every rung on this design, and the cheapest for each question."""
+    """Measure time and error of each way to simulate this design, and name the cheapest."""
     from designer.cli import tables
     from designer.jobs import trade_job
 
@@ -362,7 +395,7 @@ def trade(
     return Output(result.answer, lambda: tables.traded(result.answer))
 
 
-@verb("overwrite", "resume")
+@verb("Make", "designer export out/model --deck ltspice", "overwrite", "resume")
 def export(
     session: Session,
     model: Source,
@@ -377,7 +410,7 @@ def export(
     ] = None,
     **shared: Any,
 ) -> Output:
-    """The KiCad project: schematic, placed board, netlist; or decks; into the design folder."""
+    """Write the KiCad project (schematic, placed board, netlist), or decks for simulators."""
     from designer.cli import tables
     from designer.jobs import export_job
 
@@ -387,7 +420,7 @@ def export(
     return Output(result.answer, lambda: tables.files(result.folder, result.reused))
 
 
-@verb()
+@verb("Make", "designer rules out/model --board out/model/kicad/model.kicad_pcb")
 def rules(
     session: Session,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A design folder.")],
@@ -397,7 +430,7 @@ def rules(
     junit: Annotated[Path | None, option("--junit", "FILE", "Also write a JUnit report.")] = None,
     **shared: Any,
 ) -> Output:
-    """Design rules on a circuit and its board; exit status 1 where one fails."""
+    """Test a circuit and its board against the design rules; exit status 1 where one fails."""
     from designer.cli import tables
     from designer.jobs import rules_job
 

@@ -6,7 +6,9 @@ import csv
 import importlib
 import json
 import os
+import platform
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -20,7 +22,8 @@ import pytest
 
 from designer.base.version import __version__
 from designer.cli import entry
-from designer.cli.app import VERBS
+from designer.cli.app import GROUPS, VERBS
+from designer.cli.command_line import application
 from designer.jobs.bench_tables import COLUMNS
 from designer.spice.worker import open_simulator
 from designer.verdicts.cross_check import OWN_SAMPLES
@@ -101,7 +104,53 @@ def finished(home: Path) -> tuple[Path, subprocess.CompletedProcess[str]]:
 
 def test_version_and_module(capfd: pytest.CaptureFixture[str]) -> None:
     assert entry.status(["--version"]) == 0
-    assert capfd.readouterr().out == f"designer {__version__}\n"
+    first, *programs = capfd.readouterr().out.splitlines()
+    assert first == f"designer {__version__}"
+    versions = dict(line.split(maxsplit=1) for line in programs)
+    assert list(versions) == ["Python", "ngspice", "KiCad", "cores"]
+    assert versions["Python"] == platform.python_version()
+    assert versions["cores"] == str(len(os.sched_getaffinity(0)))
+
+
+def test_the_version_says_what_is_missing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert entry.status(["--version"]) == 0
+    out = capfd.readouterr().out
+    assert "ngspice  the program ngspice is missing" in out
+    assert "KiCad    none" in out
+
+
+def test_the_help_shows_every_verb_once_below_a_heading(capfd: pytest.CaptureFixture[str]) -> None:
+    assert entry.status(["--help"]) == 0
+    text = capfd.readouterr().out
+    visible = [name for name, each in application().commands.items() if not each.hidden]
+    assert all(len(re.findall(rf"^  {name}  +\S", text, re.MULTILINE)) == 1 for name in visible)
+    headings = [text.index(f"\n{group}:\n") for group in GROUPS]
+    assert headings == sorted(headings)
+
+
+@pytest.mark.parametrize("verb", sorted(application().commands))
+def test_the_help_of_a_verb_ends_with_a_command_that_is_understood(
+    verb: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert entry.status([verb, "--help"]) == 0
+    program, name, *words = shlex.split(capfd.readouterr().out.rpartition("Example:\n")[2])
+    assert (program, name) == ("designer", verb.replace("synthesize", "synthesise"))
+    application().commands[name].make_context(name, words)  # raises where an option is unknown
+
+
+def test_a_shell_completes_the_verbs(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COMP_WORDS", "designer tol")
+    monkeypatch.setenv("COMP_CWORD", "1")
+    monkeypatch.setenv("_DESIGNER_COMPLETE", "complete_bash")
+    with pytest.raises(SystemExit) as left:
+        entry.status([])
+    assert left.value.code == 0
+    assert capfd.readouterr().out.split() == ["tolerance"]
 
 
 def test_run_prints_one_object_and_nothing_else(
