@@ -99,7 +99,7 @@ def subjects(made: Synthesis) -> dict[int, tuple[float, GateSubject]]:
     reduction = nominal.nominal_reduction(made.design)
     system = reduction.system()
     out: dict[int, tuple[float, GateSubject]] = {}
-    for r in made.found:
+    for r in made.model_responses:
         orbit = on_circuit(system, made.design, r)
         if orbit.n == 1 and orbit.p == orbit.q and orbit.p not in out:
             frequency = made.design.errors.scales.frequency(r.omega)

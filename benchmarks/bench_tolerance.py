@@ -104,7 +104,7 @@ def plan_of(stage: str, most: int) -> StudyPlan:
             on_circuit(system, made.design, r),
             None,
         )
-        for r in made.found
+        for r in made.model_responses
     )
     plan = plan_study(file, made.design, [], made.catalog, samples=0, seed=SEED)
     fine = FINE[stage]

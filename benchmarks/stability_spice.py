@@ -158,7 +158,7 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
     made, row = synthesised(case)
     if made is None:
         return row
-    (response,) = made.found
+    (response,) = made.model_responses
     reduction = nominal.nominal_reduction(made.design)
     orbit = on_circuit(reduction.system(), made.design, response)
     excitation = Excitation(
@@ -171,7 +171,7 @@ def measure(case: Case, pool: SpicePool) -> dict[str, Any]:
         "radius": orbit.radius if orbit.n else None,
         "circuit_trust": str(trust.of_orbit(flow, orbit)),
     }
-    found = equation_check.check(made.design, made.found, pool)
+    found = equation_check.check(made.design, made.model_responses, pool)
     row["equation"] = {"passed": found.passed, "worst": str(found.worst)}
     row["rungs"] = {}
     for rung in case.rungs:

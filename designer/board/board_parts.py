@@ -56,7 +56,7 @@ class Designed(Protocol):
     def catalog(self) -> Catalog: ...
 
     @property
-    def found(self) -> tuple[ModelResponse, ...]: ...
+    def model_responses(self) -> tuple[ModelResponse, ...]: ...
 
     @property
     def design(self) -> Design: ...
@@ -96,13 +96,13 @@ def board_choice(
     return replace(BoardChoice.of(modelfile.circuit, modelfile.board), trim=reach)
 
 
-def board_circuit(made: Designed) -> tuple[Circuit, BoardChoice]:
+def board_circuit(synthesis: Designed) -> tuple[Circuit, BoardChoice]:
     """The circuit of a design with its fittings, and the choices that they were made by."""
-    choice = board_choice(made.modelfile, made.design, made.found)
-    grades = bought(made.modelfile, made.design.circuit, made.catalog)
-    inside = arrays(made.modelfile, made.design.circuit, made.catalog)
+    choice = board_choice(synthesis.modelfile, synthesis.design, synthesis.model_responses)
+    grades = bought(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
+    inside = arrays(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
     choice = replace(choice, grades=grades, arrays=inside)
-    return fitted(made.design.circuit, choice, made.catalog), choice
+    return fitted(synthesis.design.circuit, choice, synthesis.catalog), choice
 
 
 def shown(circuit: Circuit) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What a search has asked boards already, kept in a file so that an interrupted one goes on.
+"""The answers that a search has computed, in a file, so that an interrupted search goes on.
 
 Lines of JSON, each with its seal (``base.keyed_store``): the first says which search, every
 further one a key and the boards that showed the response, by stretch. A last line that was cut
@@ -22,8 +22,10 @@ FORMAT = 2
 
 
 class AnswerCache:
-    """Answers by key. path : where they are kept; in memory alone if None. whose : names the
-    search; what another one left is not read. note : told of damaged lines.
+    """Answers by key.
+
+    path : the file that holds them; None: memory alone. whose : names the search; the file of
+    another search is not read. note : called with a message where lines are damaged.
 
     Raises
     ------
@@ -33,22 +35,26 @@ class AnswerCache:
     def __init__(self, path: Path | None = None, whose: str = "", note: Note = quiet) -> None:
         self._path, self._whose, self._note = path, whose, note
         self._known: dict[str, tuple[int, ...]] = {}
-        self.asked = 0
-        """How many answers were wanted, known or not."""
+        self.wanted = 0
+        """How many answers were wanted, from the file or new."""
         if path is not None:
             self._read(path)
 
     def get_all(
-        self, said: list[Any], make: Callable[[list[int]], list[tuple[int, ...]]]
+        self, queries: list[Any], make: Callable[[list[int]], list[tuple[int, ...]]]
     ) -> list[tuple[int, ...]]:
-        """The answers to many. make : those of the questions with these numbers."""
-        keys = [_key(self._whose, one) for one in said]
+        """The answer to each query, in their order.
+
+        queries : plain data that decides an answer. make : computes the answers to the queries with
+        these numbers, which no earlier call or run has answered.
+        """
+        keys = [_key(self._whose, one) for one in queries]
         new = [k for k, key in enumerate(keys) if key not in self._known]
-        self.asked += len(keys)
+        self.wanted += len(keys)
         if new:
-            made = dict(zip((keys[k] for k in new), make(new), strict=True))
-            self._known |= made
-            self._write(made)
+            answers = dict(zip((keys[k] for k in new), make(new), strict=True))
+            self._known |= answers
+            self._write(answers)
         return [self._known[key] for key in keys]
 
     def _read(self, path: Path) -> None:
@@ -75,14 +81,14 @@ class AnswerCache:
     def _head(self) -> list[Any]:
         return [{"format": FORMAT, "search": self._whose}]
 
-    def _text(self, known: Iterable[tuple[str, tuple[int, ...]]]) -> str:
-        lines = [self._head(), *([key, list(ok)] for key, ok in known)]
+    def _text(self, answers: Iterable[tuple[str, tuple[int, ...]]]) -> str:
+        lines = [self._head(), *([key, list(ok)] for key, ok in answers)]
         return "".join(f"{sealed_line(line)}\n" for line in lines)
 
-    def _write(self, made: dict[str, tuple[int, ...]]) -> None:
+    def _write(self, answers: dict[str, tuple[int, ...]]) -> None:
         if self._path is None:
             return
-        lines = [sealed_line([key, list(ok)]) for key, ok in made.items()]
+        lines = [sealed_line([key, list(ok)]) for key, ok in answers.items()]
         try:
             with self._path.open("a", encoding="ascii") as stream:
                 stream.write("\n".join(lines) + "\n")
@@ -109,6 +115,6 @@ def _answer(line: bytes) -> tuple[str, tuple[int, ...]] | None:
         return None
 
 
-def _key(whose: str, said: Any) -> str:
-    text = json.dumps([whose, said], sort_keys=True)
+def _key(whose: str, query: Any) -> str:
+    text = json.dumps([whose, query], sort_keys=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()[:24]

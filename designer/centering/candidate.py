@@ -1,4 +1,4 @@
-"""What a search finds on its way: candidates, which of two is better, what a lever is worth."""
+"""Candidates of a search, which of two is better, and what a lever is worth."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ class Candidate:
     """How the design is made."""
     design: Design
     """The finished design."""
-    found: tuple[ModelResponse, ...]
-    """Its responses at their places, and what the model shows there."""
+    model_responses: tuple[ModelResponse, ...]
+    """The design's responses at their operating points, and what the model shows there."""
     scored: tuple[Scored, ...]
-    """By response, its place with what boards showed there."""
+    """For each response, its operating point with what boards showed there."""
 
     @property
     def distances(self) -> tuple[float, ...]:
         return tuple(s.distance for s in self.scored)
 
     @property
-    def shown_at(self) -> tuple[Response, ...]:
-        """Each response with its place."""
-        return tuple(r.spec for r in self.found)
+    def wanted(self) -> tuple[Response, ...]:
+        """Each response with its operating point."""
+        return tuple(r.spec for r in self.model_responses)
 
     @property
     def rank(self) -> tuple[float, float]:
@@ -63,8 +63,8 @@ class Step:
     """Setting that the lever was put to."""
     rank: tuple[float, float] | None
     """Rank of the design then; None where there is none, for the reason given."""
-    kept: bool
-    """Whether the lever stayed there."""
+    adopted: bool
+    """Whether the lever stayed at this setting."""
     reason: str = ""
     """Why there is no design."""
 
@@ -89,39 +89,39 @@ class Contribution:
 
 
 @dataclass(frozen=True)
-class Listened:
-    """What ngspice said of a design."""
+class NgspiceOutcome:
+    """How ngspice agrees with the exact circuit about a design."""
 
     frequency: float
     """Frequency at ω = 1 [Hz]."""
     agreements: tuple[Agreement, ...]
     """By response, how many boards both engines agree on."""
-    kept: bool
-    """Whether this design was taken."""
+    adopted: bool
+    """Whether this design was chosen."""
 
 
 @dataclass(frozen=True)
-class Searched:
-    """What a search found."""
+class SearchResult:
+    """The design that a search chose, and how it came to it."""
 
-    made: Synthesis
+    synthesis: Synthesis
     """The design with its resolved model file."""
     start: Candidate | None
     """The match design with every response in the middle of its widest stretch."""
     final: Candidate
-    """The design that was found, as it was predicted."""
+    """The chosen design with its predicted yields."""
     steps: tuple[Step, ...]
     """The levers that were tried, in order."""
     contributions: tuple[Contribution, ...]
     """What each lever that moved is worth."""
-    heard: tuple[Listened, ...]
-    """What ngspice said about the final design and slower ones; empty where it was not asked."""
+    checks: tuple[NgspiceOutcome, ...]
+    """ngspice's outcome for the final design and slower ones; empty where ngspice was not run."""
     windows: tuple[tuple[Stretch, ...], ...]
     """By response, the stretches where it is shown."""
     candidates: int
-    """Designs that were made."""
+    """Number of designs that were made."""
     places: int
-    """Places that boards were asked at."""
+    """Number of operating points at which boards were simulated."""
     seed: int
     """Seed of the boards."""
 

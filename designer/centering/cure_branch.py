@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from designer.base.errors import InputError
 from designer.catalog.catalog import Catalog
 from designer.catalog.entries import OpAmp
-from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_parts_kept
+from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.check import synthesis_result
 from designer.check.synthesis_result import Synthesis
 
@@ -35,7 +35,7 @@ class CureBranch:
 
     upgrades: Upgrades
     """The upgrades that need a new design."""
-    made: Synthesis
+    synthesis: Synthesis
     """The design with its model."""
     extra: float
     """Price over the design that is cured [euro]."""
@@ -44,9 +44,9 @@ class CureBranch:
     def name(self) -> str:
         """In words; "as it is" for the design that is cured."""
         u = self.upgrades
-        said = [f"op-amp {u.opamp}"] if u.opamp else []
-        said += [f"dead zone: {u.dead_zone}"] if u.dead_zone else []
-        return ", ".join(said) or "as it is"
+        phrases = [f"op-amp {u.opamp}"] if u.opamp else []
+        phrases += [f"dead zone: {u.dead_zone}"] if u.dead_zone else []
+        return ", ".join(phrases) or "as it is"
 
 
 @dataclass(frozen=True)
@@ -104,16 +104,16 @@ def branch_of(
         return CureBranch(upgrades, base, 0.0)
     modelfile = upgraded_file(base.modelfile, upgrades)
     try:
-        made = None
+        synthesis = None
         if upgrades.dead_zone is None:
-            made = with_parts_kept(base, modelfile)
-            if not all(check.holds for check in made.design.checks):
-                made = None
-        if made is None:
-            made = synthesis_result.synthesise(modelfile, base.catalog)
+            synthesis = with_same_parts(base, modelfile)
+            if not all(check.holds for check in synthesis.design.checks):
+                synthesis = None
+        if synthesis is None:
+            synthesis = synthesis_result.synthesise(modelfile, base.catalog)
     except InputError as error:
         return Refused(upgrades, str(error))
-    return CureBranch(upgrades, made, price(made) - least)
+    return CureBranch(upgrades, synthesis, price(synthesis) - least)
 
 
 def cured(base: Synthesis, upgrades: Upgrades) -> Synthesis:
@@ -123,15 +123,15 @@ def cured(base: Synthesis, upgrades: Upgrades) -> Synthesis:
     ------
     InputError : there is no such design.
     """
-    made = branch_of(base, upgrades)
-    if isinstance(made, Refused):
-        raise InputError(None, "upgrades", made.why, "upgrades with which there is a design")
-    return applied(made, upgrades)
+    branch = branch_of(base, upgrades)
+    if isinstance(branch, Refused):
+        raise InputError(None, "upgrades", branch.why, "upgrades with which there is a design")
+    return applied(branch, upgrades)
 
 
 def applied(branch: CureBranch, upgrades: Upgrades) -> Synthesis:
     """The branch's design with the other upgrades."""
     more = replace(upgrades, opamp=None, dead_zone=None)
     if more == Upgrades():
-        return branch.made
-    return with_parts_kept(branch.made, upgraded_file(branch.made.modelfile, more))
+        return branch.synthesis
+    return with_same_parts(branch.synthesis, upgraded_file(branch.synthesis.modelfile, more))

@@ -30,7 +30,7 @@ def couplings(
 def _one_setting(
     slots: Sequence[Slot], parts: Sequence[PartSlot], kinds: Sequence[Sequence[str]]
 ) -> list[Demand]:
-    held = []
+    demands = []
     for k, part in enumerate(parts):
         if part.trim is None:
             continue
@@ -40,20 +40,20 @@ def _one_setting(
             otherwise[r] = np.array([float(kind != "trimmer") for kind in row])
             for w, kind in enumerate(row):
                 if kind == "trimmer":
-                    held.append(Demand("trimmer set", 0.5, tuple(unset), (r, w)))
-        held.append(Demand("trimmer for all", 0.5, tuple(otherwise), (k, 1)))
-    return held
+                    demands.append(Demand("trimmer set", 0.5, tuple(unset), (r, w)))
+        demands.append(Demand("trimmer for all", 0.5, tuple(otherwise), (k, 1)))
+    return demands
 
 
 def _one_place(slots: Sequence[Slot], parts: Sequence[PartSlot]) -> list[Demand]:
-    held = []
+    demands = []
     for name in dict.fromkeys(name for part in parts for name in part.network):
         rows = _none(slots)
         for k, part in enumerate(parts):
             if name in (*part.parts, *part.network):
                 rows[k] = np.array([float(i > 0) for i in range(len(part.slot.options))])
-        held.append(Demand(f"{name} once", 1.5, tuple(rows)))
-    return held
+        demands.append(Demand(f"{name} once", 1.5, tuple(rows)))
+    return demands
 
 
 def finest(parts: Sequence[PartSlot], catalog: Catalog) -> tuple[tuple[int, ...], ...]:

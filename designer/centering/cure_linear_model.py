@@ -19,7 +19,7 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.centering.cure_branch import TRIM, TRIMMER, CureBranch
 from designer.centering.cure_couplings import couplings, finest
-from designer.centering.cure_measure import Book, asked
+from designer.centering.cure_measure import Book, questions_of
 from designer.centering.cure_milp import CureProgram, Demand, Option, Slot
 from designer.centering.cure_slots import TRIMMED, PartSlot, network_slots, part_slots, trimmer_slot
 from designer.centering.cure_trimmed import trimmed_margins, trimmer_ways
@@ -89,23 +89,23 @@ class LinearModel:
                 networks.append(PartNetwork(part.models[i], part.network))
             elif i and part.models:
                 reference = part.models[i]
-        taken = self.taken(pick)
+        ways = self.ways_of(pick)
         return replace(
             self.branch.upgrades,
             reference=reference,
             grades=grades,
-            places={w.response: w.place for w in taken if w.place is not None},
-            trim=self.trim if any(w.kind == TRIM for w in taken) else None,
+            places={w.response: w.place for w in ways if w.place is not None},
+            trim=self.trim if any(w.kind == TRIM for w in ways) else None,
             networks=tuple(networks),
             trimmer=any(
                 i and part.trim is not None for part, i in zip(self.parts, pick, strict=False)
             ),
         )
 
-    def taken(self, pick: Sequence[int]) -> tuple[ResponseWay, ...]:
+    def ways_of(self, pick: Sequence[int]) -> tuple[ResponseWay, ...]:
         """The way of each response."""
-        chosen = pick[len(self.parts) :]
-        return tuple(row[i] for row, i in zip(self.ways, chosen, strict=True))
+        options = pick[len(self.parts) :]
+        return tuple(row[i] for row, i in zip(self.ways, options, strict=True))
 
     @property
     def trimmer(self) -> DcTrim | None:
@@ -114,14 +114,14 @@ class LinearModel:
 
     def spread(self, pick: Sequence[int]) -> tuple[Circuit, Spread]:
         """The circuit and the spread of this choice, each response where it was."""
-        made = self.branch.made
-        chosen = replace(self, ways=()).upgrades(pick[: len(self.parts)])
-        upgrades = replace(chosen, opamp=None, dead_zone=None, trimmer=False)
-        modelfile = upgraded_file(made.modelfile, upgrades)
-        circuit = made.design.circuit
+        synthesis = self.branch.synthesis
+        part_upgrades = replace(self, ways=()).upgrades(pick[: len(self.parts)])
+        upgrades = replace(part_upgrades, opamp=None, dead_zone=None, trimmer=False)
+        modelfile = upgraded_file(synthesis.modelfile, upgrades)
+        circuit = synthesis.design.circuit
         if upgrades.reference is not None:
-            circuit = rebuilt(made.design, modelfile, made.catalog)
-        return circuit, spread_of(modelfile, circuit, made.catalog)
+            circuit = rebuilt(synthesis.design, modelfile, synthesis.catalog)
+        return circuit, spread_of(modelfile, circuit, synthesis.catalog)
 
     def boards(self, pick: Sequence[int]) -> Boards:
         """Boards of this choice, for its linear forms."""
@@ -143,14 +143,14 @@ class LinearModel:
 
         shrink : as ``program`` has it.
         """
-        known = shrink or {}
-        chosen = pick[len(self.parts) :]
+        factors = shrink or {}
+        options = pick[len(self.parts) :]
         out = []
-        for w, way in zip(chosen, self.taken(pick), strict=True):
+        for w, way in zip(options, self.ways_of(pick), strict=True):
             if way.margin is None:
                 out.append(way.rate)
                 continue
-            nearer = 1.0 - known.get((way.response, w), 1.0) ** 0.5
+            nearer = 1.0 - factors.get((way.response, w), 1.0) ** 0.5
             away = np.array([nearer * limit.distance for limit in way.margin.limits])
             fine = (way.margin.each(boards) > away).all(axis=1) if len(away) else np.ones(1)
             out.append(float(fine.mean()))
@@ -159,7 +159,7 @@ class LinearModel:
     def quantiles(self, target: float, boards: Boards) -> dict[tuple[int, int, int], float]:
         """z of each limit: (response, way, limit) → how many standard deviations of its form the
         nominal value has to be above 0 for the target."""
-        found = {}
+        z_scores = {}
         for r, row in enumerate(self.ways):
             for w, way in enumerate(row):
                 if way.margin is None or not way.margin.limits:
@@ -167,8 +167,8 @@ class LinearModel:
                 each = way.margin.each(boards)
                 for k, limit in enumerate(way.margin.limits):
                     form = each[:, k] - limit.distance
-                    found[r, w, k] = _quantile(form, target)
-        return found
+                    z_scores[r, w, k] = _quantile(form, target)
+        return z_scores
 
     def program(
         self,
@@ -225,8 +225,8 @@ class LinearModel:
             shares[k][j] = float(slopes @ together @ slopes - slopes @ slopes)
         # The limit's own variance is of drawn boards, on which parts that track vary together: what
         # that adds or takes stays in proportion.
-        own = 1.0 / total if total > 0.0 else 1.0
-        return [row * own for row in shares], fixed * own
+        scale = 1.0 / total if total > 0.0 else 1.0
+        return [row * scale for row in shares], fixed * scale
 
 
 def _quantile(form: Array, target: float) -> float:
@@ -257,29 +257,31 @@ def picture(
     without : kinds of upgrades that are not wanted. missed : responses that were measured to miss
     the target on this branch as it is. progress : called once a piece of work.
     """
-    made = branch.made
-    parts = (*part_slots(made, without), *network_slots(made, without))
-    questions = [q for q in asked(made, made.found) if q is not None]
-    if len(questions) < len(made.found):
+    synthesis = branch.synthesis
+    parts = (*part_slots(synthesis, without), *network_slots(synthesis, without))
+    questions = [q for q in questions_of(synthesis, synthesis.model_responses) if q is not None]
+    if len(questions) < len(synthesis.model_responses):
         return None
     bare = LinearModel(branch, parts, (), (), trim, seed)
     best = tuple(
-        StudyPlan(*bare.spread(pick), seed, SAMPLES, ()) for pick in finest(parts, made.catalog)
+        StudyPlan(*bare.spread(pick), seed, SAMPLES, ())
+        for pick in finest(parts, synthesis.catalog)
     )
     looker = Looker(branch, target, seed, book, trim, without, best, jobs, progress, missed)
     rows = [
-        [looker.seen(ResponseWay(r, "as it is", question))] for r, question in enumerate(questions)
+        [looker.with_rate(ResponseWay(r, "as it is", question))]
+        for r, question in enumerate(questions)
     ]
     order = sorted(range(len(rows)), key=lambda r: (rows[r][0].rate, r))
     firsts = [rows[r][0] for r in order]
 
     @cache
     def fitted() -> tuple[PartSlot, list[ResponseWay]] | None:
-        slot = trimmer_slot(made, without)
-        found = (
+        slot = trimmer_slot(synthesis, without)
+        ways = (
             None if slot is None or slot.trim is None else trimmer_ways(looker, slot.trim, firsts)
         )
-        return None if slot is None or found is None else (slot, found)
+        return None if slot is None or ways is None else (slot, ways)
 
     out = False
     for r in order:
@@ -294,15 +296,15 @@ def picture(
             rows[way.response].append(way)
     bare = replace(bare, parts=parts, ways=tuple(map(tuple, rows)))
     # What limits the design as it is is told in any case.
-    told = branch.upgrades == Upgrades()
-    if told or not out:
+    unchanged = branch.upgrades == Upgrades()
+    if unchanged or not out:
         ratios, matched = _ratios(branch, parts, seed), _matched(branch, parts, seed)
         bare = replace(bare, ratios=ratios, matched=matched)
     which = [
         (r, w)
         for r, row in enumerate(rows)
         for w, way in enumerate(row)
-        if (told and w == 0) or not (out or _needs_no_picture(way, rows, target))
+        if (unchanged and w == 0) or not (out or _needs_no_picture(way, rows, target))
     ]
     return pictured(bare, which, jobs, progress)
 
@@ -319,34 +321,34 @@ def _needs_no_picture(
 
 
 def pictured(
-    seen: LinearModel,
+    model: LinearModel,
     which: Sequence[tuple[int, int]],
     jobs: int,
     progress: Callable[[], None] = lambda: None,
 ) -> LinearModel:
     """The same with margins of these ways (response, way)."""
-    made = seen.branch.made
-    circuit = made.design.circuit
-    spread = spread_of(made.modelfile, circuit, made.catalog)
-    known = dict[tuple[int, int], Margin]()
-    trimmed = [(r, w) for r, w in which if seen.ways[r][w].kind == TRIMMER]
+    synthesis = model.branch.synthesis
+    circuit = synthesis.design.circuit
+    spread = spread_of(synthesis.modelfile, circuit, synthesis.catalog)
+    margin_of = dict[tuple[int, int], Margin]()
+    trimmed = [(r, w) for r, w in which if model.ways[r][w].kind == TRIMMER]
     for some in ([key for key in which if key not in trimmed], trimmed):
         if not some:
             continue
-        questions = tuple(seen.ways[r][w].question for r, w in some)
+        questions = tuple(model.ways[r][w].question for r, w in some)
         if some is trimmed:
-            assert seen.trimmer is not None
-            plan = StudyPlan(circuit, spread, seen.seed, SAMPLES, questions)
-            found = trimmed_margins(
-                plan, seen.trimmer, count=CROSSINGS, jobs=jobs, progress=progress
+            assert model.trimmer is not None
+            plan = StudyPlan(circuit, spread, model.seed, SAMPLES, questions)
+            new_margins = trimmed_margins(
+                plan, model.trimmer, count=CROSSINGS, jobs=jobs, progress=progress
             )
         else:
-            boards = draw_many(circuit, spread, seen.seed, range(SAMPLES))
+            boards = draw_many(circuit, spread, model.seed, range(SAMPLES))
             answers = []
             for question in questions:
                 answers.append(foretold(boards, question, jobs))
                 progress()
-            found = list(
+            new_margins = list(
                 margins.margins(
                     circuit,
                     questions,
@@ -357,15 +359,15 @@ def pictured(
                     progress=progress,
                 )
             )
-        known.update(zip(some, found, strict=True))
+        margin_of.update(zip(some, new_margins, strict=True))
     ways = tuple(
         tuple(
-            replace(way, margin=known[r, w]) if (r, w) in known else way
+            replace(way, margin=margin_of[r, w]) if (r, w) in margin_of else way
             for w, way in enumerate(row)
         )
-        for r, row in enumerate(seen.ways)
+        for r, row in enumerate(model.ways)
     )
-    return replace(seen, ways=ways)
+    return replace(model, ways=ways)
 
 
 def _ratios(
@@ -379,8 +381,8 @@ def _ratios(
     names = [name for p in parts for name in p.parts]
     for j in range(most):
         boards = bare.boards([0 if p.network else min(j, len(p.slot.options) - 1) for p in parts])
-        known = {**boards.values, **boards.reference}
-        columns.append({name: float(np.std(known[name])) for name in names})
+        values = {**boards.values, **boards.reference}
+        columns.append({name: float(np.std(values[name])) for name in names})
     base = columns[0]
     return tuple({n: c[n] / base[n] if base[n] > 0.0 else 1.0 for n in names} for c in columns)
 
@@ -392,11 +394,11 @@ def _matched(
     each part's own standard deviation as it is."""
     bare = LinearModel(branch, tuple(parts), (), (), 0.0, seed)
     none = [0] * len(parts)
-    found = {}
+    covariances = {}
     plain = bare.boards(none).values if any(p.network for p in parts) else {}
     for k, part in enumerate(parts):
         for j in range(1, len(part.slot.options) if part.network else 1):
-            drawn = bare.boards([j if i == k else 0 for i in range(len(parts))]).values
-            off = [(drawn[n] - drawn[n].mean()) / float(np.std(plain[n])) for n in part.network]
-            found[k, j] = np.array([[float((a * b).mean()) for b in off] for a in off])
-    return found
+            values = bare.boards([j if i == k else 0 for i in range(len(parts))]).values
+            off = [(values[n] - values[n].mean()) / float(np.std(plain[n])) for n in part.network]
+            covariances[k, j] = np.array([[float((a * b).mean()) for b in off] for a in off])
+    return covariances

@@ -1,5 +1,5 @@
-"""The studies of a cure: fresh boards, as many as it takes to tell which side of the target a yield
-is on, and kept so that interrupted work goes on."""
+"""The studies of a cure: fresh boards, as many as it takes to tell on which side of the target a
+yield is. They are stored, so that interrupted work goes on."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def fresh(seed: int, number: int) -> int:
     return int(np.random.SeedSequence([seed, number, TAG]).generate_state(1)[0])
 
 
-def asked(made: Synthesis, responses: Sequence[ModelResponse]) -> list[Question | None]:
-    """What the boards of a design are asked; None where the model or its circuit does not show the
-    response."""
-    checked = checked_design.check(made.design, responses, None)
+def questions_of(synthesis: Synthesis, responses: Sequence[ModelResponse]) -> list[Question | None]:
+    """The question that the boards of a design are asked for each response; None where the model or
+    the nominal circuit does not show the response."""
+    checked = checked_design.check(synthesis.design, responses, None)
     return [
         Question(c.model.spec, c.excitation, c.circuit, None)
         if c.model.found and c.circuit.status is OrbitStatus.PERIODIC
@@ -50,10 +50,10 @@ def asked(made: Synthesis, responses: Sequence[ModelResponse]) -> list[Question 
     ]
 
 
-def plan_of(made: Synthesis, question: Question, seed: int, samples: int = MOST) -> StudyPlan:
+def plan_of(synthesis: Synthesis, question: Question, seed: int, samples: int = MOST) -> StudyPlan:
     """The study of one response of a design, boards as its model file says."""
-    circuit = made.design.circuit
-    spread = spread_of(made.modelfile, circuit, made.catalog)
+    circuit = synthesis.design.circuit
+    spread = spread_of(synthesis.modelfile, circuit, synthesis.catalog)
     return StudyPlan(circuit, spread, seed, samples, (question,))
 
 
@@ -65,10 +65,10 @@ class Book:
 
     def __init__(
         self,
-        known: Mapping[str, Mapping[str, str]] | None = None,
+        studies: Mapping[str, Mapping[str, str]] | None = None,
         save: Callable[[dict[str, Any]], None] = lambda _: None,
     ) -> None:
-        self._known = {study: dict(blocks) for study, blocks in (known or {}).items()}
+        self._known = {study: dict(blocks) for study, blocks in (studies or {}).items()}
         self._save = save
 
     def block(
@@ -165,19 +165,19 @@ def measure(
     it ends where the target is missed and ``LOST`` boards are lost; None: never before ``least``.
     progress : called once a block.
     """
-    letters, found, most = "", MeasuredYield(Yield(0, 0, 0, 0), target), max(least, most)
-    while len(letters) < least or (len(letters) < most and not found.decided):
-        lost = found.counts.lost + found.counts.grazing
-        if first is not None and found.missed and lost >= LOST:
+    letters, result, most = "", MeasuredYield(Yield(0, 0, 0, 0), target), max(least, most)
+    while len(letters) < least or (len(letters) < most and not result.decided):
+        lost = result.counts.lost + result.counts.grazing
+        if first is not None and result.missed and lost >= LOST:
             break
         stop = (len(letters) // BLOCK + 1) * BLOCK
         if not letters and first is not None:
             stop = first
         indices = range(len(letters), min(stop, most))
         letters += book.block(replace(plan, samples=most), indices, trim, jobs)[0]
-        found = MeasuredYield(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
+        result = MeasuredYield(Yield(*(letters.count(letter) for letter in VERDICTS)), target)
         progress()
-    return found
+    return result
 
 
 def measure_together(
@@ -196,16 +196,16 @@ def measure_together(
     plans : each with what its boards are trimmed by (``Book.block``), None: as built; None where
     there is no response to ask for, which misses.
     """
-    found = [MeasuredYield(Yield(0, 0, 0, 0), target) for _ in plans]
+    measured = [MeasuredYield(Yield(0, 0, 0, 0), target) for _ in plans]
     for least, most in ((BLOCK, BLOCK), (2 * BLOCK, MOST)):
-        for k, asked_for in enumerate(plans):
-            out = None in plans or any(m.missed for m in found)
-            if most > BLOCK and out and not found[k].missed:
+        for k, study in enumerate(plans):
+            out = None in plans or any(m.missed for m in measured)
+            if most > BLOCK and out and not measured[k].missed:
                 continue
-            if asked_for is not None:
-                plan, trim = asked_for
-                found[k] = measure(
+            if study is not None:
+                plan, trim = study
+                measured[k] = measure(
                     plan, target, book, trim=trim, least=least, most=most, first=FIRST, jobs=jobs,
                     progress=progress,
                 )  # fmt: skip
-    return tuple(found)
+    return tuple(measured)

@@ -109,10 +109,10 @@ def cheapest(program: CureProgram) -> tuple[int, ...] | None:
     ArithmeticError : what the solver calls optimal does not keep the demands.
     """
     takes = [cp.Variable(len(s.options), boolean=True) for s in program.slots]
-    held: list[object] = [cp.sum(x) == 1 for x in takes]
+    constraints: list[object] = [cp.sum(x) == 1 for x in takes]
     for d in program.demands:
         if d.when is not None and d.room < 0.0:
-            held.append(takes[d.when[0]][d.when[1]] == 0)
+            constraints.append(takes[d.when[0]][d.when[1]] == 0)
             continue
         # In shares of the room, so that every row has the same size.
         scale = abs(d.room) if d.room else 1.0
@@ -123,12 +123,12 @@ def cheapest(program: CureProgram) -> tuple[int, ...] | None:
             room = d.room / scale + max(most - d.room / scale, 0.0) * (
                 1.0 - takes[d.when[0]][d.when[1]]
             )
-        held.append(total <= room)
+        constraints.append(total <= room)
     cost = sum(
         np.array([o.price + TIE * o.trouble for o in s.options]) @ x
         for s, x in zip(program.slots, takes, strict=True)
     )
-    problem = cp.Problem(cp.Minimize(cost), held)
+    problem = cp.Problem(cp.Minimize(cost), constraints)
     problem.solve(solver=cp.HIGHS, **SOLVER)
     rows = [chosen_row(x) for x in takes]
     pick = tuple(row for row in rows if row is not None)

@@ -19,19 +19,19 @@ MOST_WORDS = 100
 
 
 @styled
-def front_chart(found: Cure) -> Figure:
+def front_chart(cure: Cure) -> Figure:
     """Yield of the worst response over the price of the upgrades: measured with its 95 % interval,
     and as the linear picture promised; the upgrades are listed by number.
 
     Where nothing that was tried costs anything, the rounds take the place of the price.
     """
-    front, free = found.front, all(t.price == 0.0 for t in found.front)
+    front, free = cure.front, all(t.price == 0.0 for t in cure.front)
     if free:
-        front = (found.before, *found.rounds)
+        front = (cure.before, *cure.rounds)
     figure = new_figure(7.4, 3.4 + 0.17 * len(front))
     top, bottom = figure.subplots(2, 1, height_ratios=(3.0, 0.3 + 0.17 * len(front)))
     along = [float(k) if free else t.price for k, t in enumerate(front)]
-    lowest = _yields(top, found, front, along)
+    lowest = _yields(top, cure, front, along)
     room = 0.07 * (100.0 - lowest)
     top.set_ylim(lowest - room, 100.0 + room)
     if free:
@@ -40,21 +40,21 @@ def front_chart(found: Cure) -> Figure:
         top.set_xlabel("choices one after the other; none costs anything")
     else:
         dearest = max(along)
-        if found.budget is not None and found.budget <= FAR * dearest:
-            top.axvline(found.budget, color=MUTED, lw=0.8, ls=":", label="budget")
-            dearest = max(dearest, found.budget)
+        if cure.budget is not None and cure.budget <= FAR * dearest:
+            top.axvline(cure.budget, color=MUTED, lw=0.8, ls=":", label="budget")
+            dearest = max(dearest, cure.budget)
         top.set_xlim(left=-0.04 * dearest, right=1.1 * dearest)
         top.set_xlabel("price of the upgrades [euro, by the catalogue's price classes]")
     over = "round by round" if free else "against price"
     top.set_ylabel("yield of the worst response [%]")
-    top.set_title(f"{found.base.modelfile.title}: yield {over}", loc="left")
+    top.set_title(f"{cure.base.modelfile.title}: yield {over}", loc="left")
     top.grid(color=GRID, lw=0.7)
     top.legend(loc="lower right")
     _listed(bottom, front)
     return figure
 
 
-def _yields(axes: Axes, found: Cure, front: Sequence[Trial], along: Sequence[float]) -> float:
+def _yields(axes: Axes, cure: Cure, front: Sequence[Trial], along: Sequence[float]) -> float:
     """The points of the front over ``along``; the lowest yield that is drawn [%]."""
     rates = [100.0 * t.worst.rate for t in front]
     ends = [t.worst.counts.interval for t in front]
@@ -69,27 +69,27 @@ def _yields(axes: Axes, found: Cure, front: Sequence[Trial], along: Sequence[flo
     promised = [
         (x, 100.0 * min(t.predicted))
         for x, t in zip(along, front, strict=True)
-        if t is not found.before
+        if t is not cure.before
     ]
     if promised:
         axes.plot(*zip(*promised, strict=True), "x", ms=6, color=PREDICTED, label="linear picture")
-    asked = f"asked for: {100.0 * found.target:g} %"
-    axes.axhline(100.0 * found.target, color=INK, lw=0.8, ls="--", label=asked)
+    label = f"asked for: {100.0 * cure.target:g} %"
+    axes.axhline(100.0 * cure.target, color=INK, lw=0.8, ls="--", label=label)
     for number, (x, y) in enumerate(zip(along, rates, strict=True)):
         axes.annotate(
             str(number), (x, y), xytext=(7, -11), textcoords="offset points", color=MUTED, size=8
         )
     lowest = [100.0 * low for low, _ in ends] + [y for _, y in promised]
-    return min(*lowest, 100.0 * found.target - 1.0)
+    return min(*lowest, 100.0 * cure.target - 1.0)
 
 
 def _listed(axes: Axes, front: Sequence[Trial]) -> None:
     """What each number stands for."""
     axes.set_axis_off()
     for number, t in enumerate(front):
-        said = "; ".join(words(t.upgrades)) or "as it is"
-        said = said if len(said) <= MOST_WORDS else said[: MOST_WORDS - 1] + "…"
+        text = "; ".join(words(t.upgrades)) or "as it is"
+        text = text if len(text) <= MOST_WORDS else text[: MOST_WORDS - 1] + "…"
         axes.text(
-            0.0, 1.0 - (number + 0.5) / max(len(front), 1), f"{number}  {t.price:.2f} euro: {said}",
+            0.0, 1.0 - (number + 0.5) / max(len(front), 1), f"{number}  {t.price:.2f} euro: {text}",
             transform=axes.transAxes, va="center", color=INK, size=7.5,
         )  # fmt: skip

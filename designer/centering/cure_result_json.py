@@ -13,9 +13,9 @@ from designer.centering.cure_upgrade import Upgrades
 COLUMNS = ("price_euro", "predicted", "yield", "low", "high", "samples", "upgrades", "failed")
 
 
-def cure_json(found: Cure, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+def cure_json(cure: Cure, provenance: Mapping[str, Any], seconds: float) -> dict[str, Any]:
     """Everything that was found. Prices are over the design as it is, in euro."""
-    best = found.best
+    best = cure.best
     responses = [
         {
             "omega": r.omega,
@@ -27,23 +27,23 @@ def cure_json(found: Cure, provenance: Mapping[str, Any], seconds: float) -> dic
             "limit": limit,
         }
         for r, before, after, limit in zip(
-            found.base.found, found.before.measured, best.measured, found.limits, strict=True
+            cure.base.model_responses, cure.before.measured, best.measured, cure.limits, strict=True
         )
     ]
     return {
         "format": FORMAT,
-        "reached": found.reached,
-        "why": found.why,
-        "target": found.target,
-        "budget": found.budget,
+        "reached": cure.reached,
+        "why": cure.why,
+        "target": cure.target,
+        "budget": cure.budget,
         "price": best.price,
         "branch": best.branch,
         "upgrades": best.upgrades.as_dict(),
         "said": words(best.upgrades),
         "responses": responses,
-        "rounds": [_trial(t) for t in found.rounds],
-        "front": [_trial(t) for t in found.front],
-        "refused": [{"upgrades": words(r.upgrades), "why": r.why} for r in found.refused],
+        "rounds": [_trial(t) for t in cure.rounds],
+        "front": [_trial(t) for t in cure.front],
+        "refused": [{"upgrades": words(r.upgrades), "why": r.why} for r in cure.refused],
         "provenance": dict(provenance),
         "cost": {"seconds": seconds},
     }
@@ -51,30 +51,30 @@ def cure_json(found: Cure, provenance: Mapping[str, Any], seconds: float) -> dic
 
 def words(upgrades: Upgrades) -> list[str]:
     """Each upgrade in a few words, the same grade of several parts together."""
-    said = []
+    phrases = []
     if upgrades.opamp is not None:
-        said.append(f"op-amp {upgrades.opamp}")
+        phrases.append(f"op-amp {upgrades.opamp}")
     if upgrades.dead_zone is not None:
-        said.append(f"dead zone: {upgrades.dead_zone}")
+        phrases.append(f"dead zone: {upgrades.dead_zone}")
     if upgrades.reference is not None:
-        said.append(f"reference {upgrades.reference}")
+        phrases.append(f"reference {upgrades.reference}")
     for grade in sorted(set(upgrades.grades.values())):
-        names = [name for name, own in upgrades.grades.items() if own == grade]
-        said.append(f"{100.0 * grade:g} % {' '.join(names)}")
-    said += [f"array {n.family} for {' '.join(n.parts)}" for n in upgrades.networks]
+        names = [name for name, of_part in upgrades.grades.items() if of_part == grade]
+        phrases.append(f"{100.0 * grade:g} % {' '.join(names)}")
+    phrases += [f"array {n.family} for {' '.join(n.parts)}" for n in upgrades.networks]
     for number, place in sorted(upgrades.places.items()):
-        said.append(f"response {number + 1} at ω = {place.omega:g}, b = {place.b:g}")
+        phrases.append(f"response {number + 1} at ω = {place.omega:g}, b = {place.b:g}")
     if upgrades.trimmer:
-        said.append("trimmer fitted, set once on each board")
+        phrases.append("trimmer fitted, set once on each board")
     if upgrades.trim is not None:
-        said.append(f"DC offset trimmed on each board, ± {100.0 * upgrades.trim:g} %")
-    return said
+        phrases.append(f"DC offset trimmed on each board, ± {100.0 * upgrades.trim:g} %")
+    return phrases
 
 
-def front_csv(found: Cure) -> str:
+def front_csv(cure: Cure) -> str:
     """The front of yield against price: the yield is that of the worst response."""
     rows = []
-    for t in found.front:
+    for t in cure.front:
         low, high = t.worst.counts.interval
         rows.append(
             {

@@ -24,11 +24,11 @@ from designer.centering.cure_measure import (
     MOST,
     Book,
     MeasuredYield,
-    asked,
     fresh,
     measure,
     measure_together,
     plan_of,
+    questions_of,
 )
 from designer.centering.cure_milp import CureProgram, cheapest
 from designer.centering.cure_trial import Cure, Trial
@@ -84,10 +84,10 @@ def find_cure(
     InputError : the model file names no response, or a place of a response is no choice.
     """
     need_responses(base.modelfile)
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     book = Book() if book is None else book
     threads = cores() if jobs is None else jobs
-    search = _Search(base, target, budget, trim, without, seed, threads, book, said)
+    search = _Search(base, target, budget, trim, without, seed, threads, book, progress)
     return search.run()
 
 
@@ -102,10 +102,16 @@ class _Search:
         seed: int,
         jobs: int,
         book: Book,
-        said: Progress,
+        progress: Progress,
     ) -> None:
         self.base, self.target, self.budget, self.trim = base, target, budget, trim
-        self.without, self.seed, self.jobs, self.book, self.said = without, seed, jobs, book, said
+        self.without, self.seed, self.jobs, self.book, self.progress = (
+            without,
+            seed,
+            jobs,
+            book,
+            progress,
+        )
         self.waiting = branches(base, without)
         self.known: list[CureBranch] = []
         self.pictures: list[LinearModel] = []
@@ -121,10 +127,10 @@ class _Search:
             return self._answer(before, [], True, "every response is there already")
         rounds: list[Trial] = []
         for number in range(ROUNDS):
-            found = self._choice(self.target)
-            if found is None:
+            choice = self._choice(self.target)
+            if choice is None:
                 return self._answer(before, rounds, False, self._out_of_reach())
-            which, pick, predicted = found
+            which, pick, predicted = choice
             cost = self._price(which, pick)
             if self.budget is not None and cost > self.budget + 1e-9:
                 why = f"the cheapest choice that may be enough costs {cost:.2f} euro"
@@ -132,7 +138,8 @@ class _Search:
             name = f"round {number + 1}"
             trial = self._trial(which, pick, predicted, 2 + number, name)
             if trial.reached:
-                # It was looked at until it was enough: what counts are other boards, asked once.
+                # Boards were drawn until the target was reached, which favours it. The verdict is
+                # that of other boards, of a number fixed beforehand.
                 again = 2 + ROUNDS + number
                 trial = self._trial(which, pick, predicted, again, f"{name}, once more", CONFIRMING)
             rounds.append(trial)
@@ -143,12 +150,12 @@ class _Search:
 
     def _before(self) -> Trial:
         """The design as it is, on fresh boards."""
-        step = self.said.stage("the design as it is")
-        made, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
-        for number, question in enumerate(asked(made, made.found)):
+        step = self.progress.stage("the design as it is")
+        synthesis, plans = self.base, list[tuple[StudyPlan, float | DcTrim | None] | None]()
+        for number, question in enumerate(questions_of(synthesis, synthesis.model_responses)):
             if question is None:
                 self.unseen.append(number)
-            plan = None if question is None else plan_of(made, question, fresh(self.seed, 1))
+            plan = None if question is None else plan_of(synthesis, question, fresh(self.seed, 1))
             plans.append(None if plan is None else (plan, None))
         trials = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
         rates = tuple(m.rate for m in trials)
@@ -161,12 +168,12 @@ class _Search:
         best: tuple[float, int, tuple[int, ...], tuple[float, ...]] | None = None
         for which in range(len(self.pictures)):
             best = self._better(best, which, target)
-        while (made := self._next_branch(None if best is None else best[0])) is not None:
-            self.said.stage(f"margins, {made.name}")
-            step = self.said.stage(f"linear picture, {made.name}")
-            measured = self.before.measured if made.upgrades == Upgrades() else ()
-            found = picture(
-                made,
+        while (branch := self._next_branch(None if best is None else best[0])) is not None:
+            self.progress.stage(f"margins, {branch.name}")
+            step = self.progress.stage(f"linear picture, {branch.name}")
+            measured = self.before.measured if branch.upgrades == Upgrades() else ()
+            linear_model = picture(
+                branch,
                 self.target,
                 fresh(self.seed, 0),
                 self.book,
@@ -176,13 +183,13 @@ class _Search:
                 jobs=self.jobs,
                 progress=step,
             )
-            if found is None:
+            if linear_model is None:
                 why = "the nominal circuit does not show every response"
-                self.refused.append(Refused(made.upgrades, why))
+                self.refused.append(Refused(branch.upgrades, why))
                 continue
-            self.pictures.append(found)
-            if made.upgrades == Upgrades():  # it has been measured
-                self._learn(0, tuple(0 for _ in found.slots), self.before)
+            self.pictures.append(linear_model)
+            if branch.upgrades == Upgrades():  # it has been measured
+                self._learn(0, tuple(0 for _ in linear_model.slots), self.before)
             best = self._better(best, len(self.pictures) - 1, target)
         return None if best is None else best[1:]
 
@@ -197,12 +204,12 @@ class _Search:
             return first
         if least is not None and least <= 0.0:
             return None
-        for made in self.waiting:
-            self.said.stage("other op-amps and dead zones")
-            if isinstance(made, Refused):
-                self.refused.append(made)
+        for branch in self.waiting:
+            self.progress.stage("other op-amps and dead zones")
+            if isinstance(branch, Refused):
+                self.refused.append(branch)
             else:
-                self.known.append(made)
+                self.known.append(branch)
         self.known.sort(key=lambda b: b.extra)
         if self.known and (least is None or self.known[0].extra < least):
             return self.known.pop(0)
@@ -214,62 +221,67 @@ class _Search:
         which: int,
         target: float,
     ) -> tuple[float, int, tuple[int, ...], tuple[float, ...]] | None:
-        found = self._of_picture(which, target)
-        if found is None:
+        choice = self._of_picture(which, target)
+        if choice is None:
             return best
-        cost = self._cost(which, found[0])
-        return (cost, which, *found) if best is None or cost < best[0] - 1e-12 else best
+        cost = self._cost(which, choice[0])
+        return (cost, which, *choice) if best is None or cost < best[0] - 1e-12 else best
 
     def _of_picture(
         self, which: int, target: float
     ) -> tuple[tuple[int, ...], tuple[float, ...]] | None:
         """The cheapest choice on one branch that its picture promises to be enough."""
-        seen = self.pictures[which]
-        base = tuple(0 for _ in seen.slots)
+        linear_model = self.pictures[which]
+        base = tuple(0 for _ in linear_model.slots)
         shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
         spoiled = frozenset((r, w) for k, r, w in self.spoiled if k == which)
         spoiled |= {
             (r, w)
-            for r, row in enumerate(seen.ways)
+            for r, row in enumerate(linear_model.ways)
             for w, way in enumerate(row)
             if (way.margin is None and way.rate < target)
             or (way.hopeless and target >= self.target)
         }
-        if any(all((r, w) in spoiled for w in range(len(row))) for r, row in enumerate(seen.ways)):
+        if any(
+            all((r, w) in spoiled for w in range(len(row)))
+            for r, row in enumerate(linear_model.ways)
+        ):
             return None
-        z = seen.quantiles(target, seen.boards(base))
+        z = linear_model.quantiles(target, linear_model.boards(base))
         enough: dict[tuple[int, ...], tuple[float, ...]] = {}
-        tried: set[tuple[int, ...]] = set()
+        earlier: set[tuple[int, ...]] = set()
         for _ in range(TRIES):
-            program = seen.program(z, shrink, spoiled)
+            program = linear_model.program(z, shrink, spoiled)
             pick = cheapest(program)
-            if pick is None or (pick in tried and pick in enough):
+            if pick is None or (pick in earlier and pick in enough):
                 break
-            tried.add(pick)
-            boards = seen.boards(pick)
-            promised = seen.predicted(pick, boards, shrink)
+            earlier.add(pick)
+            boards = linear_model.boards(pick)
+            promised = linear_model.predicted(pick, boards, shrink)
             short = [r for r, share in enumerate(promised) if share < target]
             if target >= self.target:
                 short = sorted({*short, *self.fell_short.get((which, pick), [])})
             if short:
                 for r in short:
-                    key = r, pick[len(seen.parts) + r]
-                    shrink[key] = shrink.get(key, 1.0) * _cut(program, pick, key, len(seen.parts))
+                    key = r, pick[len(linear_model.parts) + r]
+                    shrink[key] = shrink.get(key, 1.0) * _cut(
+                        program, pick, key, len(linear_model.parts)
+                    )
             else:
                 enough[pick] = promised
-            z = seen.quantiles(target, boards)
+            z = linear_model.quantiles(target, boards)
         if not enough:
             return None
         pick = min(enough, key=lambda p: (self._cost(which, p), p))
         return pick, enough[pick]
 
     def _price(self, which: int, pick: Sequence[int]) -> float:
-        seen = self.pictures[which]
-        return seen.branch.extra + CureProgram(seen.slots, ()).price(pick)
+        linear_model = self.pictures[which]
+        return linear_model.branch.extra + CureProgram(linear_model.slots, ()).price(pick)
 
     def _cost(self, which: int, pick: Sequence[int]) -> float:
-        seen = self.pictures[which]
-        return seen.branch.extra + CureProgram(seen.slots, ()).cost(pick)
+        linear_model = self.pictures[which]
+        return linear_model.branch.extra + CureProgram(linear_model.slots, ()).cost(pick)
 
     def _trial(
         self,
@@ -280,62 +292,67 @@ class _Search:
         name: str,
         boards: int | None = None,
     ) -> Trial:
-        """A choice, measured on boards that nobody has seen.
+        """A choice, measured on fresh boards.
 
-        boards : how many, of each response; None: until it is decided whether all are enough."""
-        seen = self.pictures[which]
+        boards : their number, for each response; None: more until it is decided whether all
+        responses reach the target."""
+        linear_model = self.pictures[which]
         cost = self._price(which, pick)
-        step = self.said.stage(f"{name}: {cost:.2f} euro, fresh boards")
-        upgrades = seen.upgrades(pick)
-        circuit, spread = seen.spread(pick)
-        drawn = fresh(self.seed, number)
+        step = self.progress.stage(f"{name}: {cost:.2f} euro, fresh boards")
+        upgrades = linear_model.upgrades(pick)
+        circuit, spread = linear_model.spread(pick)
+        seed = fresh(self.seed, number)
         plans = list[tuple[StudyPlan, float | DcTrim | None]]()
-        for way in seen.taken(pick):
+        for way in linear_model.ways_of(pick):
             setting: float | DcTrim | None = upgrades.trim if way.kind == "trim" else None
-            if way.kind == TRIMMER and seen.trimmer is not None:
-                setting = seen.trimmer.on(circuit)
-            plans.append((StudyPlan(circuit, spread, drawn, MOST, (way.question,)), setting))
-        found: tuple[MeasuredYield, ...]
+            if way.kind == TRIMMER and linear_model.trimmer is not None:
+                setting = linear_model.trimmer.on(circuit)
+            plans.append((StudyPlan(circuit, spread, seed, MOST, (way.question,)), setting))
+        measured: tuple[MeasuredYield, ...]
         if boards is None:
-            found = measure_together(plans, self.target, self.book, jobs=self.jobs, progress=step)
+            measured = measure_together(
+                plans, self.target, self.book, jobs=self.jobs, progress=step
+            )
         else:
-            found = tuple(
+            measured = tuple(
                 measure(
                     plan, self.target, self.book, trim=trim, least=boards, most=boards,
                     first=FIRST, jobs=self.jobs, progress=step,
                 )
                 for plan, trim in plans
             )  # fmt: skip
-        return Trial(seen.branch.name, upgrades, cost, predicted, found, self.target)
+        return Trial(linear_model.branch.name, upgrades, cost, predicted, measured, self.target)
 
     def _learn(self, which: int, pick: Sequence[int], trial: Trial) -> None:
-        """Tighten what was promised and not kept.
+        """Tighten the demands of ways that promised more than was measured.
 
         Where a response has missed the target, those that are undecided were asked on few boards
         only: nothing is learnt of them."""
-        seen = self.pictures[which]
+        linear_model = self.pictures[which]
         short = [r for r, m in enumerate(trial.measured) if m.missed or not m.counts.samples]
         short = short or [r for r, m in enumerate(trial.measured) if not m.reached]
         self.fell_short[which, tuple(pick)] = short
-        boards = seen.boards(pick)
-        for r, (way, m) in enumerate(zip(seen.taken(pick), trial.measured, strict=True)):
+        boards = linear_model.boards(pick)
+        for r, (way, m) in enumerate(zip(linear_model.ways_of(pick), trial.measured, strict=True)):
             if r not in short:
                 continue
-            w = pick[len(seen.parts) + r]
+            w = pick[len(linear_model.parts) + r]
             if way.margin is None and (way.certain or way.kind == TRIMMER):  # it seemed enough
-                step = self.said.stage(f"linear picture, {seen.branch.name}: response {r + 1}")
-                seen = pictured(seen, [(r, w)], self.jobs, step)
-                self.pictures[which] = seen
-                way = seen.ways[r][w]
+                step = self.progress.stage(
+                    f"linear picture, {linear_model.branch.name}: response {r + 1}"
+                )
+                linear_model = pictured(linear_model, [(r, w)], self.jobs, step)
+                self.pictures[which] = linear_model
+                way = linear_model.ways[r][w]
             if way.margin is None or not way.margin.limits:
                 self.spoiled.add((which, r, w))
                 continue
-            # The upper end of what the measurement allows: the cheapest is come upon from below.
+            # The upper end of the interval: the search approaches the cheapest choice from below.
             key, rate = (which, r, w), m.counts.interval[1]
-            self.shrink[key] = min(self.shrink.get(key, 1.0), _shown(way, boards, rate))
+            self.shrink[key] = min(self.shrink.get(key, 1.0), _shrink_factor(way, boards, rate))
 
     def _answer(self, before: Trial, rounds: list[Trial], reached: bool, why: str) -> Cure:
-        limits = tuple(self._limit(r) for r in range(len(self.base.found)))
+        limits = tuple(self._limit(r) for r in range(len(self.base.model_responses)))
         return Cure(
             self.base,
             self.target,
@@ -351,19 +368,22 @@ class _Search:
         )
 
     def _out_of_reach(self) -> str:
-        """Which responses no choice of upgrades is enough for, as the pictures are known now."""
-        best = np.zeros(len(self.base.found))
-        for which, seen in enumerate(self.pictures):
+        """The responses for which no choice of upgrades is enough, by the linear pictures."""
+        best = np.zeros(len(self.base.model_responses))
+        for which, linear_model in enumerate(self.pictures):
             shrink = {(r, w): f for (k, r, w), f in self.shrink.items() if k == which}
-            for most in finest(seen.parts, seen.branch.made.catalog):
-                boards = seen.boards(most)
-                for r, row in enumerate(seen.ways):
+            for most in finest(linear_model.parts, linear_model.branch.synthesis.catalog):
+                boards = linear_model.boards(most)
+                for r, row in enumerate(linear_model.ways):
                     for w, way in enumerate(row):
                         if way.hopeless:
                             best[r] = max(best[r], way.most)
                         elif (which, r, w) not in self.spoiled:
-                            pick = [*most, *(w if k == r else 0 for k in range(len(seen.ways)))]
-                            best[r] = max(best[r], seen.predicted(pick, boards, shrink)[r])
+                            pick = [
+                                *most,
+                                *(w if k == r else 0 for k in range(len(linear_model.ways))),
+                            ]
+                            best[r] = max(best[r], linear_model.predicted(pick, boards, shrink)[r])
         short = [
             f"response {r + 1} ({share:.3f} at most)"
             for r, share in enumerate(best)
@@ -376,35 +396,35 @@ class _Search:
         """What limits a response with nothing upgraded, in one line."""
         if number in self.unseen:
             return "the nominal circuit does not show it"
-        seen = self.pictures[0] if self.pictures else None
-        margin = None if seen is None else seen.ways[number][0].margin
-        if seen is None or margin is None:
+        linear_model = self.pictures[0] if self.pictures else None
+        margin = None if linear_model is None else linear_model.ways[number][0].margin
+        if linear_model is None or margin is None:
             return ""
-        made = seen.branch.made
-        spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
-        return limiting(margin, together(made.design.circuit, spread, seen.seed)).line
+        synthesis = linear_model.branch.synthesis
+        spread = spread_of(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
+        return limiting(margin, together(synthesis.design.circuit, spread, linear_model.seed)).line
 
     def _front(self, before: Trial, rounds: list[Trial]) -> tuple[Trial, ...]:
         """The design as it is, and trials by price, each with a higher worst yield than any cheaper
         one: those of the rounds and the choices for other targets, as the pictures are known
         now."""
         trials = [before, *rounds]
-        seen = {(t.branch, repr(t.upgrades)) for t in trials}
-        found: list[tuple[int, tuple[int, ...], tuple[float, ...]]] = []
+        keys = {(t.branch, repr(t.upgrades)) for t in trials}
+        choices: list[tuple[int, tuple[int, ...], tuple[float, ...]]] = []
         for target in FRONT_TARGETS if self.pictures else ():
-            options = [(k, got) for k in range(len(self.pictures))
-                       if (got := self._of_picture(k, target)) is not None]  # fmt: skip
+            options = [(k, choice) for k in range(len(self.pictures))
+                       if (choice := self._of_picture(k, target)) is not None]  # fmt: skip
             if not options:
                 break
             which, (pick, promised) = min(options, key=lambda x: (self._cost(x[0], x[1][0]), x[0]))
-            if (which, pick, promised) not in found:
-                found.append((which, pick, promised))
-        for which, pick, promised in found:
+            if (which, pick, promised) not in choices:
+                choices.append((which, pick, promised))
+        for which, pick, promised in choices:
             picked = self.pictures[which]
             key = picked.branch.name, repr(picked.upgrades(pick))
-            if key in seen or len(trials) > len(rounds) + FRONT_POINTS:
+            if key in keys or len(trials) > len(rounds) + FRONT_POINTS:
                 continue
-            seen.add(key)
+            keys.add(key)
             trials.append(self._trial(which, pick, promised, FRONT, "front", FRONT_BOARDS))
         trials.sort(key=lambda t: (t.price, -t.worst.rate))
         front: list[Trial] = []
@@ -417,12 +437,12 @@ class _Search:
 def _cut(program: CureProgram, pick: Sequence[int], key: tuple[int, int], parts: int) -> float:
     """A factor on a way's room under which this choice no longer keeps its demands."""
     r, w = key
-    own = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]
-    shares = [d.variance(pick) / d.room for d in own]
+    demands = [d for d in program.demands if d.when == (parts + r, w) and d.room > 0.0]
+    shares = [d.variance(pick) / d.room for d in demands]
     return min(TIGHTER, 0.999 * max(shares, default=1.0))
 
 
-def _shown(way: ResponseWay, boards: Boards, rate: float) -> float:
+def _shrink_factor(way: ResponseWay, boards: Boards, rate: float) -> float:
     """By which factor the room of a way's demands is to shrink for the picture to promise what was
     measured: the square of the ratio of the distances at which that share of boards is lost; 1
     where more are ok than was promised."""

@@ -10,7 +10,7 @@ from designer.catalog.catalog import Catalog
 from designer.catalog.entries import Kind
 from designer.centering.cure_branch import GRADE, NETWORK, REFERENCE, TRIMMER
 from designer.centering.cure_milp import Option, Slot
-from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_parts_kept
+from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.check.synthesis_result import Synthesis
 from designer.circuit.netlist import Capacitor, Resistor
 from designer.spread.part_grades import bought
@@ -41,49 +41,59 @@ class PartSlot:
     """Parts whose places an array may take."""
 
 
-def part_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
+def part_slots(synthesis: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
     """Every part of which a better grade can be bought, in the circuit's order; then the
     references.
 
     A part whose value was measured, or whose grade is not that of anything sold, stays as it is.
     """
-    spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
-    own = bought(made.modelfile, circuit, catalog)
-    measured = made.modelfile.measured
-    known = set() if measured is None else set(measured.values)
+    spec, circuit, catalog = (
+        synthesis.modelfile.circuit,
+        synthesis.design.circuit,
+        synthesis.catalog,
+    )
+    grades = bought(synthesis.modelfile, circuit, catalog)
+    measured = synthesis.modelfile.measured
+    measured_parts = set() if measured is None else set(measured.values)
     out = []
     if GRADE not in without:
-        stated = {name for rule in made.modelfile.spread.part for name in rule.names}
+        stated = {name for rule in synthesis.modelfile.spread.part for name in rule.names}
         kinds = {"resistors", "capacitors"} & stated
         every: tuple[Resistor | Capacitor, ...] = (*circuit.resistors, *circuit.capacitors)
         for part in every:
             kind: Kind = "resistor" if isinstance(part, Resistor) else "capacitor"
-            if part.name in known or (f"{kind}s" in kinds and part.name not in own):
+            if part.name in measured_parts or (f"{kind}s" in kinds and part.name not in grades):
                 continue
-            if part.name in stated and part.name not in own:
+            if part.name in stated and part.name not in grades:
                 continue
             usual = spec.resistor_grade if kind == "resistor" else spec.capacitor_grade
-            found = _grades(catalog, kind, part, own.get(part.name, usual))
-            if found is not None:
-                out.append(found)
+            slot = _grades(catalog, kind, part, grades.get(part.name, usual))
+            if slot is not None:
+                out.append(slot)
     if REFERENCE not in without:
-        out += _references(made)
+        out += _references(synthesis)
     return tuple(out)
 
 
-def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tuple[PartSlot, ...]:
+def network_slots(
+    synthesis: Synthesis, without: frozenset[str] = frozenset()
+) -> tuple[PartSlot, ...]:
     """Resistors of one value in sets that an array can hold, those at one summing node together.
 
     Parts that were measured, that track already or have a grade of their own stay as they are.
     """
     if NETWORK in without:
         return ()
-    spec, circuit, catalog = made.modelfile.circuit, made.design.circuit, made.catalog
-    spread = spread_of(made.modelfile, circuit, catalog)
-    measured = made.modelfile.measured
-    taken = {name for g in spread.groups if not g.reel for name in g.parts}
-    taken |= {*(spread.grades.keys() - spread.asked.keys()), *spread.shapes}
-    taken |= set() if measured is None else measured.values.keys()
+    spec, circuit, catalog = (
+        synthesis.modelfile.circuit,
+        synthesis.design.circuit,
+        synthesis.catalog,
+    )
+    spread = spread_of(synthesis.modelfile, circuit, catalog)
+    measured = synthesis.modelfile.measured
+    excluded = {name for g in spread.groups if not g.reel for name in g.parts}
+    excluded |= {*(spread.grades.keys() - spread.asked.keys()), *spread.shapes}
+    excluded |= set() if measured is None else measured.values.keys()
     nodes = {s.inverting: k for k, s in enumerate(circuit.sections)}
 
     def place(part: Resistor) -> int:
@@ -91,7 +101,7 @@ def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tup
 
     equal: dict[float, list[Resistor]] = {}
     for part in sorted(circuit.resistors, key=place):
-        if part.name not in taken:
+        if part.name not in excluded:
             equal.setdefault(float(f"{part.value:.9g}"), []).append(part)
     out = []
     for family in (f for f in catalog.families if f.use == "array" and f.kind == "resistor"):
@@ -111,16 +121,16 @@ def network_slots(made: Synthesis, without: frozenset[str] = frozenset()) -> tup
     return tuple(out)
 
 
-def trimmer_slot(made: Synthesis, without: frozenset[str] = frozenset()) -> PartSlot | None:
+def trimmer_slot(synthesis: Synthesis, without: frozenset[str] = frozenset()) -> PartSlot | None:
     """The trimmer on the board; None where it is not wanted or there is none.
 
     Fitting it costs what it adds to the bill of materials, nothing where it is fitted already.
     """
     if TRIMMER in without:
         return None
-    fitted = with_parts_kept(made, upgraded_file(made.modelfile, Upgrades(trimmer=True)))
+    fitted = with_same_parts(synthesis, upgraded_file(synthesis.modelfile, Upgrades(trimmer=True)))
     try:
-        trim, extra = dc_trim(fitted), price(fitted) - price(made)
+        trim, extra = dc_trim(fitted), price(fitted) - price(synthesis)
     except (Unreachable, InputError):
         return None
     options = (Option("not set", 0.0), Option("set", extra, TRIMMED))
@@ -128,14 +138,14 @@ def trimmer_slot(made: Synthesis, without: frozenset[str] = frozenset()) -> Part
 
 
 def _grades(
-    catalog: Catalog, kind: Kind, part: Resistor | Capacitor, asked: float
+    catalog: Catalog, kind: Kind, part: Resistor | Capacitor, wanted_grade: float
 ) -> PartSlot | None:
     """The slot of one part; None where nothing better is sold. A dearer grade that is no better
     than a cheaper one is left out.
 
     asked : the grade that is asked for; the part is as it is bought there.
     """
-    base = catalog.part(kind, part.value, asked)
+    base = catalog.part(kind, part.value, wanted_grade)
     now = base.family.grade
     better = {
         f.grade
@@ -156,8 +166,8 @@ def _grades(
     return PartSlot(Slot(part.name, tuple(options)), (part.name,), grades=tuple(grades))
 
 
-def _references(made: Synthesis) -> Sequence[PartSlot]:
-    circuit, catalog = made.design.circuit, made.catalog
+def _references(synthesis: Synthesis) -> Sequence[PartSlot]:
+    circuit, catalog = synthesis.design.circuit, synthesis.catalog
     if not circuit.references:
         return []
     now = catalog.reference(circuit.references[0].model)

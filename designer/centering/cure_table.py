@@ -15,14 +15,14 @@ def text(answer: Mapping[str, Any]) -> str:
     lines = []
     if answer["reached"]:
         lines.append(f"every response at {percent} or better for {answer['price']:.2f} euro:")
-        lines += [f"  {said}" for said in answer["said"]] or ["  nothing has to change"]
+        lines += [f"  {upgrade}" for upgrade in answer["said"]] or ["  nothing has to change"]
     else:
         lines.append(f"{percent} not reached: {answer['why']}")
         best = "; ".join(answer["said"]) or "the design as it is"
         lines.append(f"  best measured, {answer['price']:.2f} euro: {best}")
     lines += ["", "response            before                  after", *_responses(answer)]
     for number, trial in enumerate(answer["rounds"], start=1):
-        lines += ["", f"round {number}, {trial['price']:.2f} euro: " + _said(trial)]
+        lines += ["", f"round {number}, {trial['price']:.2f} euro: " + _upgrades(trial)]
         for r, (promised, m) in enumerate(
             zip(trial["predicted"], trial["measured"], strict=True), start=1
         ):
@@ -30,7 +30,7 @@ def text(answer: Mapping[str, Any]) -> str:
     lines += ["", "price     worst response          upgrades"]
     for trial in answer["front"]:
         worst = min(trial["measured"], key=lambda m: (_rate(m), m["low"]))
-        lines.append(f"{trial['price']:<9.2f} {_yield(worst):<23} {_said(trial)}")
+        lines.append(f"{trial['price']:<9.2f} {_yield(worst):<23} {_upgrades(trial)}")
     lines += [
         "",
         *(f"not built: {'; '.join(r['upgrades'])}: {r['why']}" for r in answer["refused"]),
@@ -48,7 +48,7 @@ def _responses(answer: Mapping[str, Any]) -> list[str]:
     return out
 
 
-def _said(trial: Mapping[str, Any]) -> str:
+def _upgrades(trial: Mapping[str, Any]) -> str:
     return "; ".join(trial["said"]) or "as it is"
 
 

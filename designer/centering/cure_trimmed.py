@@ -40,13 +40,13 @@ def trimmer_ways(
     """
     boards, _ = trimmed_boards(trim, looker.plan, range(SAMPLES))
     finest = [trimmed_boards(trim.on(p.circuit), p, range(2 * FEW))[0] for p in looker.best]
-    found = []
+    ways = []
     for first in firsts:
-        way = looker.seen(ResponseWay(first.response, TRIMMER, first.question), boards)
-        found.append(looker.bounded(way, finest))
-        if found[-1].hopeless:
+        way = looker.with_rate(ResponseWay(first.response, TRIMMER, first.question), boards)
+        ways.append(looker.bounded(way, finest))
+        if ways[-1].hopeless:
             return None
-    return found
+    return ways
 
 
 def trimmed_margins(
@@ -57,7 +57,7 @@ def trimmed_margins(
     jobs: int = 1,
     progress: Callable[[], None] = lambda: None,
 ) -> list[Margin]:
-    """Of each question of a plan of the circuit without the trimmer: its margin.
+    """The margin of each question; the plan is of the circuit without the trimmer.
 
     count, progress : as ``margins.margins``.
     """
@@ -66,33 +66,33 @@ def trimmed_margins(
     for question in plan.questions:
         answers.append(foretold(boards, question, jobs))
         progress()
-    found = margins.margins(
+    trimmed = margins.margins(
         trim.circuit, plan.questions, boards, answers, count=count, jobs=jobs, progress=progress
     )
-    return [without_wiper(margin, plan, trim) for margin in found]
+    return [without_wiper(margin, plan, trim) for margin in trimmed]
 
 
 def without_wiper(margin: Margin, plan: StudyPlan, trim: DcTrim) -> Margin:
     """A margin of trimmed boards in terms of the quantities of the boards without a trimmer."""
     indices = range(FITTED)
     boards, _ = trimmed_boards(trim, plan, indices)
-    own = set(plan.circuit.values)
+    part_names = set(plan.circuit.values)
     wiper = [k for k, q in enumerate(margin.quantities) if q.part in (HIGH, LOW)]
-    kept = [
-        k for k, q in enumerate(margin.quantities) if q.group != "values" or q.part in own
+    remaining = [
+        k for k, q in enumerate(margin.quantities) if q.group != "values" or q.part in part_names
     ]  # and not the resistor at the wiper
 
     def off(k: int) -> Array:
         q = margin.quantities[k]
         return (column(boards, q) - q.nominal) / q.sigma
 
-    drawn = np.stack([off(k) for k in kept], axis=1)
-    moves = np.linalg.lstsq(drawn, np.stack([off(k) for k in wiper], axis=1), rcond=None)[0]
-    quantities = tuple(margin.quantities[k] for k in kept)
+    deviations = np.stack([off(k) for k in remaining], axis=1)
+    moves = np.linalg.lstsq(deviations, np.stack([off(k) for k in wiper], axis=1), rcond=None)[0]
+    quantities = tuple(margin.quantities[k] for k in remaining)
     plain = draw_many(plan.circuit, plan.spread, plan.seed, indices)
     limits = []
     for limit in margin.limits:
-        slopes = limit.slopes[kept] + moves @ limit.slopes[wiper]
+        slopes = limit.slopes[remaining] + moves @ limit.slopes[wiper]
         moved = replace(limit, sigma=1.0, slopes=slopes)
         sigma = float(Margin(quantities, (moved,)).each(plain).std())
         if sigma > 0.0:

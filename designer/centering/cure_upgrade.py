@@ -90,24 +90,24 @@ class Upgrades:
         }
 
     @classmethod
-    def of_dict(cls, said: Mapping[str, Any]) -> Upgrades:
-        """What ``as_dict`` gave."""
+    def of_dict(cls, record: Mapping[str, Any]) -> Upgrades:
+        """The upgrades that ``as_dict`` wrote."""
         return cls(
-            opamp=said["opamp"],
-            dead_zone=said["dead_zone"],
-            reference=said["reference"],
-            grades=dict(said["grades"]),
-            places={p["response"] - 1: WindowPlace(p["omega"], p["b"]) for p in said["places"]},
-            trim=said["trim"],
-            trimmer=said.get("trimmer", False),
+            opamp=record["opamp"],
+            dead_zone=record["dead_zone"],
+            reference=record["reference"],
+            grades=dict(record["grades"]),
+            places={p["response"] - 1: WindowPlace(p["omega"], p["b"]) for p in record["places"]},
+            trim=record["trim"],
+            trimmer=record.get("trimmer", False),
             networks=tuple(
-                PartNetwork(n["family"], tuple(n["parts"])) for n in said.get("networks", ())
+                PartNetwork(n["family"], tuple(n["parts"])) for n in record.get("networks", ())
             ),
         )
 
 
 def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
-    """The model file that says all this; the same object where nothing is changed.
+    """The model file with these upgrades; the same object where nothing is changed.
 
     A stated saturation belongs to the op-amp it was stated for: another one has its own.
     """
@@ -132,14 +132,14 @@ def upgraded_file(modelfile: ModelFile, upgrades: Upgrades) -> ModelFile:
         data.setdefault("board", {})["dc_trim"] = "fitted"
     parts = data.setdefault("spread", {}).setdefault("part", [])
     for grade in sorted(set(upgrades.grades.values())):
-        names = [name for name, own in upgrades.grades.items() if own == grade]
+        names = [name for name, of_part in upgrades.grades.items() if of_part == grade]
         picked = [name for name in names if _was_picked_out(modelfile, name, grade)]
         others = [name for name in names if name not in picked]
         parts += [{"names": others, "grade": grade}] * bool(others)
         parts += [{"names": picked, "grade": grade, "law": "uniform"}] * bool(picked)
     for network in upgrades.networks:
-        held = data["spread"].setdefault("network", [])
-        held.append({"parts": list(network.parts), "family": network.family})
+        networks = data["spread"].setdefault("network", [])
+        networks.append({"parts": list(network.parts), "family": network.family})
     read = parse_model_file(toml_text(data), modelfile.source)
     return replace(read, title=modelfile.title, measured=modelfile.measured)
 
@@ -150,9 +150,9 @@ def _was_picked_out(modelfile: ModelFile, name: str, grade: float) -> bool:
     rules = modelfile.spread
     kind = "resistors" if name.startswith("R") else "capacitors"
     law = rules.resistors if kind == "resistors" else rules.capacitors
-    whole = name[:-1] if name[-1] in "AB" else name  # of a composite's two parts
+    composite = name[:-1] if name[-1] in "AB" else name  # of a composite's two parts
     for rule in rules.part:
-        if rule.law is not None and {name, whole, kind} & set(rule.names):
+        if rule.law is not None and {name, composite, kind} & set(rule.names):
             law = rule.law
     return law.law == "binned" and grade <= law.inner
 
@@ -172,13 +172,13 @@ def rebuilt(design: Design, modelfile: ModelFile, catalog: Catalog) -> Circuit:
     )
 
 
-def with_parts_kept(
+def with_same_parts(
     base: Synthesis, modelfile: ModelFile, loaded: Sequence[int] | None = None
 ) -> Synthesis:
     """The base's parts in a design for another model file, verified afresh.
 
-    loaded : numbers of the responses of which the op-amps' loads are asked; None: all. Those that
-    stayed where they were load a circuit of the same values as before.
+    loaded : numbers of the responses for which the op-amps' loads are computed; None: all. A
+    response that stayed where it was loads the same circuit as before.
 
     The file differs in what ``Upgrades`` changes but for the dead zone. Its design's ``checks`` say
     whether the side conditions still hold.
@@ -189,9 +189,9 @@ def with_parts_kept(
     """
     model, catalog = modelfile.model, base.catalog
     circuit = rebuilt(base.design, modelfile, catalog)
-    found = _found(base, modelfile)
-    held = peaks(model, found)
-    swing = float((base.design.errors.scales.volts * held.states).max()), held.states
+    responses = _model_responses(base, modelfile)
+    model_peaks = peaks(model, responses)
+    swing = float((base.design.errors.scales.volts * model_peaks.states).max()), model_peaks.states
     errors = coefficient_errors(circuit, model.second_order(), swing=swing)
     design = replace(
         base.design,
@@ -200,36 +200,36 @@ def with_parts_kept(
         certificate=Certificate("bound", 0.0, "the parts are those of the design that was cured"),
         binding={},
     )
-    kept = modelfile.circuit.kept
-    amplitudes = [design.amplitude(r.b, r.omega) for r in found] or [design.amplitude()]
+    conditions = modelfile.circuit.kept
+    amplitudes = [design.amplitude(r.b, r.omega) for r in responses] or [design.amplitude()]
     needed = None
-    if found and kept & {"swing", "load"}:
-        loading = found if loaded is None else [found[number] for number in loaded]
+    if responses and conditions & {"swing", "load"}:
+        loading = responses if loaded is None else [responses[number] for number in loaded]
         needed = output_loads.design_loads(
             design, Reduction(circuit, nominal_board(circuit)), loading
         )
     checks = side_conditions.verify(
-        design, kept, catalog.opamp(circuit.opamp), held, amplitudes, needed
+        design, conditions, catalog.opamp(circuit.opamp), model_peaks, amplitudes, needed
     )
     stated = {c.quantity: c.limit for c in base.design.checks}
     numbers = {k: v for k, v in base.design.conditions.items() if k not in stated}
     design = replace(
         design, checks=checks, conditions=numbers | {c.quantity: c.limit for c in checks}
     )
-    return replace(base, modelfile=modelfile, found=found, design=design)
+    return replace(base, modelfile=modelfile, model_responses=responses, design=design)
 
 
-def _found(base: Synthesis, modelfile: ModelFile) -> tuple[ModelResponse, ...]:
+def _model_responses(base: Synthesis, modelfile: ModelFile) -> tuple[ModelResponse, ...]:
     """The model's responses; those that stay where they were are not sought again."""
-    known = dict(zip(base.modelfile.responses, base.found, strict=True))
+    responses = dict(zip(base.modelfile.responses, base.model_responses, strict=True))
     return tuple(
-        known[spec] if spec in known else find(modelfile.model, [spec])[0]
+        responses[spec] if spec in responses else find(modelfile.model, [spec])[0]
         for spec in modelfile.responses
     )
 
 
-def price(made: Synthesis) -> float:
+def price(synthesis: Synthesis) -> float:
     """Of everything on its bill of materials, in euro, with the catalogue's price of each class."""
-    circuit, choice = board_circuit(made)
-    lines = bill(to_buy(components(circuit, made.catalog, choice), choice))
-    return float(np.sum([x.quantity * made.catalog.euro(x.price_class) for x in lines]))
+    circuit, choice = board_circuit(synthesis)
+    lines = bill(to_buy(components(circuit, synthesis.catalog, choice), choice))
+    return float(np.sum([x.quantity * synthesis.catalog.euro(x.price_class) for x in lines]))

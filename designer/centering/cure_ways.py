@@ -17,8 +17,8 @@ import numpy as np
 from scipy.stats import binom
 
 from designer.centering.cure_branch import PLACE, TRIM, CureBranch
-from designer.centering.cure_measure import Book, asked, measure, plan_of
-from designer.centering.cure_upgrade import Upgrades, WindowPlace, upgraded_file, with_parts_kept
+from designer.centering.cure_measure import Book, measure, plan_of, questions_of
+from designer.centering.cure_upgrade import Upgrades, WindowPlace, upgraded_file, with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.spread.part_rules import spread_of
@@ -69,46 +69,49 @@ class ResponseWay:
 
 
 def forecast(boards: Boards, question: Question, jobs: int) -> list[Verdict | None]:
-    """The verdict of each board; None where the compiled way leaves it open."""
+    """The verdict of each board; None where the compiled kernel leaves it open."""
     size = len(boards)
-    found = Ensemble(boards, jobs=jobs).quick(
+    orbits = Ensemble(boards, jobs=jobs).quick(
         range(size),
         [question.excitation.drive] * size,
         np.tile(question.start.start, (size, 1)),
         jobs=jobs,
     )
-    said = [None if o is None else judge(o, question.spec, question.start)[0] for o in found]
-    return [None if verdict is Verdict.FAILED else verdict for verdict in said]
+    verdicts = [None if o is None else judge(o, question.spec, question.start)[0] for o in orbits]
+    return [None if verdict is Verdict.FAILED else verdict for verdict in verdicts]
 
 
 def settled(boards: Boards, question: Question, jobs: int) -> list[Verdict]:
     """The verdict of each board, given all the time there is."""
     size = len(boards)
-    found = Ensemble(boards).settle(
+    orbits = Ensemble(boards).settle(
         range(size),
         [question.excitation.drive] * size,
         np.tile(question.start.start, (size, 1)),
         jobs=jobs,
     )
-    return [judge(orbit, question.spec, question.start)[0] for orbit in found]
+    return [judge(orbit, question.spec, question.start)[0] for orbit in orbits]
 
 
 def foretold(boards: Boards, question: Question, jobs: int) -> list[Answer]:
-    """As much of an answer as a margin needs, for each board. What stays open is lost where a few
-    of the open ones have been settled and none shows the response."""
-    found = forecast(boards, question, jobs)
-    left = [k for k, verdict in enumerate(found) if verdict is None]
-    settle_open(found, left, lambda some: settled(boards.take(some), question, jobs))
+    """For each board as much of an answer as a margin needs.
+
+    Of the boards that the compiled kernel leaves open a few are settled; where none of them shows
+    the response, all of them count as lost.
+    """
+    verdicts = forecast(boards, question, jobs)
+    left = [k for k, verdict in enumerate(verdicts) if verdict is None]
+    settle_open(verdicts, left, lambda some: settled(boards.take(some), question, jobs))
     nan = float("nan")
     return [
         Answer(sample, 0, verdict or Verdict.LOST, "", "", nan, nan, nan, nan, 0)
-        for sample, verdict in enumerate(found)
+        for sample, verdict in enumerate(verdicts)
     ]
 
 
 @dataclass(frozen=True)
 class Looker:
-    """Looks for the ways of a branch's responses."""
+    """Computes the ways in which a branch may show each response."""
 
     branch: CureBranch
     """The branch."""
@@ -136,19 +139,19 @@ class Looker:
     @property
     def plan(self) -> StudyPlan:
         """The study of boards with the parts as they are, of no question yet."""
-        made = self.branch.made
-        spread = spread_of(made.modelfile, made.design.circuit, made.catalog)
-        return StudyPlan(made.design.circuit, spread, self.seed, SAMPLES, ())
+        synthesis = self.branch.synthesis
+        spread = spread_of(synthesis.modelfile, synthesis.design.circuit, synthesis.catalog)
+        return StudyPlan(synthesis.design.circuit, spread, self.seed, SAMPLES, ())
 
-    def seen(self, way: ResponseWay, boards: Boards | None = None) -> ResponseWay:
-        """A way with the share of boards that show it.
+    def with_rate(self, way: ResponseWay, boards: Boards | None = None) -> ResponseWay:
+        """The way with the share of boards that show its response.
 
-        boards : that are asked; None: with the parts as they are.
+        boards : drawn boards; None: those of the design with its parts as they are.
         """
-        boards = drawn(self.plan, SAMPLES) if boards is None else boards
-        found = count(foretold(boards, way.question, self.jobs))
+        boards = first_boards(self.plan, SAMPLES) if boards is None else boards
+        counts = count(foretold(boards, way.question, self.jobs))
         self.progress()
-        return replace(way, rate=0.0 if np.isnan(found.rate) else found.rate)
+        return replace(way, rate=0.0 if np.isnan(counts.rate) else counts.rate)
 
     def bounded(self, way: ResponseWay, finest: Sequence[Boards] | None = None) -> ResponseWay:
         """A way with what the best parts make of it.
@@ -158,7 +161,7 @@ class Looker:
         if way.certain or way.kind == TRIM:
             return way
         if finest is None:
-            finest = [drawn(plan, 2 * FEW) for plan in self.best]
+            finest = [first_boards(plan, 2 * FEW) for plan in self.best]
         shares = []
         for boards in finest:
             lost, total = self._lost(boards, way.question)
@@ -169,19 +172,24 @@ class Looker:
         return replace(way, most=max(shares), hopeless=self._too_many(lost, total))
 
     def _lost(self, boards: Boards, question: Question) -> tuple[int, int]:
-        """How many of how many boards are lost. More are asked while it is few; those left open are
-        settled as far as they decide whether it is too many."""
+        """How many boards are lost, and of how many.
+
+        More boards are asked while few are lost. Boards left open are settled only where they
+        decide whether too many are lost.
+        """
         lost, left = 0, list[int]()
         for total in (FEW, 2 * FEW):
             some = range(total - FEW, total)
-            found = forecast(boards.take(some), question, self.jobs)
-            left += [k for k, verdict in zip(some, found, strict=True) if verdict is None]
-            lost += found.count(Verdict.LOST)
+            verdicts = forecast(boards.take(some), question, self.jobs)
+            left += [k for k, verdict in zip(some, verdicts, strict=True) if verdict is None]
+            lost += verdicts.count(Verdict.LOST)
             needed = next((n for n in range(total + 1) if self._too_many(n, total)), total + 1)
             if needed <= lost + len(left):
                 missing = max(needed - lost, 0)
-                said = settled(boards.take(left[:missing]), question, self.jobs) if missing else []
-                lost, left = lost + said.count(Verdict.LOST), left[missing:]
+                settled_verdicts = (
+                    settled(boards.take(left[:missing]), question, self.jobs) if missing else []
+                )
+                lost, left = lost + settled_verdicts.count(Verdict.LOST), left[missing:]
                 if lost >= needed:  # those that were not settled are taken for lost too
                     return lost + len(left), total
             if not lost and not left:
@@ -201,12 +209,12 @@ class Looker:
         row = [self.bounded(first)]
         if self.enough(first):
             return row
-        plan = plan_of(self.branch.made, first.question, self.seed)
+        plan = plan_of(self.branch.synthesis, first.question, self.seed)
         if PLACE not in self.without:
             for over in ("omega", "b"):
                 moved = self._moved(first, plan, over)
                 if moved is not None:
-                    row.append(self.bounded(self.seen(moved)))
+                    row.append(self.bounded(self.with_rate(moved)))
                     if row[-1].certain:
                         return row
         if TRIM not in self.without and self.trim > 0.0:
@@ -224,21 +232,23 @@ class Looker:
 
     def _moved(self, way: ResponseWay, plan: StudyPlan, over: str) -> ResponseWay | None:
         """Another place of the response in its window, where more boards show it."""
-        number, made = way.response, self.branch.made
-        response = made.found[number]
+        number, synthesis = way.response, self.branch.synthesis
+        response = synthesis.model_responses[number]
 
         def mapped(of: StudyPlan, values: tuple[float, ...] | None = None) -> YieldMap:
-            found = yield_map(
+            result = yield_map(
                 of, 0, "b" if over == "b" else "omega", response.b, values=values,
                 samples=FEW, points=MAP_POINTS, jobs=self.jobs, quick=True,
             )  # fmt: skip
             self.progress()
-            return found
+            return result
 
-        found = mapped(plan)
-        if found.rate.max() < FAINT:
-            found = mapped(replace(self.best[0], questions=plan.questions), found.axes[0].values)
-        best = best_place(found)
+        rate_map = mapped(plan)
+        if rate_map.rate.max() < FAINT:
+            rate_map = mapped(
+                replace(self.best[0], questions=plan.questions), rate_map.axes[0].values
+            )
+        best = best_place(rate_map)
         if best is None:
             return None
         value = float(f"{best:.4g}")
@@ -251,7 +261,7 @@ class Looker:
         return None if question is None else ResponseWay(number, over, question, place)
 
 
-def drawn(plan: StudyPlan, number: int) -> Boards:
+def first_boards(plan: StudyPlan, number: int) -> Boards:
     """The first boards of a study."""
     return draw_many(plan.circuit, plan.spread, plan.seed, range(number))
 
@@ -259,24 +269,26 @@ def drawn(plan: StudyPlan, number: int) -> Boards:
 def moved_question(branch: CureBranch, places: Mapping[int, WindowPlace]) -> Question | None:
     """What boards are asked of one response at another place; None where the circuit does not show
     it there, or a side condition breaks that held."""
-    made = branch.made
+    synthesis = branch.synthesis
     ((number, _),) = places.items()
-    moved = with_parts_kept(made, upgraded_file(made.modelfile, Upgrades(places=places)), [number])
-    broken = {c.quantity for c in made.design.checks if not c.holds}
+    moved = with_same_parts(
+        synthesis, upgraded_file(synthesis.modelfile, Upgrades(places=places)), [number]
+    )
+    broken = {c.quantity for c in synthesis.design.checks if not c.holds}
     if any(not c.holds and c.quantity not in broken for c in moved.design.checks):
         return None
-    return asked(moved, moved.found[number : number + 1])[0]
+    return questions_of(moved, moved.model_responses[number : number + 1])[0]
 
 
-def best_place(found: YieldMap) -> float | None:
+def best_place(rate_map: YieldMap) -> float | None:
     """The middle of the longest row of settings with the highest yield; None where the setting in
     use has it.
 
     Not ``recommended``, which stays where it is unless another setting is proved to be better: a
     cure is measured before it is believed.
     """
-    values, rate = np.array(found.axes[0].values), found.rate
-    if rate[found.axes[0].values.index(found.used)] >= rate.max():
+    values, rate = np.array(rate_map.axes[0].values), rate_map.rate
+    if rate[rate_map.axes[0].values.index(rate_map.used)] >= rate.max():
         return None
     equal = np.flatnonzero(rate == rate.max())
     rows = np.split(equal, np.flatnonzero(np.diff(equal) > 1) + 1)

@@ -24,7 +24,14 @@ from designer.base.progress import Progress
 from designer.board.board_check import check_board
 from designer.catalog.catalog import Catalog
 from designer.centering.answer_cache import AnswerCache
-from designer.centering.candidate import Candidate, Contribution, Listened, Searched, Step, better
+from designer.centering.candidate import (
+    Candidate,
+    Contribution,
+    NgspiceOutcome,
+    SearchResult,
+    Step,
+    better,
+)
 from designer.centering.distance import Stretched
 from designer.centering.levers import (
     LEVERS,
@@ -62,7 +69,7 @@ def search(
     windows: Sequence[tuple[Stretch, ...]] | None = None,
     listen: Listen | None = None,
     progress: Progress | None = None,
-) -> Searched:
+) -> SearchResult:
     """Seek the design and the places of the highest predicted yield.
 
     seed : of the boards of the search, which no study draws. memory : of an earlier, interrupted
@@ -75,19 +82,21 @@ def search(
         does not show a response.
     Unreachable : no design keeps its conditions and the match error.
     """
-    said = Progress() if progress is None else progress
+    progress = Progress() if progress is None else progress
     catalog = modelfile.choices(catalog)
     with naming(modelfile):
-        seen = look(modelfile, catalog, jobs, said) if windows is None else tuple(windows)
+        all_windows = (
+            look(modelfile, catalog, jobs, progress) if windows is None else tuple(windows)
+        )
         hunt = _Hunt(
             modelfile,
             catalog,
-            seen,
+            all_windows,
             seed,
             jobs,
             AnswerCache() if memory is None else memory,
             listen,
-            said,
+            progress,
         )
         return hunt.run()
 
@@ -131,24 +140,24 @@ class _Hunt:
         self,
         modelfile: ModelFile,
         catalog: Catalog,
-        seen: tuple[tuple[Stretch, ...], ...],
+        windows: tuple[tuple[Stretch, ...], ...],
         seed: int,
         jobs: int,
         memory: AnswerCache,
         listen: Listen | None,
-        said: Progress,
+        progress: Progress,
     ) -> None:
-        self.modelfile, self.catalog, self.seen = modelfile, catalog, seen
-        self.seed, self.jobs, self.memory, self.said = seed, jobs, memory, said
-        self.listen, self.heard = listen, list[Listened]()
+        self.modelfile, self.catalog, self.windows = modelfile, catalog, windows
+        self.seed, self.jobs, self.memory, self.progress = seed, jobs, memory, progress
+        self.listen, self.checks = listen, list[NgspiceOutcome]()
         self.steps: list[Step] = []
         self.candidates = self.places = 0
         self.short: Unreachable | None = None
 
-    def run(self) -> Searched:
+    def run(self) -> SearchResult:
         middle = tuple(
-            self._there(spec, [s.at((0.5,))[0] for s in found])
-            for spec, found in zip(self.modelfile.responses, self.seen, strict=True)
+            self._there(spec, [s.at((0.5,))[0] for s in window])
+            for spec, window in zip(self.modelfile.responses, self.windows, strict=True)
         )
         start, best = self._topology(middle)
         if any(open_in(spec) for spec in self.modelfile.responses):
@@ -161,17 +170,17 @@ class _Hunt:
                     best = self._try(TOPOLOGY, setting, other, best)
         for lever in LEVERS[2:]:
             for choice in variants(best.choice, lever):
-                best = self._try(lever, _shown(choice.get(lever)), choice, best)
+                best = self._try(lever, _setting_text(choice.get(lever)), choice, best)
         best = self._borne_out(best)
         contributions = self._contributions(start, best)
-        return Searched(
-            self._made(best),
+        return SearchResult(
+            self._synthesis(best),
             start,
             best,
             tuple(self.steps),
             contributions,
-            tuple(self.heard),
-            self.seen,
+            tuple(self.checks),
+            self.windows,
             self.candidates,
             self.places,
             self.seed,
@@ -179,107 +188,117 @@ class _Hunt:
 
     def _topology(self, middle: tuple[ModelResponse, ...]) -> tuple[Candidate | None, Candidate]:
         """The match design, if there is one, and the best of all op-amps and dead zones."""
-        own = DesignChoice.of(self.modelfile.circuit)
+        file_choice = DesignChoice.of(self.modelfile.circuit)
         start: Candidate | None = None
         best: Candidate | None = None
         for choice in topologies(self.modelfile, self.catalog):
             setting = f"{choice.opamp}, {choice.dead_zone}"
-            made = self._candidate(choice, middle, setting)
-            if made is None:
+            candidate = self._candidate(choice, middle, setting)
+            if candidate is None:
                 self._note(TOPOLOGY, setting, None, False)
                 continue
-            gained = best is None or better(made.rank, best.rank)
-            self._note(TOPOLOGY, setting, made, gained)
-            if choice == own:
-                start = made
+            gained = best is None or better(candidate.rank, best.rank)
+            self._note(TOPOLOGY, setting, candidate, gained)
+            if choice == file_choice:
+                start = candidate
             if gained:
-                best = made
+                best = candidate
         if best is None:
             assert self.short is not None
             raise self.short
-        if own not in topologies(self.modelfile, self.catalog):  # what the levers are worth
-            start = self._candidate(own, middle, "the match design")
+        if file_choice not in topologies(self.modelfile, self.catalog):  # what the levers are worth
+            start = self._candidate(file_choice, middle, "the match design")
         return start, best
 
     def _placed(self, best: Candidate) -> Candidate:
         """The same choice with every open response at its best place."""
         spread = spread_of(self.modelfile, best.design.circuit, self.catalog)
         bench = Stretched(best.design, spread, self.seed, MANY, jobs=self.jobs, memory=self.memory)
-        chosen = []
+        responses = []
         for number, spec in enumerate(self.modelfile.responses):
             if not open_in(spec):
-                chosen.append(best.found[number])
+                responses.append(best.model_responses[number])
                 continue
-            step = self.said.stage(f"place of response {number + 1}, {spec.expect}")
+            step = self.progress.stage(f"place of response {number + 1}, {spec.expect}")
             room = room_of(
                 spec, self.modelfile.model.b, self.modelfile.search.band(self.modelfile.model)
             )
-            ranked, tried = best_points(bench, spec, self.seen[number], room, progress=step)
-            self.places += tried
+            ranked, trials = best_points(bench, spec, self.windows[number], room, progress=step)
+            self.places += trials
             if not ranked:
                 raise self._nowhere(number, spec)
-            chosen.append(self._there(spec, [s.place for s in ranked]))
-        setting = "; ".join(f"{r.expected}: ω = {r.omega:.5g}, b = {r.b:.4g}" for r in chosen)
-        made = self._candidate(best.choice, tuple(chosen), PLACES)
-        gained = made is not None and better(made.rank, best.rank)
-        self._note(PLACES, setting, made, gained)
-        return made if made is not None and gained else best
+            responses.append(self._there(spec, [s.place for s in ranked]))
+        setting = "; ".join(f"{r.expected}: ω = {r.omega:.5g}, b = {r.b:.4g}" for r in responses)
+        candidate = self._candidate(best.choice, tuple(responses), PLACES)
+        gained = candidate is not None and better(candidate.rank, best.rank)
+        self._note(PLACES, setting, candidate, gained)
+        return candidate if candidate is not None and gained else best
 
     def _try(self, lever: str, setting: str, choice: DesignChoice, best: Candidate) -> Candidate:
-        made = self._candidate(choice, best.found, f"{lever} {setting}")
-        gained = made is not None and better(made.rank, best.rank)
-        self._note(lever, setting, made, gained)
-        return made if made is not None and gained else best
+        candidate = self._candidate(choice, best.model_responses, f"{lever} {setting}")
+        gained = candidate is not None and better(candidate.rank, best.rank)
+        self._note(lever, setting, candidate, gained)
+        return candidate if candidate is not None and gained else best
 
     def _borne_out(self, best: Candidate) -> Candidate:
         """The design, or the same with a slower time scale where ngspice loses boards of it."""
         if self.listen is None:
             return best
-        tried: list[tuple[Candidate, float, tuple[Agreement, ...]]] = []
+        checked: list[tuple[Candidate, float, tuple[Agreement, ...]]] = []
         unit = self.modelfile.model.second_order().own_frequency
         frequency = best.design.errors.scales.frequency(unit)
         low, _ = self.modelfile.circuit.frequency
         for choice in (best.choice, *slower(best.choice, frequency, low)):
-            made: Candidate | None = best
+            candidate: Candidate | None = best
             if choice != best.choice:
-                made = self._candidate(choice, best.found, f"time scale {_shown(choice.frequency)}")
-            if made is None:
-                self._note("time scale", _shown(choice.frequency), None, False)
+                candidate = self._candidate(
+                    choice, best.model_responses, f"time scale {_setting_text(choice.frequency)}"
+                )
+            if candidate is None:
+                self._note("time scale", _setting_text(choice.frequency), None, False)
                 continue
-            at = made.design.errors.scales.frequency(unit)
-            step = self.said.stage(f"ngspice, rung {RUNG}, {at:.4g} Hz at ω = 1", len(made.found))
-            bench = self._bench(made.choice, made.found, made.design, LISTENED)
-            heard = self.listen(bench, [s.stand for s in made.scored], step)
-            tried.append((made, at, heard))
-            if not any(h.borne_out is False for h in heard):
+            at = candidate.design.errors.scales.frequency(unit)
+            step = self.progress.stage(
+                f"ngspice, rung {RUNG}, {at:.4g} Hz at ω = 1", len(candidate.scored)
+            )
+            responses, design = candidate.model_responses, candidate.design
+            bench = self._bench(candidate.choice, responses, design, LISTENED)
+            agreements = self.listen(bench, [s.stand for s in candidate.scored], step)
+            checked.append((candidate, at, agreements))
+            if not any(h.borne_out is False for h in agreements):
                 break
-        told = [r for r, h in enumerate(tried[0][2]) if h.borne_out is not None]
-        kept = max(tried, key=lambda t: min((t[2][r].ngspice for r in told), default=0))[0]
-        for made, at, heard in tried:
-            self.heard.append(Listened(at, heard, made is kept))
-            said = ", ".join(str(h) for h in heard)
-            self.said.note(f"  {at:.4g} Hz: boards that ngspice keeps, by response: {said}")
-            if made is not best:
-                self._note("time scale", _shown(made.choice.frequency), made, made is kept)
-        return kept
+        answered = [r for r, h in enumerate(checked[0][2]) if h.borne_out is not None]
+        final = max(checked, key=lambda t: min((t[2][r].ngspice for r in answered), default=0))[0]
+        for candidate, at, agreements in checked:
+            self.checks.append(NgspiceOutcome(at, agreements, candidate is final))
+            text = ", ".join(str(h) for h in agreements)
+            self.progress.note(f"  {at:.4g} Hz: boards that ngspice keeps, by response: {text}")
+            if candidate is not best:
+                self._note(
+                    "time scale",
+                    _setting_text(candidate.choice.frequency),
+                    candidate,
+                    candidate is final,
+                )
+        return final
 
     def _bench(
-        self, choice: DesignChoice, found: Sequence[ModelResponse], design: Design, boards: int
+        self, choice: DesignChoice, responses: Sequence[ModelResponse], design: Design, boards: int
     ) -> Stretched:
-        spread = spread_of(self._resolved(choice, found), design.circuit, self.catalog)
+        spread = spread_of(self._resolved(choice, responses), design.circuit, self.catalog)
         return Stretched(design, spread, self.seed, boards, jobs=self.jobs, memory=self.memory)
 
     def _candidate(
-        self, choice: DesignChoice, found: tuple[ModelResponse, ...], what: str
+        self, choice: DesignChoice, responses: tuple[ModelResponse, ...], title: str
     ) -> Candidate | None:
         """A design made so; None where there is none, and then ``short`` says why."""
-        step = self.said.stage(f"candidate {self.candidates + 1}: {what}")
+        step = self.progress.stage(f"candidate {self.candidates + 1}: {title}")
         self.candidates += 1
         model, spec = self.modelfile.model, choice.spec(self.modelfile.circuit)
         try:
-            held = find_responses.peaks(model, found)
+            model_peaks = find_responses.peaks(model, responses)
             design = parts_choice.synthesise(
-                model, spec, self.catalog, held, found, aims=choice.aims, binding=False
+                model, spec, self.catalog, model_peaks, responses, aims=choice.aims, binding=False
             )
             most, error = self.modelfile.search.match_error, design.errors.max_error
             if error > most:
@@ -293,63 +312,63 @@ class _Hunt:
         except Unreachable as error:
             self.short = error
             return None
-        bench = self._bench(choice, found, design, BOARDS)
+        bench = self._bench(choice, responses, design, BOARDS)
         scored = tuple(
             score(
                 bench, r.spec, [OperatingPoint(r.omega, r.b, r.orbit.start)], BOARDS, progress=step
             )[0]
-            for r in found
+            for r in responses
         )
         self.places += len(scored)
-        return Candidate(choice, design, found, scored)
+        return Candidate(choice, design, responses, scored)
 
     def _contributions(self, start: Candidate | None, final: Candidate) -> tuple[Contribution, ...]:
         """One lever at a time: moved from the match design, and moved back from the final one."""
         if start is None:
             return ()
         out = []
-        if final.shown_at != start.shown_at:
+        if final.wanted != start.wanted:
             out.append(
                 Contribution(
                     PLACES,
                     "middle of the widest window",
                     "chosen",
-                    self._rank(start.choice, final.found),
-                    self._rank(final.choice, start.found),
+                    self._rank(start.choice, final.model_responses),
+                    self._rank(final.choice, start.model_responses),
                 )
             )
-        slowed = bool(self.heard) and not self.heard[0].kept
+        slowed = bool(self.checks) and not self.checks[0].adopted
         for lever in LEVERS:
             before, after = start.choice.get(lever), final.choice.get(lever)
             if before != after:
                 out.append(
                     Contribution(
                         lever,
-                        _shown(before),
-                        _shown(after),
-                        self._rank(start.choice.with_lever(lever, after), start.found),
-                        self._rank(final.choice.with_lever(lever, before), final.found),
+                        _setting_text(before),
+                        _setting_text(after),
+                        self._rank(start.choice.with_lever(lever, after), start.model_responses),
+                        self._rank(final.choice.with_lever(lever, before), final.model_responses),
                         "ngspice" if slowed and lever == "time scale" else "exact",
                     )
                 )
         return tuple(out)
 
     def _rank(
-        self, choice: DesignChoice, found: tuple[ModelResponse, ...]
+        self, choice: DesignChoice, responses: tuple[ModelResponse, ...]
     ) -> tuple[float, float] | None:
-        made = self._candidate(choice, found, "what a lever is worth")
-        return None if made is None else made.rank
+        candidate = self._candidate(choice, responses, "what a lever is worth")
+        return None if candidate is None else candidate.rank
 
     def _there(self, spec: Response, ranked: Sequence[OperatingPoint]) -> ModelResponse:
         """The first of these places at which ``find_responses.find`` meets the response too."""
         model = self.modelfile.model
         for place in ranked:
-            asked = replace(spec, omega=place.omega, b=place.b)
+            wanted = replace(spec, omega=place.omega, b=place.b)
             if spec.b is None and place.b == model.b:
-                asked = replace(asked, b=None)
-            found = find_responses.find(model, [asked])[0]
-            if found.found:
-                return found
+                wanted = replace(wanted, b=None)
+            response = find_responses.find(model, [wanted])[0]
+            if response.found:
+                return response
         raise self._nowhere(self.modelfile.responses.index(spec), spec)
 
     def _nowhere(self, number: int, spec: Response) -> InputError:
@@ -362,35 +381,37 @@ class _Hunt:
             "within this range",
         )
 
-    def _resolved(self, choice: DesignChoice, found: Sequence[ModelResponse]) -> ModelFile:
-        wanted = tuple(r.spec for r in found)
+    def _resolved(self, choice: DesignChoice, responses: Sequence[ModelResponse]) -> ModelFile:
+        wanted = tuple(r.spec for r in responses)
         return replace(
             self.modelfile, circuit=choice.spec(self.modelfile.circuit), responses=wanted
         )
 
-    def _made(self, best: Candidate) -> Synthesis:
+    def _synthesis(self, best: Candidate) -> Synthesis:
         """The final design with its certificate whole: what each condition costs included."""
-        self.said.stage("the design that was found, what its conditions cost")
+        self.progress.stage("the design that was found, what its conditions cost")
         model, spec = self.modelfile.model, best.choice.spec(self.modelfile.circuit)
-        held = find_responses.peaks(model, best.found)
+        responses = best.model_responses
+        model_peaks = find_responses.peaks(model, responses)
         design = parts_choice.synthesise(
-            model, spec, self.catalog, held, best.found, aims=best.choice.aims
+            model, spec, self.catalog, model_peaks, responses, aims=best.choice.aims
         )
-        return Synthesis(self._resolved(best.choice, best.found), self.catalog, best.found, design)
+        modelfile = self._resolved(best.choice, responses)
+        return Synthesis(modelfile, self.catalog, responses, design)
 
-    def _note(self, lever: str, setting: str, made: Candidate | None, kept: bool) -> None:
-        rank = None if made is None else made.rank
-        reason = str(self.short) if made is None else ""
-        self.steps.append(Step(lever, setting, rank, kept, reason))
-        if made is not None:
-            worst = float(norm.cdf(made.rank[0]))
-            self.said.note(
-                f"  {lever}: {setting}: smallest distance {made.rank[0]:.2f} σ "
-                f"(predicted yield {worst:.4f}){', kept' if kept else ''}"
+    def _note(self, lever: str, setting: str, candidate: Candidate | None, adopted: bool) -> None:
+        rank = None if candidate is None else candidate.rank
+        reason = str(self.short) if candidate is None else ""
+        self.steps.append(Step(lever, setting, rank, adopted, reason))
+        if candidate is not None:
+            worst = float(norm.cdf(candidate.rank[0]))
+            self.progress.note(
+                f"  {lever}: {setting}: smallest distance {candidate.rank[0]:.2f} σ "
+                f"(predicted yield {worst:.4f}){', kept' if adopted else ''}"
             )
 
 
-def _shown(value: object) -> str:
+def _setting_text(value: object) -> str:
     if isinstance(value, tuple):
         return " to ".join(f"{v:.4g}" for v in value) + " Hz"
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -49,7 +49,7 @@ class StretchCounts:
 
     stretches: tuple[float, ...]
     """Factors that the spread is stretched by."""
-    asked: tuple[int, ...]
+    samples: tuple[int, ...]
     """For each stretch, boards that were asked."""
     ok: tuple[int, ...]
     """For each stretch, boards that show the response."""
@@ -59,15 +59,15 @@ class StretchCounts:
         """d, as above. Half a loss is added at the largest stretch, so that it is finite."""
         scale = 1.0 / np.array(self.stretches)
         ok = np.array(self.ok, dtype=float)
-        lost = np.array(self.asked, dtype=float) - ok
+        lost = np.array(self.samples, dtype=float) - ok
         lost[int(np.argmin(scale))] += 0.5
 
         def against(d: float) -> float:
             z = d * scale
             return -float(np.sum(ok * norm.logcdf(z) + lost * norm.logcdf(-z)))
 
-        found = minimize_scalar(against, bounds=(-FARTHEST, FARTHEST), method="bounded")
-        return round(float(found.x), 4)
+        fit = minimize_scalar(against, bounds=(-FARTHEST, FARTHEST), method="bounded")
+        return round(float(fit.x), 4)
 
     @property
     def predicted(self) -> float:
@@ -108,10 +108,10 @@ class Stretched:
     ) -> None:
         self.design, self.count, self.jobs = design, count, jobs
         self._memory = AnswerCache() if memory is None else memory
-        drawn = draw_many(design.circuit, spread, seed, range(count), STREAM)
+        boards = draw_many(design.circuit, spread, seed, range(count), STREAM)
         rows = [0] + [i for _ in LADDER for i in range(count)]
         shares = np.concatenate([[0.0], np.repeat(LADDER, count)])
-        self._boards = Ensemble(between(drawn.take(rows), shares), jobs=jobs)
+        self._boards = Ensemble(between(boards.take(rows), shares), jobs=jobs)
         circuit = design.circuit
         self._whose = [circuit.opamp, sorted(circuit.values.items()), plain(spread.as_dict()), seed]
 
@@ -121,9 +121,9 @@ class Stretched:
             return []
         drives = [self.excitation(place).drive for _, place in wanted]
         starts = np.array([p.start * self.design.volts(p.b) for _, p in wanted])
-        found = self._boards.quick([0] * len(wanted), drives, starts, jobs=self.jobs)
+        orbits = self._boards.quick([0] * len(wanted), drives, starts, jobs=self.jobs)
         out: list[Stand | None] = []
-        for (spec, place), drive, orbit in zip(wanted, drives, found, strict=True):
+        for (spec, place), drive, orbit in zip(wanted, drives, orbits, strict=True):
             fine = orbit is not None and judge(orbit, spec, orbit)[0] is Verdict.OK
             out.append(Stand(spec, place, drive, orbit) if fine and orbit is not None else None)
         return out
@@ -136,14 +136,14 @@ class Stretched:
         progress: Callable[[], None] = lambda: None,
     ) -> list[StretchCounts]:
         """What these boards show at each place. stretches : some of ``LADDER``."""
-        said = [self.said(stand, boards, stretches) for stand in stands]
+        queries = [self.query(stand, boards, stretches) for stand in stands]
 
         def make(new: list[int]) -> list[tuple[int, ...]]:
             return self._made([stands[k] for k in new], boards, stretches, progress)
 
-        asked = (len(boards),) * len(stretches)
-        known = self._memory.get_all(said, make)
-        return [StretchCounts(tuple(stretches), asked, ok) for ok in known]
+        samples = (len(boards),) * len(stretches)
+        answers = self._memory.get_all(queries, make)
+        return [StretchCounts(tuple(stretches), samples, ok) for ok in answers]
 
     def _made(
         self,
@@ -158,18 +158,18 @@ class Stretched:
         which = [row for row in rows for _ in stands]
         drives = [s.drive for _ in rows for s in stands]
         starts = np.array([s.orbit.start for _ in rows for s in stands])
-        found = self._boards.quick(which, drives, starts, jobs=self.jobs, progress=progress)
-        fine = [_shows(orbit, stands[k % len(stands)]) for k, orbit in enumerate(found)]
+        orbits = self._boards.quick(which, drives, starts, jobs=self.jobs, progress=progress)
+        fine = [_shows(orbit, stands[k % len(stands)]) for k, orbit in enumerate(orbits)]
         ok = np.array(fine).reshape(len(rungs), len(boards), len(stands)).sum(axis=1)
         return [tuple(int(v) for v in ok[:, k]) for k in range(len(stands))]
 
-    def said(self, stand: Stand, boards: range, stretches: Sequence[float]) -> object:
+    def query(self, stand: Stand, boards: range, stretches: Sequence[float]) -> object:
         """Everything that decides an answer, as plain data."""
         drive, spec = stand.drive, stand.spec
         setting = [drive.omega, drive.amplitude, *(float(v) for v in stand.orbit.start)]
         wanted = [str(spec.expect), spec.twin, spec.symmetric]
-        asked = [boards.start, boards.stop, list(stretches)]
-        return [self._whose, nine_digits(setting), wanted, asked]
+        extent = [boards.start, boards.stop, list(stretches)]
+        return [self._whose, nine_digits(setting), wanted, extent]
 
     def excitation(self, place: OperatingPoint) -> Excitation:
         """The generator's setting for a place."""
@@ -184,11 +184,11 @@ class Stretched:
         """Those of these boards that show the response at this stretch, for ngspice."""
         rows = [1 + LADDER.index(stretch) * self.count + i for i in boards]
         starts = np.tile(stand.orbit.start, (len(rows), 1))
-        found = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
+        orbits = self._boards.quick(rows, [stand.drive] * len(rows), starts, jobs=self.jobs)
         excitation = self.excitation(stand.place)
         return [
             GateSubject(self._boards.reduction(row), excitation, orbit)
-            for row, orbit in zip(rows, found, strict=True)
+            for row, orbit in zip(rows, orbits, strict=True)
             if orbit is not None and _shows(orbit, stand)
         ]
 

@@ -84,18 +84,20 @@ def topologies(modelfile: ModelFile, catalog: Catalog) -> list[DesignChoice]:
     ------
     InputError : an op-amp that the catalogue does not have.
     """
-    own, spec = DesignChoice.of(modelfile.circuit), modelfile.search
+    file_choice, spec = DesignChoice.of(modelfile.circuit), modelfile.search
     for name in spec.opamps:
         try:
             catalog.opamp(name, modelfile.circuit.supply)
         except InputError as error:
             field = "search.opamps" if error.field == "circuit.opamp" else error.field
             raise InputError(None, field, error.found, error.expected) from None
-    opamps = spec.opamps or (own.opamp,)
-    found = [
-        replace(own, opamp=opamp, dead_zone=zone) for opamp in opamps for zone in spec.dead_zones
+    opamps = spec.opamps or (file_choice.opamp,)
+    choices = [
+        replace(file_choice, opamp=opamp, dead_zone=zone)
+        for opamp in opamps
+        for zone in spec.dead_zones
     ]
-    return sorted(found, key=lambda choice: choice != own)
+    return sorted(choices, key=lambda choice: choice != file_choice)
 
 
 def variants(choice: DesignChoice, lever: str) -> Iterator[DesignChoice]:

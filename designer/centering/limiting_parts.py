@@ -90,8 +90,8 @@ def together(circuit: Circuit, spread: Spread, seed: int) -> Boards | None:
     return draw_many(circuit, spread, seed, range(TOGETHER), STREAM)
 
 
-def limiting(margin: Margin, drawn: Boards | None = None) -> Limiting:
-    """What limits a response, by its margin. drawn : see ``together``."""
+def limiting(margin: Margin, boards: Boards | None = None) -> Limiting:
+    """What limits a response, by its margin. boards : see ``together``."""
     if margin.sought and margin.there > HALF * margin.sought:
         border = f"another attractor takes over: {margin.there} of {margin.sought} lost boards"
         return Limiting(
@@ -100,7 +100,7 @@ def limiting(margin: Margin, drawn: Boards | None = None) -> Limiting:
     if not margin.limits:
         return Limiting(NOTHING, "", float("nan"), {}, NOTHING)
     limit = margin.limits[0]
-    moved = shares(margin.quantities, limit, drawn)
+    moved = shares(margin.quantities, limit, boards)
     first = max(moved, key=lambda name: moved[name])
     mechanism = GRAZING if limit.kind in ("contact", "miss", "parting") else NEIGHBOUR
     if first != COEFFICIENTS and moved[first] >= HALF:
@@ -115,26 +115,26 @@ def limiting(margin: Margin, drawn: Boards | None = None) -> Limiting:
 
 
 def shares(
-    quantities: Sequence[Quantity], limit: Limit, drawn: Boards | None = None
+    quantities: Sequence[Quantity], limit: Limit, boards: Boards | None = None
 ) -> dict[str, float]:
     """Of the variance of a limit, by what moves it; they sum to 1.
 
-    drawn : boards on which quantities vary together; None: each varies by itself. A cause's share
+    boards : boards on which quantities vary together; None: each varies by itself. A cause's share
     is the covariance of what it adds with the whole: below 0 where it takes off what another adds.
     """
     total = dict.fromkeys(NAMES, 0.0)
-    if drawn is None:
+    if boards is None:
         for quantity, slope in zip(quantities, limit.slopes, strict=True):
             total[cause(quantity)] += float(slope) ** 2
     else:
-        added = {name: np.zeros(len(drawn)) for name in NAMES}
+        added = {name: np.zeros(len(boards)) for name in NAMES}
         for q, slope in zip(quantities, limit.slopes, strict=True):
-            away = column(drawn, q) - q.nominal
+            away = column(boards, q) - q.nominal
             added[cause(q)] += float(slope) / q.sigma * (away - away.mean())
         form = np.sum(list(added.values()), axis=0)
         total = {name: float(np.mean(one * form)) for name, one in added.items()}
-    whole = float(np.sum(list(total.values())))
-    return {name: value / whole if whole > 0.0 else 0.0 for name, value in total.items()}
+    variance = float(np.sum(list(total.values())))
+    return {name: value / variance if variance > 0.0 else 0.0 for name, value in total.items()}
 
 
 def cause(quantity: Quantity) -> str:

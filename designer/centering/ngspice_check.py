@@ -79,12 +79,17 @@ class Listener:
         """For each response; where the nominal board does not show it there is nothing to ask."""
         out = []
         for stand in stands:
-            found = Agreement(0, 0)
+            agreement = Agreement(0, 0)
             if stand is not None:
-                said = [RUNG, REFINEMENTS, LONGEST, bench.said(stand, range(LISTENED), (STRETCH,))]
-                (known,) = self._memory.get_all([said], partial(self._ask, bench, stand))
-                found = Agreement(*known)
-            out.append(found)
+                query = [
+                    RUNG,
+                    REFINEMENTS,
+                    LONGEST,
+                    bench.query(stand, range(LISTENED), (STRETCH,)),
+                ]
+                (counts,) = self._memory.get_all([query], partial(self._ask, bench, stand))
+                agreement = Agreement(*counts)
+            out.append(agreement)
             progress()
         return tuple(out)
 
@@ -99,12 +104,12 @@ class Listener:
         if not nominal.passed:
             return [(len(there), 0, len(there))]
         queries = [Query(s, nominal.settings, s.orbit.response, REFINEMENTS) for s in near]
-        kept = [
+        survivals = [
             survives(stand.spec.completed(stand.orbit), h.response, h.either, symmetric=h.symmetric)
             for h in run_queries(self._pool, queries)
         ]
-        answers = len(kept) - kept.count(None)
-        return [(len(there), kept.count(True), len(there) - answers)]
+        answers = len(survivals) - survivals.count(None)
+        return [(len(there), survivals.count(True), len(there) - answers)]
 
 
 def _started(subject: GateSubject) -> GateSubject:

@@ -80,13 +80,13 @@ def best_points(
     first = score(bench, spec, scanned, SCAN, SCANNED, progress)
     # The scan's distances are coarse: among equals the middle of a wide stretch comes first.
     second = score(bench, spec, [s.place for s in best(first, KEPT)], SOME, LADDER, progress)
-    tried, found = len(scanned) + len(second), []
+    count, scored = len(scanned) + len(second), []
     for start in best(second, STARTS):
         step = _step(stretches, start.place)
         ways, more = _pattern(bench, spec, start.place, room, step, progress)
-        found += ways
-        tried += more
-    return best(found, len(found)), tried
+        scored += ways
+        count += more
+    return best(scored, len(scored)), count
 
 
 def score(
@@ -108,9 +108,9 @@ def score(
     ]
 
 
-def best(found: Sequence[Scored], count: int) -> list[Scored]:
+def best(scored: Sequence[Scored], count: int) -> list[Scored]:
     """Those of the largest distances that the nominal board shows; the earlier of equals first."""
-    there = [s for s in found if s.stand is not None]
+    there = [s for s in scored if s.stand is not None]
     return sorted(there, key=lambda s: -s.distance)[:count]
 
 
@@ -129,30 +129,30 @@ def _pattern(
     progress: Callable[[], None],
 ) -> tuple[list[Scored], int]:
     """Places met by a pattern search over (ln ω, ln b)."""
-    known = {(start.omega, start.b): score(bench, spec, [start], MANY, LADDER[1:], progress)[0]}
-    centre, halved, wide = known[start.omega, start.b], 0, 0.5 * CLEARANCE_STEP
+    scored_at = {(start.omega, start.b): score(bench, spec, [start], MANY, LADDER[1:], progress)[0]}
+    centre, halved, wide = scored_at[start.omega, start.b], 0, 0.5 * CLEARANCE_STEP
     for _ in range(MOST):
         if halved == PATTERN:
             break
         steps = itertools.product((-1, 0, 1), repeat=2)
         pairs = (
             (
-                _held(centre.place.omega * math.exp(i * step), room.omega),
-                _held(centre.place.b * math.exp(j * wide), room.b),
+                _clamped(centre.place.omega * math.exp(i * step), room.omega),
+                _clamped(centre.place.b * math.exp(j * wide), room.b),
             )
             for i, j in steps
         )
-        new = [pair for pair in dict.fromkeys(pairs) if pair not in known]
+        new = [pair for pair in dict.fromkeys(pairs) if pair not in scored_at]
         around = [replace(centre.place, omega=omega, b=b) for omega, b in new]
         for scored in score(bench, spec, around, MANY, LADDER[1:], progress):
-            known[scored.place.omega, scored.place.b] = scored
-        top = max(known.values(), key=lambda s: s.distance)
+            scored_at[scored.place.omega, scored.place.b] = scored
+        top = max(scored_at.values(), key=lambda s: s.distance)
         if top.distance > centre.distance:
             centre = top
         else:
             step, wide, halved = 0.5 * step, 0.5 * wide, halved + 1
-    return list(known.values()), len(known)
+    return list(scored_at.values()), len(scored_at)
 
 
-def _held(value: float, ends: tuple[float, float]) -> float:
+def _clamped(value: float, ends: tuple[float, float]) -> float:
     return min(max(value, ends[0]), ends[1])

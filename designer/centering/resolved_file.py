@@ -15,29 +15,31 @@ from designer.model.find_responses import ModelResponse
 from designer.model.model_file import ModelFile, parse_model_file
 
 
-def resolved(asked: ModelFile, made: Synthesis, choice: DesignChoice, source: Path) -> ModelFile:
+def resolved(
+    modelfile: ModelFile, synthesis: Synthesis, choice: DesignChoice, source: Path
+) -> ModelFile:
     """The model file that a design folder holds, as if read from ``source``.
 
     ω and b of each response, op-amp and dead zone are values; ``objective`` stays "yield". What
     the synthesis aimed at inside its conditions is no key of a model file: the parts stand in
     ``design.json``.
     """
-    text = _text(asked, made.found, choice)
+    text = _text(modelfile, synthesis.model_responses, choice)
     file = parse_model_file(text, source)
-    return replace(file, measured=asked.measured)
+    return replace(file, measured=modelfile.measured)
 
 
-def _text(asked: ModelFile, found: Sequence[ModelResponse], choice: DesignChoice) -> str:
-    data: dict[str, Any] = tomllib.loads(asked.text.lstrip("\ufeff"))
-    data.setdefault("title", asked.title)
-    for table, spec, response in zip(data["response"], asked.responses, found, strict=True):
+def _text(modelfile: ModelFile, responses: Sequence[ModelResponse], choice: DesignChoice) -> str:
+    data: dict[str, Any] = tomllib.loads(modelfile.text.lstrip("\ufeff"))
+    data.setdefault("title", modelfile.title)
+    for table, spec, response in zip(data["response"], modelfile.responses, responses, strict=True):
         if spec.omega is None:
             table["omega"] = response.omega
         if isinstance(spec.b, tuple):
             table["b"] = response.b
     circuit = data.setdefault("circuit", {})
     circuit |= {"opamp": choice.opamp, "dead_zone": choice.dead_zone}
-    if choice.opamp != asked.circuit.opamp:
+    if choice.opamp != modelfile.circuit.opamp:
         circuit.pop("saturation", None)  # it was stated for the other op-amp
     order = ["format", "title", "model", "mechanical", "response", "circuit"]
     first = {key: data[key] for key in order if key in data}

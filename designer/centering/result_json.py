@@ -8,7 +8,7 @@ from typing import Any
 
 from scipy.stats import norm
 
-from designer.centering.candidate import Candidate, Contribution, Searched
+from designer.centering.candidate import Candidate, Contribution, SearchResult
 from designer.centering.design_search import BOARDS
 from designer.centering.distance import LADDER, STREAM
 from designer.centering.levers import DesignChoice
@@ -19,54 +19,54 @@ from designer.verdicts.verdict import Answer, Verdict
 Rank = tuple[float, float] | None
 
 
-def search_json(found: Searched) -> dict[str, Any]:
+def search_json(result: SearchResult) -> dict[str, Any]:
     """``search.json``: the levers, what each contributed, what was tried, what is predicted."""
     return {
         "format": 1,
-        "seed": found.seed,
+        "seed": result.seed,
         "stream": STREAM,
         "stretches": list(LADDER),
         "boards": BOARDS,
-        "designs_tried": found.candidates,
-        "places_tried": found.places,
-        "objective": _rank(found.final.rank),
-        "choice": _choice(found.final.choice),
-        "start": None if found.start is None else _candidate(found.start),
-        "final": _candidate(found.final),
+        "designs_tried": result.candidates,
+        "places_tried": result.places,
+        "objective": _rank(result.final.rank),
+        "choice": _choice(result.final.choice),
+        "start": None if result.start is None else _candidate(result.start),
+        "final": _candidate(result.final),
         "steps": [
             {
                 "lever": s.lever,
                 "setting": s.setting,
                 **_rank(s.rank),
-                "kept": s.kept,
+                "kept": s.adopted,
                 "reason": s.reason,
             }
-            for s in found.steps
+            for s in result.steps
         ],
-        "contributions": [_contribution(c) for c in found.contributions],
+        "contributions": [_contribution(c) for c in result.contributions],
         "ngspice": {
             "rung": RUNG,
             "stretch": STRETCH,
             "designs": [
                 {
                     "frequency_hz": row.frequency,
-                    "kept": row.kept,
+                    "kept": row.adopted,
                     "responses": [{**h.__dict__, "borne_out": h.borne_out} for h in row.agreements],
                 }
-                for row in found.heard
+                for row in result.checks
             ],
         },
         "windows": [
             [{"b": s.b, "from": s.low, "to": s.high, "steps": len(s.places)} for s in row]
-            for row in found.windows
+            for row in result.windows
         ],
     }
 
 
 def confirmation_json(
-    heard: Sequence[CrossCheck],
+    checks: Sequence[CrossCheck],
     answers: Mapping[tuple[int, int], Answer],
-    asked: Sequence[int],
+    response_of: Sequence[int],
     responses: int,
 ) -> list[dict[str, Any]]:
     """What ngspice's rung said of boards of the study, by response.
@@ -75,13 +75,13 @@ def confirmation_json(
     """
     out: list[dict[str, Any]] = []
     for index in range(responses):
-        own = [h for h in heard if asked[h.question] == index]
-        ok = [answers[h.sample, h.question].verdict is Verdict.OK for h in own]
-        agreed = [h.agrees(answers[h.sample, h.question]) is True for h in own]
-        differ = [h for h, same in zip(own, agreed, strict=True) if not same]
+        of_response = [h for h in checks if response_of[h.question] == index]
+        ok = [answers[h.sample, h.question].verdict is Verdict.OK for h in of_response]
+        agreed = [h.agrees(answers[h.sample, h.question]) is True for h in of_response]
+        differ = [h for h, same in zip(of_response, agreed, strict=True) if not same]
         out.append(
             {
-                "asked": len(own),
+                "asked": len(of_response),
                 "agreed": sum(agreed),
                 "ok_on_both": sum(a and b for a, b in zip(ok, agreed, strict=True)),
                 "differences": [
@@ -111,11 +111,11 @@ def _choice(choice: DesignChoice) -> dict[str, Any]:
     }
 
 
-def _candidate(made: Candidate) -> dict[str, Any]:
+def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
-        "max_error": made.design.errors.max_error,
-        "threshold_v": made.design.errors.scales.threshold,
-        **_rank(made.rank),
+        "max_error": candidate.design.errors.max_error,
+        "threshold_v": candidate.design.errors.scales.threshold,
+        **_rank(candidate.rank),
         "responses": [
             {
                 "omega": r.omega,
@@ -125,7 +125,7 @@ def _candidate(made: Candidate) -> dict[str, Any]:
                 "predicted_yield": s.counts.predicted if s.stand is not None else 0.0,
                 "ok": list(s.counts.ok),
             }
-            for r, s in zip(made.found, made.scored, strict=True)
+            for r, s in zip(candidate.model_responses, candidate.scored, strict=True)
         ],
     }
 

@@ -125,23 +125,23 @@ def stretches(
         if b not in swept:
             subject = ModelSubject(model.at(b))
             plan = SweepPlan(subject, "omega", omegas, tracks=(DOWN, UP), course=COURSE)
-            found = sweep.run(plan, jobs)
-            swept[b] = [found.steps[DOWN], found.steps[UP]]
+            result = sweep.run(plan, jobs)
+            swept[b] = [result.steps[DOWN], result.steps[UP]]
             progress()
         return swept[b]
 
     out = []
     for number, response in enumerate(wanted, start=1):
-        found: list[Stretch] = []
+        windows: list[Stretch] = []
         for b in clearances(model, response):
             if response.omega is None:
-                found += _runs(response, omegas, b, at(b))
+                windows += _runs(response, omegas, b, at(b))
             else:
-                found += _single(model, response, response.omega, b)
-        if not found:
+                windows += _single(model, response, response.omega, b)
+        if not windows:
             _refuse(number, response, band)
-        found.sort(key=lambda s: (-len(s.places), s.b, s.low))
-        out.append(tuple(found))
+        windows.sort(key=lambda s: (-len(s.places), s.b, s.low))
+        out.append(tuple(windows))
     return tuple(out)
 
 
@@ -188,22 +188,22 @@ def _runs(
 
 
 def _single(model: MechanicalModel, response: Response, omega: float, b: float) -> list[Stretch]:
-    found = find_responses.find(model, [replace(response, omega=omega, b=b)])[0]
-    return [Stretch((OperatingPoint(omega, b, found.orbit.start),))] if found.found else []
+    steady = find_responses.find(model, [replace(response, omega=omega, b=b)])[0]
+    return [Stretch((OperatingPoint(omega, b, steady.orbit.start),))] if steady.found else []
 
 
 def _refuse(number: int, response: Response, band: tuple[float, float]) -> None:
     ranged = isinstance(response.b, tuple)
     field = "omega" if response.omega is None else "b" if ranged else "omega"
-    found: object = "best" if response.omega is None else response.omega
+    value: object = "best" if response.omega is None else response.omega
     if field == "b":
-        found = list(response.b) if isinstance(response.b, tuple) else response.b
-    where = f"ω from {band[0]:g} to {band[1]:g}" if response.omega is None else "it"
+        value = list(response.b) if isinstance(response.b, tuple) else response.b
+    region = f"ω from {band[0]:g} to {band[1]:g}" if response.omega is None else "it"
     raise InputError(
         None,
         f"response[{number}].{field}",
-        found,
-        f"a place at which the model shows {response.expect}: it has no window over {where}"
+        value,
+        f"a place at which the model shows {response.expect}: it has no window over {region}"
         + (" and this range of b" if ranged else " at this b")
         + ("; search.omega says where to look" if response.omega is None else ""),
     )

@@ -71,7 +71,7 @@ def response_runs(made: Synthesis) -> tuple[ResponseRun, ...]:
 
 
 def _responses(made: Synthesis) -> tuple[ModelResponse, ...]:
-    return made.found or find(made.design.model, [Response(1.0)])
+    return made.model_responses or find(made.design.model, [Response(1.0)])
 
 
 def _excitation(made: Synthesis, response: ModelResponse) -> Excitation:
@@ -101,10 +101,11 @@ def _run(made: Synthesis, response: ModelResponse) -> ResponseRun:
 def circuit_notes(made: Synthesis, run: FirstRun) -> tuple[str, ...]:
     """For ``circuit.cir``. run : what it shows."""
     drive = run.excitation
-    if made.found:
-        first = made.found[0]
+    if made.model_responses:
+        first = made.model_responses[0]
         wanted = f", expected {first.expected}" if first.expected else ""
-        shown = f"number 1 of {len(made.found)} in the model file, omega {first.omega:g}{wanted}"
+        count = len(made.model_responses)
+        shown = f"number 1 of {count} in the model file, omega {first.omega:g}{wanted}"
     else:
         shown = "the model file wants none, so omega is 1"
     return (

@@ -305,7 +305,7 @@ def _circuit_orbits(
 ) -> tuple[ModelResponse, Flow, list[Orbit]]:
     """The wanted orbit first, in volts and seconds; with ``scan`` what is reached from rest."""
     with naming(made.modelfile):
-        known = [r for r in made.found if r.spec is spec]
+        known = [r for r in made.model_responses if r.spec is spec]
         (r,) = known or find(made.modelfile.model, [spec])
     flow = circuit_flow(nominal.nominal_reduction(made.design).system(), made.design, r)
     volts = made.design.volts(r.b)

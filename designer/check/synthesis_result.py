@@ -26,14 +26,15 @@ class Synthesis:
     """The model file."""
     catalog: Catalog
     """The catalogue that parts were chosen from."""
-    found: tuple[ModelResponse, ...]
-    """What its model shows of the wanted responses."""
+    model_responses: tuple[ModelResponse, ...]
+    """The wanted responses as the model shows them."""
     design: Design
     """The parts chosen for it."""
     seconds: float = 0.0
     """Wall time [s]."""
 
     def _repr_html_(self) -> str:
+        responses = self.model_responses
         rows = [
             {
                 "omega": r.omega,
@@ -42,7 +43,7 @@ class Synthesis:
                 "frequency_hz": s.frequency_hz,
                 "amplitude_v_peak": s.amplitude_v_peak,
             }
-            for r, s in zip(self.found, settings(self.design, self.found), strict=True)
+            for r, s in zip(responses, settings(self.design, responses), strict=True)
         ]
         note = f"largest coefficient error {self.design.errors.max_error:.3g}"
         return table_html(self.modelfile.title, rows, note)
@@ -61,10 +62,10 @@ def synthesise(modelfile: ModelFile, catalog: Catalog | None = None) -> Synthesi
         choice = modelfile.model, modelfile.circuit, catalog
         check_choices(*choice)
         check_names(modelfile, unit_circuit(*choice), catalog)
-        found = find(modelfile.model, modelfile.responses)
-        design = parts_choice.synthesise(*choice, peaks(modelfile.model, found), found)
+        responses = find(modelfile.model, modelfile.responses)
+        design = parts_choice.synthesise(*choice, peaks(modelfile.model, responses), responses)
         spread_of(modelfile, design.circuit, catalog)  # refuses what this design's boards cannot be
-    return Synthesis(modelfile, catalog, found, design, time.perf_counter() - began)
+    return Synthesis(modelfile, catalog, responses, design, time.perf_counter() - began)
 
 
 synthesize = synthesise

@@ -48,8 +48,8 @@ class RuleSubject:
         return self.made.catalog
 
     @property
-    def found(self) -> Sequence[ModelResponse]:
-        return self.made.found
+    def model_responses(self) -> Sequence[ModelResponse]:
+        return self.made.model_responses
 
     @property
     def opamp(self) -> OpAmp:
@@ -63,12 +63,12 @@ class RuleSubject:
 
     @cached_property
     def _runs(self) -> tuple[list[Run], dict[str, str]]:
-        if not self.found:
+        if not self.model_responses:
             raise NotRun("the model file wants no response, so nothing says what the board does")
         system = self.reduction.system()
-        drives = [circuit_flow(system, self.design, r).drive for r in self.found]
-        orbits = [on_circuit(system, self.design, r) for r in self.found]
-        return output_loads.runs([r.omega for r in self.found], drives, orbits)
+        drives = [circuit_flow(system, self.design, r).drive for r in self.model_responses]
+        orbits = [on_circuit(system, self.design, r) for r in self.model_responses]
+        return output_loads.runs([r.omega for r in self.model_responses], drives, orbits)
 
     @cached_property
     def operating(self) -> Operating:
@@ -98,13 +98,13 @@ class RuleSubject:
     @cached_property
     def drive(self) -> float:
         """Smallest amplitude of the wanted responses [V]."""
-        wanted = [self.design.amplitude(r.b, r.omega) for r in self.found]
+        wanted = [self.design.amplitude(r.b, r.omega) for r in self.model_responses]
         return min(wanted, default=self.design.amplitude())
 
     @cached_property
     def fastest(self) -> float:
         """Frequency of the highest harmonic that matters [Hz]."""
-        highest = peaks(self.design.model, self.found).fastest
+        highest = peaks(self.design.model, self.model_responses).fastest
         return highest / (2.0 * np.pi * self.design.errors.scales.seconds)
 
     @cached_property

@@ -145,7 +145,7 @@ def question(
 
     settings : of ngspice, those that passed the gate.
     """
-    response = made.found[number - 1]
+    response = made.model_responses[number - 1]
     if not response.found:
         return "the model does not show it"
     nominal = rungs.subject(made, response)

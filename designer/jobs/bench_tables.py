@@ -74,7 +74,7 @@ def setup_csv(
 def start_recipes(made: Synthesis, jobs: int = 1) -> tuple[Recipe | None, ...]:
     """A start recipe for each response of a design, found on its circuit; None where the model or
     the nominal circuit does not show it."""
-    checked = checked_design.check(made.design, made.found, None)
+    checked = checked_design.check(made.design, made.model_responses, None)
     shown = [
         i
         for i, c in enumerate(checked)

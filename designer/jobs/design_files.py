@@ -51,8 +51,8 @@ def texts(made: Synthesis) -> dict[str, str]:
     return {
         MODEL: modelfile.text,
         "circuit.cir": circuit_deck(made),
-        SETUP: setup_csv(design, made.found, start_recipes(made, cores()), modelfile.si),
-        "scales.csv": scales_csv(modelfile, design, made.found),
+        SETUP: setup_csv(design, made.model_responses, start_recipes(made, cores()), modelfile.si),
+        "scales.csv": scales_csv(modelfile, design, made.model_responses),
         **board_files.texts(made),
     }
 
@@ -80,7 +80,7 @@ def answer(made: Synthesis) -> dict[str, Any]:
     return synthesis_json(
         made.modelfile,
         made.design,
-        made.found,
+        made.model_responses,
         design_provenance(made),
         made.seconds,
         better_grades(made.modelfile, made.design.circuit, made.catalog),

@@ -104,8 +104,8 @@ def searched_into(
             listen=Listener(pool, memory),
             progress=progress,
         )
-    final = resolved(modelfile, searched.made, searched.final.choice, out / MODEL)
-    made = replace(searched.made, modelfile=final, seconds=time.perf_counter() - began)
+    final = resolved(modelfile, searched.synthesis, searched.final.choice, out / MODEL)
+    made = replace(searched.synthesis, modelfile=final, seconds=time.perf_counter() - began)
     stages = design_stage(final, design_inputs(final, catalog))
     write_design(folder, made, stages, options, progress)
     if trade is not None:

@@ -319,7 +319,7 @@ def checks_in_memory(made: Synthesis, pool: SpicePool | None, progress: Progress
 
 def _equations(made: Synthesis, pool: SpicePool, progress: Progress) -> EquationCheck:
     progress.stage("ngspice, equation check")
-    return equation_check.check(made.design, made.found, pool)
+    return equation_check.check(made.design, made.model_responses, pool)
 
 
 def run_result(
@@ -343,7 +343,7 @@ def run_result(
     return RunResult(
         made.modelfile,
         made.catalog,
-        made.found,
+        made.model_responses,
         made.design,
         study.checked,
         study,

@@ -142,12 +142,12 @@ def measure(
     ------
     EnvironmentMissing : ngspice is missing.
     """
-    count = len(made.found)
+    count = len(made.model_responses)
     with SpicePool(jobs, timeout=TIMEOUT) as pool, SpicePool(1, timeout=TIMEOUT) as timed:
         require_ngspice(pool)
         clock = SpiceClock(timed)
         rungs = []
-        for number, r in enumerate(made.found, start=1):
+        for number, r in enumerate(made.model_responses, start=1):
 
             def rung(number: int = number, r: ModelResponse = r) -> dict[str, Any]:
                 progress.stage(f"response {number} of {count}, every rung")

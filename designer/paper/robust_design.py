@@ -153,7 +153,7 @@ def _searched(
     tuned: bool,
 ) -> dict[str, Any]:
     """A searched design: as built on all boards, reached (and tuned) on some."""
-    checked = checked_design.check(synthesis.design, synthesis.found, None)
+    checked = checked_design.check(synthesis.design, synthesis.model_responses, None)
     jobs = cores() if options.jobs is None else options.jobs
     asked = [c for c in checked if c.model.found]
     plan = plan_study(
@@ -189,7 +189,7 @@ def _searched(
         for i in range(len(checked) if rows is not None else 0):
             row["responses"][i][name] = _counted(count(study.rows_of(i, rows)))
     for i in range(len(checked)):
-        row["responses"][i]["b"] = synthesis.found[i].b
+        row["responses"][i]["b"] = synthesis.model_responses[i].b
     search = read_json(place / "search.json")
     keys = ("choice", "start", "final", "contributions", "designs_tried", "places_tried", "cost")
     return {**row, "search": {key: search[key] for key in keys}}

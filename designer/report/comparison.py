@@ -146,7 +146,7 @@ def compare(
     out = []
     for candidate in (*paper_values.candidates(model, spec, result.catalog), ours):
         progress(candidate.name)
-        out.append(column(candidate, model, result.found, spec, result.catalog))
+        out.append(column(candidate, model, result.model_responses, spec, result.catalog))
     return tuple(out)
 
 

@@ -230,7 +230,7 @@ class RunResult:
     """The model file."""
     catalog: Catalog
     """The catalogue."""
-    found: tuple[ModelResponse, ...]
+    model_responses: tuple[ModelResponse, ...]
     """What the model shows of the wanted responses."""
     design: Design
     """The design."""

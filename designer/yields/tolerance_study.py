@@ -83,7 +83,9 @@ def check(
     gates : see ``checked_design.check``.
     """
     stage = (Progress() if progress is None else progress).stage
-    return checked_design.check(synthesis.design, synthesis.found, pool, stage, gates=gates)
+    return checked_design.check(
+        synthesis.design, synthesis.model_responses, pool, stage, gates=gates
+    )
 
 
 def tolerance(

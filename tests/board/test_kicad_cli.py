@@ -168,7 +168,7 @@ def spice(folder: Path) -> str:
 def test_kicads_own_deck_shows_the_same_responses(tmp_path: Path) -> None:
     """An independent netlister for ours: at the gate's settings, the n-p-q of ``circuit.cir``."""
     made = synthesised()
-    wanted = [r for r in made.found if r.omega in (OMEGA[1], OMEGA[3], OMEGA[8])]
+    wanted = [r for r in made.model_responses if r.omega in (OMEGA[1], OMEGA[3], OMEGA[8])]
     assert [r.orbit.response for r in wanted] == ["1-1-1", "1-3-3", "1-8-8"]
     reduction = nominal.nominal_reduction(made.design)
     with SpicePool(1) as pool:

@@ -34,7 +34,7 @@ from designer.centering.cure_search import find_cure
 from designer.centering.cure_slots import PartSlot, network_slots, part_slots, trimmer_slot
 from designer.centering.cure_table import text
 from designer.centering.cure_trial import Cure
-from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_parts_kept
+from designer.centering.cure_upgrade import Upgrades, price, upgraded_file, with_same_parts
 from designer.centering.cure_ways import ResponseWay, best_place
 from designer.jobs import rung_choice
 from designer.jobs.cure_job import CURE, STUDIES, cure_into
@@ -76,7 +76,7 @@ def branch() -> CureBranch:
 def known_margin(nominal: float, otherwise: bool = False) -> Margin:
     """One linear limit in a few parts and an offset, of this nominal value."""
     weights = OTHERWISE if otherwise else WEIGHTS
-    made = branch().made
+    made = branch().synthesis
     circuit = made.design.circuit
     boards = draw_many(circuit, spread_of(made.modelfile, circuit, CATALOG), 3, range(4000))
     differing = quantities(circuit, boards)
@@ -92,7 +92,7 @@ def known_picture(nominal: float) -> LinearModel:
     """The picture of that limit: the better grades of a few parts are what can be bought."""
     from designer.centering import cure_linear_model
 
-    parts = tuple(p for p in part_slots(branch().made) if p.slot.name in SLOTS)
+    parts = tuple(p for p in part_slots(branch().synthesis) if p.slot.name in SLOTS)
     way = ResponseWay(0, "as it is", cast(Question, None), None, known_margin(nominal), 0.5)
     ratios = cure_linear_model._ratios(branch(), parts, 5)
     return LinearModel(branch(), parts, ((way,),), ratios, 0.0, 5)
@@ -102,7 +102,7 @@ def test_a_demand_holds_the_variance_of_the_drawn_boards() -> None:
     seen = known_picture(8.0)
     slots = len(seen.parts)
     assert [p.slot.name for p in seen.parts] == [
-        p.name for p in branch().made.design.circuit.resistors if p.name in SLOTS
+        p.name for p in branch().synthesis.design.circuit.resistors if p.name in SLOTS
     ]
     z = seen.quantiles(TARGET, seen.boards((0,) * (slots + 1)))
     demand = seen.program(z, {}).demands[0]
@@ -155,7 +155,7 @@ def searched(
     monkeypatch.setattr(cure_search, "picture", taken)
     monkeypatch.setattr(cure_search, "measure", real)
     monkeypatch.setattr(cure_measure, "measure", real)  # as measure_together calls it
-    monkeypatch.setattr(cure_search, "asked", lambda *_: [bench_plans.question(1)])
+    monkeypatch.setattr(cure_search, "questions_of", lambda *_: [bench_plans.question(1)])
     monkeypatch.setattr(cure_search, "branches", lambda *_: iter([branch()]))
     return find_cure(one_response(), TARGET, budget=budget, seed=1, jobs=1)
 
@@ -240,7 +240,7 @@ def test_the_picture_knows_what_missed(
 def one_response() -> Any:
     base = paper_cases.synthesised()
     file = replace(base.modelfile, responses=base.modelfile.responses[:1])
-    return replace(base, modelfile=file, found=base.found[:1])
+    return replace(base, modelfile=file, model_responses=base.model_responses[:1])
 
 
 def test_a_study_grows_until_it_is_decided(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -481,7 +481,7 @@ def test_a_design_is_cured_and_its_cure_is_a_design(tmp_path: Path) -> None:
 
 @cache
 def trimming() -> PartSlot:
-    slot = trimmer_slot(branch().made)
+    slot = trimmer_slot(branch().synthesis)
     assert slot is not None
     return slot
 
@@ -496,7 +496,7 @@ def with_trimmer(nominal: float, rate: float) -> LinearModel:
 
 
 def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
-    made, slot = branch().made, trimming()
+    made, slot = branch().synthesis, trimming()
     assert slot.trim is not None
     trimmer = CATALOG.trimmer(slot.trim.track)
     series = slot.trim.circuit.values["R911"]
@@ -505,7 +505,7 @@ def test_the_trimmer_costs_what_it_adds_to_the_bill() -> None:
     assert [o.price for o in slot.slot.options] == [0.0, pytest.approx(extra)]
     assert trimmer_slot(made, frozenset({"trimmer"})) is None
     fitted = upgraded_file(made.modelfile, Upgrades(trimmer=True))
-    again = trimmer_slot(with_parts_kept(made, fitted))
+    again = trimmer_slot(with_same_parts(made, fitted))
     assert again is not None
     assert [o.price for o in again.slot.options] == [0.0, pytest.approx(0.0, abs=1e-12)]
 
@@ -580,7 +580,7 @@ def test_a_trimmer_that_falls_short_is_not_taken_again(monkeypatch: pytest.Monke
 
 def test_a_study_of_trimmed_boards_is_kept_apart() -> None:
     """The book's verdicts are those of the trimmed boards, once found and then known."""
-    made, slot = branch().made, trimming()
+    made, slot = branch().synthesis, trimming()
     assert slot.trim is not None
     question = bench_plans.question(3)
     circuit = made.design.circuit
@@ -598,7 +598,7 @@ def matched_picture(signs: tuple[float, ...], nominal: float = 6.5) -> LinearMod
     """A limit of the elements of one array alone, with slopes of these signs, and of R50."""
     from designer.centering import cure_linear_model
 
-    made = branch().made
+    made = branch().synthesis
     network = network_slots(made)[0]
     weights = dict(zip(network.network, signs, strict=False)) | {"R50": 1.0}
     circuit = made.design.circuit
@@ -635,7 +635,7 @@ def test_a_demand_holds_the_variance_of_drawn_arrays(signs: tuple[float, ...]) -
 
 
 def test_an_array_costs_what_it_changes_on_the_bill() -> None:
-    made = branch().made
+    made = branch().synthesis
     slots = network_slots(made)
     assert slots
     assert network_slots(made, frozenset({"network"})) == ()
@@ -683,9 +683,9 @@ def test_arrays_are_chosen_as_by_enumeration(
 
 
 def test_the_finest_choices_can_be_built() -> None:
-    parts = (*part_slots(branch().made), *network_slots(branch().made))
+    parts = (*part_slots(branch().synthesis), *network_slots(branch().synthesis))
     for most in finest(parts, CATALOG):
         seen = LinearModel(branch(), parts, (), (), 0.0, 5)
-        file = upgraded_file(branch().made.modelfile, seen.upgrades(most))
-        spread_of(file, branch().made.design.circuit, CATALOG)
+        file = upgraded_file(branch().synthesis.modelfile, seen.upgrades(most))
+        spread_of(file, branch().synthesis.design.circuit, CATALOG)
         assert any(most)

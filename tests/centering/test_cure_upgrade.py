@@ -29,7 +29,7 @@ from designer.centering.cure_upgrade import (
     WindowPlace,
     price,
     upgraded_file,
-    with_parts_kept,
+    with_same_parts,
 )
 from designer.check.synthesis_result import Synthesis
 from designer.model.model_file import parse_model_file
@@ -98,7 +98,7 @@ def test_the_model_file_says_what_is_upgraded(base: Synthesis) -> None:
 
 
 def test_a_better_part_is_bought_and_spreads_less(base: Synthesis) -> None:
-    made = with_parts_kept(base, upgraded_file(base.modelfile, Upgrades(grades={"R50": 0.001})))
+    made = with_same_parts(base, upgraded_file(base.modelfile, Upgrades(grades={"R50": 0.001})))
     circuit = made.design.circuit
     grades = bought(made.modelfile, circuit, CATALOG)
     assert grades == {"R50": 0.001}
@@ -146,7 +146,7 @@ def test_prices_lie_within_their_classes() -> None:
 def test_another_opamp_on_the_same_parts_has_its_own_limits(base: Synthesis) -> None:
     now, other = CATALOG.opamp("TL074C"), CATALOG.opamp("TL074H")
     assert [o.name for o in better_opamps(now, 15.0, CATALOG)] == ["TL074H", "OPA4192"]
-    made = with_parts_kept(base, upgraded_file(base.modelfile, Upgrades(opamp="TL074H")))
+    made = with_same_parts(base, upgraded_file(base.modelfile, Upgrades(opamp="TL074H")))
     circuit, errors = made.design.circuit, made.design.errors
     assert circuit.values == base.design.circuit.values
     assert (circuit.opamp, circuit.gain) == ("TL074H", other.gain.typ)
@@ -163,7 +163,7 @@ def test_where_a_condition_breaks_the_parts_are_chosen_anew(base: Synthesis) -> 
     branch = branch_of(base, Upgrades(opamp="TL074H", grades={"R50": 0.001}))
     assert isinstance(branch, CureBranch)
     assert branch.upgrades == Upgrades(opamp="TL074H")
-    design = branch.made.design
+    design = branch.synthesis.design
     assert all(check.holds for check in design.checks)
     differing = {n for n, v in design.circuit.values.items() if v != base.design.circuit.values[n]}
     assert differing == {"R6"}  # the generator's

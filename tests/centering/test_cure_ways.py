@@ -19,7 +19,7 @@ from designer.centering.cure_ways import (
     RARE,
     Looker,
     ResponseWay,
-    drawn,
+    first_boards,
     forecast,
     foretold,
     settled,
@@ -128,7 +128,7 @@ def test_boards_that_settle_slowly_are_not_lost() -> None:
     """What falls to rest at |multiplier| 0.99 a period takes longer than the compiled way grants.
     All are ok, by the plain settling of each, and no way is given up for them."""
     plan, question = lightly_damped()
-    boards = drawn(plan, 2 * FEW)
+    boards = first_boards(plan, 2 * FEW)
     assert forecast(boards, question, 2).count(None) > 20  # a tenth would give a way up
     assert set(settled(boards, question, 2)) == {Verdict.OK}
     assert {a.verdict for a in foretold(boards, question, 2)} == {Verdict.OK}
@@ -153,7 +153,7 @@ def test_what_was_measured_to_miss_gets_further_ways(
     monkeypatch.setattr(
         cure_ways, "measure", lambda *_, **__: MeasuredYield(Yield(100, 0, 0, 0), TARGET)
     )
-    branch = cast(Any, SimpleNamespace(made=nothing))
+    branch = cast(Any, SimpleNamespace(synthesis=nothing))
     looker = Looker(
         branch, TARGET, 1, Book(), 0.05, frozenset({PLACE}), (), 1, lambda: None, missed
     )

@@ -51,7 +51,7 @@ def test_without_a_loss_it_is_finite() -> None:
 
 def test_the_boards_are_the_spread_s_stretched() -> None:
     """The compiled shortcut counts what the study's rung, asked one by one, says."""
-    synthesis, response = made(), made().found[0]
+    synthesis, response = made(), made().model_responses[0]
     bench = Stretched(synthesis.design, spread(), 5, COUNT)
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
     (stand,) = bench.stands([(response.spec, place)])
@@ -79,7 +79,7 @@ def test_the_boards_are_the_spread_s_stretched() -> None:
 
 def test_a_place_without_the_response_has_no_stand() -> None:
     bench = Stretched(made().design, spread(), 5, 1)
-    response = made().found[0]
+    response = made().model_responses[0]
     there = OperatingPoint(0.85, 0.25, response.orbit.start)
     elsewhere = OperatingPoint(0.6, 0.25, response.orbit.start)
     stands = bench.stands([(response.spec, there), (response.spec, elsewhere)])
@@ -88,7 +88,7 @@ def test_a_place_without_the_response_has_no_stand() -> None:
 
 
 def test_what_is_known_is_not_asked_again() -> None:
-    memory, response = AnswerCache(), made().found[0]
+    memory, response = AnswerCache(), made().model_responses[0]
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
     steps: list[int] = []
     answers = []

@@ -11,7 +11,7 @@ import pytest
 from designer.base.errors import InputError, Unreachable
 from designer.base.progress import Progress
 from designer.centering import levers
-from designer.centering.candidate import ALIKE, GAIN, Candidate, Listened, better
+from designer.centering.candidate import ALIKE, GAIN, Candidate, NgspiceOutcome, better
 from designer.centering.design_search import BOARDS, look, search
 from designer.centering.distance import Stand, Stretched
 from designer.centering.levers import LEVERS, DesignChoice, slower, topologies, variants
@@ -127,7 +127,7 @@ def test_places_that_stay_where_they_were_are_worth_nothing(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     found = search(file('omega = "best"\nexpect = "1-2-2"'), catalog())
     assert found.start is not None
-    assert found.final.shown_at == found.start.shown_at
+    assert found.final.wanted == found.start.wanted
     assert found.contributions == ()
 
 
@@ -144,7 +144,7 @@ def test_a_dead_zone_gets_its_chance_at_the_places_that_were_found(
     tried = [s.setting for s in found.steps if s.lever == "opamp and dead zone"]
     assert tried == ["TL074C, saturation", "TL074C, rectifier", "TL074C, saturation"]
     every = [
-        _enumerated(replace(wanted, responses=found.final.shown_at), c)
+        _enumerated(replace(wanted, responses=found.final.wanted), c)
         for c in topologies(wanted, catalog())
     ]
     assert not any(better(c.rank, found.final.rank) for c in every)
@@ -169,7 +169,7 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
     monkeypatch.setattr("designer.centering.design_search.LEVERS", ("opamp", "dead zone"))
     wanted = file(PLACE)
 
-    def asked(limit: float) -> list[Listened]:
+    def asked(limit: float) -> list[NgspiceOutcome]:
         def listen(
             bench: Stretched, stands: Sequence[Stand | None], progress: Callable[[], None]
         ) -> tuple[Agreement, ...]:
@@ -178,19 +178,19 @@ def test_a_design_that_ngspice_does_not_bear_out_is_made_slower(
             return (Agreement(16, 8 if fast else 15),) * len(stands)
 
         found = search(wanted, catalog(), listen=listen)
-        (kept,) = [h for h in found.heard if h.kept]
-        assert found.made.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
-        return list(found.heard)
+        (kept,) = [h for h in found.checks if h.adopted]
+        assert found.synthesis.design.errors.scales.frequency(1.0) == pytest.approx(kept.frequency)
+        return list(found.checks)
 
     free = asked(1e9)
     assert len(free) == 1
     (own,) = (h.frequency for h in free)
     slower = asked(0.4 * own)
-    assert [h.kept for h in slower] == [False] * (len(slower) - 1) + [True]
+    assert [h.adopted for h in slower] == [False] * (len(slower) - 1) + [True]
     assert slower[-1].frequency <= 0.4 * own < slower[-2].frequency
     # Where no time scale is slow enough, the first of the best stands.
     never = asked(0.0)
-    assert [h.kept for h in never] == [True] + [False] * (len(never) - 1)
+    assert [h.adopted for h in never] == [True] + [False] * (len(never) - 1)
     assert len(never) > len(slower) - 1
 
 
@@ -207,9 +207,9 @@ def test_a_slower_design_that_shows_fewer_boards_is_not_taken(
         return (Agreement(16, 13) if first else Agreement(10, 10),) * len(stands)
 
     wanted = file(PLACE)
-    fastest = [search(wanted, catalog()).made.design.errors.scales.frequency(1.0)]
+    fastest = [search(wanted, catalog()).synthesis.design.errors.scales.frequency(1.0)]
     found = search(wanted, catalog(), listen=listen)
-    assert [h.kept for h in found.heard] == [True, False]
+    assert [h.adopted for h in found.checks] == [True, False]
 
 
 def test_slower_bands_stay_inside_the_file_s_band() -> None:

@@ -139,7 +139,7 @@ def test_causes() -> None:
 
 def test_on_a_design_the_shares_add_up() -> None:
     synthesis = made()
-    checked = checked_design.check(synthesis.design, synthesis.found, None)
+    checked = checked_design.check(synthesis.design, synthesis.model_responses, None)
     plan = plan_study(synthesis.modelfile, synthesis.design, checked, catalog(), samples=40, seed=2)
     (found,) = limitings(plan, exact_rung.block(plan, range(40), 1))
     assert found.distance > 0.0

@@ -34,7 +34,7 @@ from tests.shared.search_cases import made, spread
 
 def bench(memory: AnswerCache | None = None) -> tuple[Stretched, Stand]:
     found = Stretched(made().design, spread(), 1, LISTENED, memory=memory)
-    (response,) = made().found
+    (response,) = made().model_responses
     place = OperatingPoint(response.omega, response.b, response.orbit.start)
     (stand,) = found.stands([(response.spec, place)])
     assert stand is not None

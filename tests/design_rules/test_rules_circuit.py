@@ -217,7 +217,7 @@ def test_protection_shares_the_fault_current() -> None:
 
 
 def test_without_responses_nothing_is_said_of_operation() -> None:
-    made = replace(base().made, found=())
+    made = replace(base().made, model_responses=())
     subject = RuleSubject(made, base().circuit, base().components)
     for id_ in ("swing", "power", "slew", "common-mode", "power-stuck"):
         found = run_rules.look(id_, subject)

@@ -60,7 +60,8 @@ def written(path: Path, text: str) -> Path:
     folder.write("model.toml", text)
     made = base().made
     folder.write(
-        "design.json", dumps(synthesis_json(modelfile, made.design, made.found, said, 0.0))
+        "design.json",
+        dumps(synthesis_json(modelfile, made.design, made.model_responses, said, 0.0)),
     )
     folder.finish("design")
     return path

@@ -312,7 +312,7 @@ def test_the_gate_of_a_setting_asks_two_steps_and_two_methods(rung: str) -> None
 def test_a_setting_passes_where_the_gate_of_a_study_passes_it() -> None:
     """1-6-6 of the paper's design: neither the gate's first step passes nor half of it."""
     design = synthesised()
-    response = next(r for r in design.found if r.omega == 0.284)
+    response = next(r for r in design.model_responses if r.omega == 0.284)
     with SpicePool(2, timeout=900.0) as pool, SpicePool(1, timeout=900.0) as timed:
         (word,) = numerics_gate.check(pool, [rungs.subject(design, response)])
         found = rungs.measured(

@@ -25,7 +25,7 @@ def test_every_response_has_a_start() -> None:
     )
     made = synthesise(parse_model_file(head + wanted + circuit))
     recipes = start_recipes(made, 2)
-    rows = list(csv.DictReader(io.StringIO(setup_csv(made.design, made.found, recipes))))
+    rows = list(csv.DictReader(io.StringIO(setup_csv(made.design, made.model_responses, recipes))))
     assert tuple(rows[0]) == COLUMNS
     first, second, third = (row["start"] for row in rows)
     # 1-1-1 coexists with 3-3-3, so it is not left to chance; 1-3-3 is alone.
@@ -35,11 +35,13 @@ def test_every_response_has_a_start() -> None:
     assert second.startswith("switch on at this setting; wait ")
     assert third.startswith(NO_RECIPE)
     assert recipes[2] is None
-    for recipe, setting in zip(recipes[:2], settings(made.design, made.found), strict=False):
+    for recipe, setting in zip(
+        recipes[:2], settings(made.design, made.model_responses), strict=False
+    ):
         assert recipe is not None
         assert recipe.target.frequency == setting.frequency_hz
         assert recipe.target.amplitude == setting.amplitude_v_peak
-    for row, setting in zip(rows, settings(made.design, made.found), strict=True):
+    for row, setting in zip(rows, settings(made.design, made.model_responses), strict=True):
         for name, value in (
             ("frequency_hz", setting.frequency_hz),
             ("amplitude_v_peak", setting.amplitude_v_peak),

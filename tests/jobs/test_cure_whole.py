@@ -15,7 +15,7 @@ from designer.base.design_folder import MODEL
 from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.centering.cure_branch import KINDS, PLACE, TRIMMER
-from designer.centering.cure_measure import asked, plan_of
+from designer.centering.cure_measure import plan_of, questions_of
 from designer.jobs.cure_job import cure_into
 from designer.jobs.design_source import read_design
 from designer.jobs.options import Options
@@ -119,7 +119,7 @@ def test_another_b_alone(tmp_path: Path) -> None:
         studied(found.cured)["yield"],
     )
     made = read_design(found.design)
-    (question,) = asked(made, made.found)
+    (question,) = questions_of(made, made.model_responses)
     assert question is not None
     plan = plan_of(made, question, FRESH.seed)
     along = yield_map(plan, 0, "omega", 0.25, values=(0.2125, 0.215, 0.2175), samples=50)

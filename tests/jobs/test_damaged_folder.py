@@ -77,7 +77,7 @@ def work_begins(finished: Finished) -> Iterator[None]:
 
     made = read_design(finished.path)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(design_files, "find", lambda *_: made.found)
+        patched.setattr(design_files, "find", lambda *_: made.model_responses)
         patched.setattr(study_stage, "SpicePool", lambda *_, **__: nullcontext())
         patched.setattr(study_stage, "require_ngspice", lambda _: None)
         patched.setattr(study_stage, "checks", stop)

@@ -220,12 +220,12 @@ def test_a_design_is_read_back_as_it_was_made(
         assert entry.status(["synthesise", str(model), "--out", str(out), "-q"]) in (0, 1)
         moved, made = tmp_path / "elsewhere", kept
         os.rename(out, moved)
-    found, design = made.found, made.design
+    found, design = made.model_responses, made.design
     again = read_design(moved)
     assert again.design.circuit == design.circuit
     assert again.design.errors.errors == design.errors.errors
     assert again.design.certificate == design.certificate
-    assert [r.orbit.response for r in again.found] == [r.orbit.response for r in found]
+    assert [r.orbit.response for r in again.model_responses] == [r.orbit.response for r in found]
     scales = (moved / "scales.csv").read_text()
     assert ("metres per volt" in scales) == (example == "drill.toml")
     assert "model time per circuit second" in scales

@@ -236,8 +236,8 @@ def test_a_resolved_file_says_what_was_open() -> None:
     synthesis = made()
     found = resolved(asked_file, synthesis, DesignChoice.of(asked_file.circuit), Path("model.toml"))
     (response,) = found.responses
-    assert response.omega == synthesis.found[0].omega
-    assert response.b == synthesis.found[0].b
+    assert response.omega == synthesis.model_responses[0].omega
+    assert response.b == synthesis.model_responses[0].b
     assert response.expect == asked_file.responses[0].expect
     assert found.circuit == asked_file.circuit
     assert found.spread == asked_file.spread

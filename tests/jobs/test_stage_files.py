@@ -77,7 +77,7 @@ def test_files_are_read_back_as_the_same_design(
     folder.path.mkdir()
     for file, text in texts.items():
         (folder.path / file).write_text(text)
-    said = synthesis_json(first.modelfile, first.design, first.found, {}, first.seconds)
+    said = synthesis_json(first.modelfile, first.design, first.model_responses, {}, first.seconds)
     (folder.path / "design.json").write_text(dumps(said))
     again = design_files.load(folder, first.modelfile, CATALOG)
     assert again.design.circuit == first.design.circuit
@@ -110,7 +110,7 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
     """Every engine shows the same response; the report names the stage's parts."""
     first = made(name, tmp_path)
     with SpicePool(2) as pool:
-        checked = checked_design.check(first.design, first.found, pool)
+        checked = checked_design.check(first.design, first.model_responses, pool)
         plan = plan_study(first.modelfile, first.design, checked, CATALOG, samples=2, seed=1)
         answers = samples_task(plan, range(2))(2, lambda: None)
         asks = ask_random(answers)
@@ -126,7 +126,9 @@ def test_gate_study_and_report(name: str, tmp_path: Path) -> None:
         checked, plan, tuple(range(len(checked))), {}, tuple(answers), cross_checks=tuple(heard)
     )
     source = provenance(first.modelfile, CATALOG.hash, seed=1, spread={})
-    result = RunResult(first.modelfile, CATALOG, first.found, first.design, checked, study, source)
+    result = RunResult(
+        first.modelfile, CATALOG, first.model_responses, first.design, checked, study, source
+    )
     data = ReportData(result, "designer run model.toml")
     page = render_html(data)
     assert render_markdown(data)

@@ -85,7 +85,7 @@ class Recipe:
 def plain() -> ReportData:
     """Two responses, three boards, no layers."""
     made = synthesised()
-    design, found = made.design, made.found[0:3:2]
+    design, found = made.design, made.model_responses[0:3:2]
     modelfile = replace(made.modelfile, responses=made.modelfile.responses[0:3:2])
     checked = checked_design.check(design, found, None)
     plan = plan_study(modelfile, design, checked, made.catalog, samples=3, seed=1)

@@ -51,7 +51,7 @@ def whole(catalog: Catalog) -> ReportData:
     """A small run in which everything works: 1-1-1, its asymmetric kind, 1-2-2."""
     made = synthesised()
     modelfile = replace(made.modelfile, responses=made.modelfile.responses[:3])
-    found, design = made.found[:3], made.design
+    found, design = made.model_responses[:3], made.design
     with SpicePool(2) as pool:
         checked = checked_design.check(design, found, pool)
         plan = plan_study(modelfile, design, checked, catalog, samples=4, seed=1)
@@ -477,7 +477,7 @@ def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:
     """
     modelfile = parse_model_file(text)
     made = synthesise(modelfile, catalog)
-    found, design = made.found, made.design
+    found, design = made.model_responses, made.design
     checked = checked_design.check(design, found, None)
     plan = plan_study(modelfile, design, (), catalog, samples=1, seed=1)
     study = Study(checked, plan, (), {0: "not asked"}, ())

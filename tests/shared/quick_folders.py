@@ -20,7 +20,7 @@ def without_starts(patched: pytest.MonkeyPatch) -> None:
     """No way to start any response is sought; ``setup.csv`` says so."""
 
     def none(made: Synthesis, jobs: int) -> list[Recipe | None]:
-        return [None] * len(made.found)
+        return [None] * len(made.model_responses)
 
     patched.setattr(design_files, "start_recipes", none)
 

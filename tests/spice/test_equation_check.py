@@ -145,7 +145,7 @@ def test_explained_is_the_sum_of_all_sensitivities() -> None:
 )
 def test_right_circuits_pass(pool: SpicePool, name: str, findings: set[str]) -> None:
     design = made(name).design
-    result = check(design, made(name).found, pool)
+    result = check(design, made(name).model_responses, pool)
     assert set(by_name(result)) == findings
     assert result.passed, result.worst
     assert all(f.reason == "" for f in result.findings)
@@ -210,7 +210,7 @@ def test_wrong_parts_are_found(
     pool: SpicePool, part: str, factor: float, wrong: tuple[str, ...]
 ) -> None:
     synthesis = made("paper")
-    result = check(with_value(synthesis.design, part, factor), synthesis.found, pool)
+    result = check(with_value(synthesis.design, part, factor), synthesis.model_responses, pool)
     assert not result.passed
     found = by_name(result)
     for name in wrong:
@@ -227,7 +227,7 @@ def test_a_sign_that_is_wrong_is_found(pool: SpicePool) -> None:
         for p in synthesis.design.circuit.parts
     )
     design = replace(synthesis.design, circuit=replace(synthesis.design.circuit, parts=parts))
-    assert not check(design, synthesis.found, pool).passed
+    assert not check(design, synthesis.model_responses, pool).passed
 
 
 @pytest.mark.parametrize("values", [rectifier(5.0), bought(rectifier(5.0))])
@@ -276,6 +276,6 @@ def test_a_deck_that_ngspice_cannot_solve_says_why(pool: SpicePool) -> None:
     synthesis = made("paper")
     circuit = synthesis.design.circuit
     loose = replace(circuit, parts=(*circuit.parts, Resistor("R999", "e1", "e2", 1e3, "")))
-    result = check(replace(synthesis.design, circuit=loose), synthesis.found, pool)
+    result = check(replace(synthesis.design, circuit=loose), synthesis.model_responses, pool)
     assert not result.passed
     assert result.worst.reason

@@ -42,7 +42,7 @@ finer = pytest.mark.parametrize("rung", ["dynamic", "full"])
 @cache
 def paper() -> dict[float, GateSubject]:
     """The paper's case as synthesised: each wanted response, by omega."""
-    found, design = synthesised().found, synthesised().design
+    found, design = synthesised().model_responses, synthesised().design
     reduction = nominal.nominal_reduction(design)
     system = reduction.system()
     return {
@@ -214,7 +214,7 @@ def test_a_board_for_low_rails() -> None:
     text = text.replace('"TL074C"', '"MCP6004"').replace("supply = 15.0", "supply = 2.5")
     text = "\n".join(line for line in text.splitlines() if not line.startswith("saturation"))
     made = synthesise(parse_model_file(text), load_catalog())
-    found, design = made.found, made.design
+    found, design = made.model_responses, made.design
     circuit = design.circuit
     assert (circuit.supply, circuit.saturation) == (2.5, 2.475)
     assert design.errors.max_error < 0.02

@@ -40,9 +40,9 @@ def design(name: str) -> Synthesis:
     """With two responses, the second one wanted at another frequency."""
     with TemporaryDirectory() as place:
         one = made(name, Path(place))
-    (first,) = one.found
+    (first,) = one.model_responses
     wanted = [Response(first.omega), Response(1.1 * first.omega)]
-    return replace(one, found=find(one.design.model, wanted))
+    return replace(one, model_responses=find(one.design.model, wanted))
 
 
 def switched(deck: str, number: int) -> str:
@@ -81,7 +81,7 @@ def by_circuit_cir(name: str, number: int) -> Waveforms:
 
 def alone(name: str, number: int) -> Synthesis:
     whole = design(name)
-    return replace(whole, found=(whole.found[number - 1],))
+    return replace(whole, model_responses=(whole.model_responses[number - 1],))
 
 
 def stop_of(name: str, number: int) -> float:
@@ -93,7 +93,7 @@ def named(name: str, number: int, found: Waveforms) -> str:
     whole = design(name)
     run = response_runs(whole)[number - 1]
     reduction = nominal_reduction(whole.design)
-    orbit = on_circuit(reduction.system(), whole.design, whole.found[number - 1])
+    orbit = on_circuit(reduction.system(), whole.design, whole.model_responses[number - 1])
     subject = numerics_gate.GateSubject(reduction, run.excitation, orbit)
     answer = numerics_gate.job(subject, run.settings).reduce(found)
     assert isinstance(answer, Read)
@@ -181,7 +181,9 @@ def test_circuit_cir_says_what_it_is_for_and_what_it_holds() -> None:
         "fv output", "setup.csv", "IC=", "designer export DIR --deck", "circuit-ltspice.cir",
     ):  # fmt: skip
         assert words in head, words
-    assert "the model file wants none" in design_files.circuit_deck(replace(whole, found=()))
+    assert "the model file wants none" in design_files.circuit_deck(
+        replace(whole, model_responses=())
+    )
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)

@@ -67,11 +67,11 @@ def test_two_unequal_clearances_one_between_masses_and_a_weight() -> None:
     assert {"gap A lower", "gap B upper", "constant x1", "stop slope B x2' x1"} <= set(
         design.errors.errors
     )
-    (response,) = made.found
+    (response,) = made.model_responses
     orbit = on_circuit(nominal_reduction(design).system(), design, response)
     assert orbit.counts == response.orbit.counts
     with SpicePool(2) as pool:
-        check = equation_check.check(design, made.found, pool)
+        check = equation_check.check(design, made.model_responses, pool)
     names = {finding.name for finding in check.findings}
     assert {"transfer, open", "slope, upper contact A", "threshold, upper contact B"} <= names
     assert check.passed, check.problem

@@ -13,7 +13,7 @@ import pytest
 
 from designer.base.toml_writer import toml_text
 from designer.board.board_parts import drive_resistance, driven_nodes
-from designer.centering.cure_upgrade import with_parts_kept
+from designer.centering.cure_upgrade import with_same_parts
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.ensemble import Ensemble
@@ -251,7 +251,7 @@ def test_only_a_fitted_trimmer_is_one() -> None:
     assert dc_trim(made) is None
     data = tomllib.loads(made.modelfile.text)
     data["board"] = {"dc_trim": "fitted"}
-    fitted = with_parts_kept(made, parse_model_file(toml_text(data)))
+    fitted = with_same_parts(made, parse_model_file(toml_text(data)))
     found = dc_trim(fitted)
     assert found is not None
     assert found.circuit.parts[: len(made.design.circuit.parts)] == made.design.circuit.parts
@@ -274,7 +274,7 @@ def test_a_study_of_a_board_with_a_trimmer_has_its_column() -> None:
     data = tomllib.loads(made.modelfile.text)
     data["board"] = {"dc_trim": "fitted"}
     data["response"] = [r for r in data["response"] if r["omega"] in (1.55, 0.85)]
-    fitted = with_parts_kept(made, parse_model_file(toml_text(data)))
+    fitted = with_same_parts(made, parse_model_file(toml_text(data)))
     study = tolerance(fitted, samples=6, rung="exact", blamed=False, jobs=1)
     assert study.trimmed is not None
     assert len(study.trimmed) == 12
