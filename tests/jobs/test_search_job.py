@@ -193,7 +193,7 @@ def test_a_search_that_is_killed_as_it_begins_keeps_the_word_too(
             raise KeyboardInterrupt
 
     file = read_model_file(model)
-    found = SimpleNamespace(made=Found(file), final=SimpleNamespace(choice=None))
+    found = SimpleNamespace(synthesis=Found(file), final=SimpleNamespace(choice=None))
     for name, value in (
         ("look", ()),
         ("design_search", found),
