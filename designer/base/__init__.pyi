@@ -88,6 +88,7 @@ from .guarded_reading import (
     decode as decode,
     inside as inside,
     parse_json as parse_json,
+    parse_toml as parse_toml,
     read_bytes as read_bytes,
     read_text as read_text,
     reading as reading,
@@ -99,6 +100,13 @@ from .jit import (
 )
 from .jit_notice import (
     announced as announced,
+)
+from .json_schema import (
+    DIALECT as DIALECT,
+    Json as Json,
+    either as either,
+    listed as listed,
+    of_tables as of_tables,
 )
 from .keyed_store import (
     DAMAGED as DAMAGED,
@@ -185,7 +193,6 @@ from .schema import (
     lines as lines,
     number as number,
     one_of as one_of,
-    parse_toml as parse_toml,
     physical as physical,
     physical_span as physical_span,
     several as several,

@@ -18,18 +18,24 @@ from __future__ import annotations
 import difflib
 import math
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from pydantic import ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
+from pydantic import (
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    ValidationError,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from designer.base.errors import MISSING, InputError
+from designer.base.json_schema import Json, either, listed
 from designer.base.units import parse_quantity
 
 
@@ -68,11 +74,18 @@ class Accepts:
     """Returns the value that a field's content stands for."""
     in_folder: bool = False
     """Whether ``check`` also takes the folder of the file."""
+    json: Json = field(default_factory=dict)
+    """JSON Schema of what is accepted, or of more; ``check`` decides."""
 
     def __get_pydantic_core_schema__(
         self, _source: object, _handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(
+        self, _schema: CoreSchema, _handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {**self.json, "x-expected": self.expected}
 
     def _validate(self, value: object, info: core_schema.ValidationInfo) -> Any:
         return self.read(value, *([info.context] if self.in_folder else []))
@@ -88,7 +101,7 @@ class Accepts:
             raise ValueError(self.expected + detail) from None
 
 
-def such(expected: str, fits: Callable[[Any], bool]) -> Accepts:
+def such(expected: str, fits: Callable[[Any], bool], json: Json | None = None) -> Accepts:
     """A value for which ``fits`` holds, as it is."""
 
     def check(value: object) -> object:
@@ -96,7 +109,7 @@ def such(expected: str, fits: Callable[[Any], bool]) -> Accepts:
             raise ValueError
         return value
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=json or {})
 
 
 def number(unit: str, expected: str, fine: Callable[[float], bool] = math.isfinite) -> Accepts:
@@ -112,7 +125,7 @@ def number(unit: str, expected: str, fine: Callable[[float], bool] = math.isfini
             raise ValueError
         return result
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json={"type": ["number", "string"] if unit else "number"})
 
 
 def fraction(example: str, *, zero: bool = False) -> Accepts:
@@ -127,7 +140,8 @@ def fraction(example: str, *, zero: bool = False) -> Accepts:
 
 def whole(expected: str, least: float, most: float = math.inf) -> Accepts:
     """A whole number from ``least`` to ``most``."""
-    return such(expected, lambda value: type(value) is int and least <= value <= most)
+    json = {"type": "integer", "minimum": least, **({"maximum": most} if most < math.inf else {})}
+    return such(expected, lambda value: type(value) is int and least <= value <= most, json)
 
 
 def span(unit: str, expected: str, fine: Callable[[float], bool]) -> Accepts:
@@ -142,7 +156,7 @@ def span(unit: str, expected: str, fine: Callable[[float], bool]) -> Accepts:
             raise ValueError("the range is reversed")
         return low, high
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=listed(end.json, 2, 2))
 
 
 def physical(unit: str, *, zero: bool = False) -> Accepts:
@@ -185,12 +199,12 @@ def choice(*names: str) -> Accepts:
             raise ValueError(did_you_mean(value, names))
         return value
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json={"enum": list(names)})
 
 
 def flag() -> Accepts:
     """true or false, and no number in their place."""
-    return such("true or false", lambda value: isinstance(value, bool))
+    return such("true or false", lambda value: isinstance(value, bool), {"type": "boolean"})
 
 
 def line(expected: str, longest: int = 200) -> Accepts:
@@ -205,14 +219,16 @@ def line(expected: str, longest: int = 200) -> Accepts:
             raise ValueError(f"at most {longest} characters")
         return value
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json={"type": "string", "minLength": 1, "maxLength": longest})
 
 
 def text(pattern: str, expected: str) -> Accepts:
     """Text that a regular expression matches as a whole."""
     fitting = re.compile(pattern, re.ASCII)
     return such(
-        expected, lambda value: isinstance(value, str) and fitting.fullmatch(value) is not None
+        expected,
+        lambda value: isinstance(value, str) and fitting.fullmatch(value) is not None,
+        {"type": "string", "pattern": f"^(?:{pattern})$"},
     )
 
 
@@ -226,13 +242,14 @@ def several(
     """
 
     def check(value: object) -> tuple[Any, ...]:
-        listed = [value] if single and isinstance(value, str) else value
-        if not isinstance(listed, list) or len(listed) < least:
+        items = [value] if single and isinstance(value, str) else value
+        if not isinstance(items, list) or len(items) < least:
             raise ValueError
-        values = [each.check(item) for item in listed]
+        values = [each.check(item) for item in items]
         return tuple(values if again else dict.fromkeys(values))
 
-    return Accepts(expected, check)
+    json = listed(each.json, least)
+    return Accepts(expected, check, json=either(each.json, json) if single else json)
 
 
 def lines(expected: str) -> Accepts:
@@ -256,24 +273,6 @@ def one_of(found: str, known: Iterable[str]) -> str:
     names = list(known)
     hint = did_you_mean(found, names)
     return "one of " + ", ".join(names) + (f"; {hint}" if hint else "")
-
-
-def parse_toml(text: str, file: str | None) -> dict[str, Any]:
-    """The tables of a TOML text; a syntax error becomes an ``InputError`` that names the line."""
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError(file, "the file", "tables or lists nested too deeply", "TOML") from None
-    except ValueError as error:  # includes tomllib.TOMLDecodeError
-        message = str(error)
-        place = re.search(r" \(at line (\d+), column \d+\)$", message)
-        content = text.splitlines()
-        row = int(place[1]) if place else max(len(content), 1)
-        found = content[row - 1].strip() if row <= len(content) else ""
-        reason = message[: place.start()] if place else message
-        raise InputError(
-            file, f"line {row}", found or "the end of the file", f"valid TOML ({reason})"
-        ) from None
 
 
 def checked(

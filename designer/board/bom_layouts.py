@@ -13,7 +13,7 @@ from typing import Annotated
 
 from designer.base.csv_tables import csv_text
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import read_text
+from designer.base.guarded_reading import parse_toml, read_text
 from designer.base.schema import (
     FIRST_FORMAT,
     FileTable,
@@ -22,7 +22,6 @@ from designer.base.schema import (
     line,
     lines,
     one_of,
-    parse_toml,
     such,
 )
 from designer.board.bom import COLUMNS, Line

@@ -23,7 +23,7 @@ import platformdirs
 
 from designer.base.errors import MISSING, InputError, InputErrors
 from designer.base.eseries import series_values
-from designer.base.guarded_reading import csv_rows, decode, read_bytes, reading
+from designer.base.guarded_reading import csv_rows, decode, parse_toml, read_bytes, reading
 from designer.base.schema import (
     FIRST_FORMAT,
     Accepts,
@@ -31,7 +31,6 @@ from designer.base.schema import (
     FileTable,
     keys_of,
     one_of,
-    parse_toml,
     validated,
     whole,
 )

@@ -59,13 +59,14 @@ def new(
     **_: Any,
 ) -> Output:
     """Write a commented model file to start from; an existing file is never replaced."""
-    from designer.model.template import new as write_model_file
+    from designer.model.template import SCHEMA, new as write_model_file
 
     if format_ not in (None, 1, 2):
         raise InputError(None, "--format", format_, "1 or 2")
     write_model_file(path, from_, format=cast("Literal[1, 2] | None", format_))
-    answer = {"format": 1, "files": [str(path)]}
-    return Output(answer, lambda: print(f"written: {path}", file=sys.stderr))
+    files = [str(path), *([] if from_ else [str(path.with_name(SCHEMA))])]
+    answer = {"format": 1, "files": files}
+    return Output(answer, lambda: print(f"written: {', '.join(files)}", file=sys.stderr))
 
 
 @verb("Study", "designer reproduce dynamics --out out/paper-dynamics", "jobs", "resume", json=False)

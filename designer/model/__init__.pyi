@@ -115,6 +115,7 @@ from .system_equations import (
     number_of as number_of,
 )
 from .template import (
+    SCHEMA as SCHEMA,
     new as new,
 )
 from .tuning_bands import (

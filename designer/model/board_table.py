@@ -16,7 +16,7 @@ Trim = Literal["none", "unfitted", "fitted"]
 def _layout() -> Accepts:
     """Its file is looked for when it is needed."""
     name = text("[a-z0-9][a-z0-9-]{0,30}", "names of small letters, digits and hyphens")
-    return Accepts(name.expected, name.read)
+    return Accepts(name.expected, name.read, json=name.json)
 
 
 @dataclass(frozen=True)

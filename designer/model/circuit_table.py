@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from designer.base.eseries import SERIES
+from designer.base.json_schema import either, listed
 from designer.base.schema import (
     Accepts,
     FileTable,
@@ -46,15 +47,15 @@ def _families() -> Accepts:
         'a family of the catalogue or a list of them, or, with "!" in front of each, those that '
         'are not bought from: "Yageo RC0603FR-07" or ["!Vishay CRCW0603 F"]'
     )
-    listed = several(expected, line(""), least=1, single=True)
+    families = several(expected, line(""), least=1, single=True)
 
     def check(value: object) -> tuple[str, ...]:
-        names = tuple(dict.fromkeys(name.strip() for name in listed.check(value)))
+        names = tuple(dict.fromkeys(name.strip() for name in families.check(value)))
         if len({name.startswith(FORBIDDEN) for name in names}) > 1:
             raise ValueError("all of them with ! or none")
         return names
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=families.json)
 
 
 def _flag_or(expected: str, names: Accepts) -> Accepts:
@@ -62,6 +63,7 @@ def _flag_or(expected: str, names: Accepts) -> Accepts:
     return Accepts(
         f"true, false or a list of {expected}",
         lambda value: value if isinstance(value, bool) else names.check(value),
+        json=either({"type": "boolean"}, names.json),
     )
 
 
@@ -83,7 +85,8 @@ def _matched() -> Accepts:
             groups.append(tuple(dict.fromkeys(n for g in (*sharing, group) for n in g)))
         return tuple(groups)
 
-    return Accepts('a list of groups of parts such as [["R1", "R7"], ["C2", "C4"]]', check)
+    expected = 'a list of groups of parts such as [["R1", "R7"], ["C2", "C4"]]'
+    return Accepts(expected, check, json=listed(_PARTS.json))
 
 
 def _preferred() -> Accepts:
@@ -103,7 +106,8 @@ def _preferred() -> Accepts:
             raise ValueError
         return tuple(sorted({value_of(item) for item in value}))
 
-    return Accepts('a list of values in Ω or F such as ["10k", "10n"]', check)
+    expected = 'a list of values in Ω or F such as ["10k", "10n"]'
+    return Accepts(expected, check, json=listed({"type": ["number", "string"]}))
 
 
 @dataclass(frozen=True)

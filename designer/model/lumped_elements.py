@@ -36,7 +36,7 @@ def _between() -> Accepts:
             raise ValueError
         return names[0], names[1]
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json={**each.json, "maxItems": 2})
 
 
 def _signed(unit: str, expected: str) -> Accepts:

@@ -27,8 +27,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from designer.base.errors import MISSING, InputError
-from designer.base.guarded_reading import inside, read_text
-from designer.base.schema import FileTable, checked, line, parse_toml, such, whole
+from designer.base.guarded_reading import inside, parse_toml, read_text
+from designer.base.json_schema import DIALECT, either, of_tables
+from designer.base.schema import FileTable, checked, line, such, whole
 from designer.catalog.catalog import Catalog
 from designer.catalog.design_rule import Override
 from designer.catalog.entries import Kind
@@ -195,7 +196,11 @@ def _check_expected(
 
 
 _FORMAT = whole("1 or 2, the formats that this version reads", 1, 2)
-_RULES = such("tables [rules.<id>]", lambda value: isinstance(value, dict))
+_RULES = such(
+    "tables [rules.<id>]",
+    lambda value: isinstance(value, dict),
+    {"type": "object", "additionalProperties": {"type": "object"}},
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,22 +208,33 @@ class _Tables(FileTable):
     """What files of both formats have."""
 
     format: Annotated[int, _FORMAT]
+    """1 for the paper's two masses, 2 for any system."""
     title: Annotated[str | None, line("text of one line")] = None
+    """Title of the reports; without it the file's name."""
     response: tuple[ResponseTable, ...] = ()
+    """The responses that the board shall show."""
     circuit: CircuitSpec = field(default_factory=CircuitSpec)
+    """What the circuit is to be made of."""
     tuning: Bands = field(default_factory=Bands)
+    """The bands that the generator may be tuned in."""
     board: BoardSpec = field(default_factory=BoardSpec)
+    """What the board has."""
     rules: Annotated[dict[str, Any], _RULES] = field(default_factory=dict)
+    """Other limits of design rules, each with a reason."""
     search: SearchSpec = field(default_factory=SearchSpec)
+    """What a search may change."""
     spread: SpreadSpec = BENCH_1
+    """How the boards of a study differ."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _ModelFile(_Tables):
-    """A file of format 1."""
+    """Format 1: the paper's two masses in a chain with stops."""
 
     model: Dimensionless | None = None
+    """The parameters, dimensionless; or [mechanical]."""
     mechanical: Mechanical | None = None
+    """The parameters in SI units."""
 
     @property
     def system(self) -> Dimensionless:
@@ -238,14 +254,20 @@ class _ModelFile(_Tables):
 
 @dataclass(frozen=True, kw_only=True)
 class _SystemFile(_Tables):
-    """A file of format 2."""
+    """Format 2: any masses, springs, dampers, clearances and forces."""
 
     mass: tuple[Mass, ...] = ()
+    """The masses."""
     spring: tuple[Spring, ...] = ()
+    """Springs between masses, or between a mass and ground."""
     damper: tuple[Damper, ...] = ()
+    """Dampers between masses, or between a mass and ground."""
     clearance: tuple[Gap, ...] = ()
+    """Gaps to stops, in the order in which n-p-q names them."""
     force: tuple[Force, ...] = ()
+    """Forces on masses."""
     base: MovingBase | None = None
+    """How the ground moves; without it the ground rests."""
     mechanical: ClassVar[None] = None
 
     @property
@@ -268,6 +290,18 @@ class _SystemFile(_Tables):
             if key not in words and isinstance(value, str)
         )
         return SiScales() if any(texts) else None
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a model file, for editors: the keys of each table and what they accept."""
+    formats, shared = list[dict[str, Any]](), dict[str, Any]()
+    for number, table in enumerate((_ModelFile, _SystemFile), start=1):
+        schema = of_tables(table)
+        shared |= schema.pop("$defs")
+        schema["properties"]["format"] |= {"const": number}
+        formats.append(schema)
+    title = "Model file of designer"
+    return {"$schema": DIALECT, "title": title, **either(*formats), "$defs": shared}
 
 
 # Which quantity of Eq. (1)-(2) to look at when a dimensionless one leaves its domain.

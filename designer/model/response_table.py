@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal, NoReturn
 
 from designer.base.errors import MISSING, InputError
+from designer.base.json_schema import either
 from designer.base.schema import Accepts, FileTable, choice, flag, number, physical, shown, span
 from designer.dynamics.counts import MAX_PERIOD, Counts, read_counts
 from designer.dynamics.orbit import Orbit
@@ -24,7 +25,11 @@ _FREQUENCY = ("omega", "Omega", "frequency")
 def _omega() -> Accepts:
     """None for "best"."""
     frequency = number("", _OMEGA, _positive)
-    return Accepts(_OMEGA, lambda value: None if value == "best" else frequency.check(value))
+    return Accepts(
+        _OMEGA,
+        lambda value: None if value == "best" else frequency.check(value),
+        json=either(frequency.json, {"const": "best"}),
+    )
 
 
 def _positive(value: float) -> bool:
@@ -42,7 +47,8 @@ def _frequency() -> Accepts:
             raise ValueError
         return angular
 
-    return Accepts(f"a number > 0 in Hz, or text such as {FREQUENCIES}", check)
+    expected = f"a number > 0 in Hz, or text such as {FREQUENCIES}"
+    return Accepts(expected, check, json={"type": ["number", "string"]})
 
 
 def _expect() -> Accepts:
@@ -52,13 +58,18 @@ def _expect() -> Accepts:
         except ValueError:
             raise ValueError from None
 
-    return Accepts(f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIOD} and p, q >= 0', check)
+    expected = f'n-p-q such as "1-2-2", with n from 1 to {MAX_PERIOD} and p, q >= 0'
+    return Accepts(expected, check, json={"type": "string"})
 
 
 def _clearance() -> Accepts:
     expected = "a number > 0, or a range [low, high] of numbers > 0"
     one, both = number("", expected, _positive), span("", expected, _positive)
-    return Accepts(expected, lambda value: (both if isinstance(value, list) else one).check(value))
+    return Accepts(
+        expected,
+        lambda value: (both if isinstance(value, list) else one).check(value),
+        json=either(one.json, both.json),
+    )
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ def _band() -> Accepts:
             raise ValueError
         return low, high
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=both.json)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from designer.base.errors import MISSING, InputError
+from designer.base.json_schema import either
 from designer.base.schema import Accepts, FileTable, fraction, line, number, one_of, several, span
 from designer.base.units import parse_quantity
 from designer.model.distributions import Binned, Distribution, Normal, Uniform
@@ -85,7 +86,7 @@ def _shape() -> Accepts:
             table["law"], **{key: positive(table, key) for key in own if key in table}
         )
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=either({"enum": list(LAWS)}, {"type": "object"}))
 
 
 def _offset() -> Accepts:
@@ -102,7 +103,8 @@ def _offset() -> Accepts:
             raise ValueError("both are > 0")
         return Offset(sigma, limit)
 
-    return Accepts('0, or { sigma = "3 mV", limit = "10 mV" }', check)
+    expected = '0, or { sigma = "3 mV", limit = "10 mV" }'
+    return Accepts(expected, check, json=either({"const": 0}, {"type": "object"}))
 
 
 def _drift(expected: str, fine: Callable[[float], bool]) -> Accepts:
@@ -117,7 +119,7 @@ def _drift(expected: str, fine: Callable[[float], bool]) -> Accepts:
             raise ValueError("± a number >= 0")
         return -width, width
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=either(one.json, two.json))
 
 
 def _tempco() -> Accepts:
@@ -128,12 +130,13 @@ def _tempco() -> Accepts:
 def _ageing(catalogue: bool = False) -> Accepts:
     expected = "a fraction >= 0 such as 0.005 for ±, or [low, high]"
     expected += ', or "catalogue"' if catalogue else ""
-    either = _drift(expected, lambda value: abs(value) < 1.0)
+    drift = _drift(expected, lambda value: abs(value) < 1.0)
 
     def check(value: object) -> object:
-        return value if catalogue and value == "catalogue" else either.check(value)
+        return value if catalogue and value == "catalogue" else drift.check(value)
 
-    return Accepts(expected, check)
+    json = either(drift.json, {"const": "catalogue"}) if catalogue else drift.json
+    return Accepts(expected, check, json=json)
 
 
 def _figure(unit: str, example: str) -> Accepts:
@@ -143,7 +146,8 @@ def _figure(unit: str, example: str) -> Accepts:
     def check(value: object) -> object:
         return value if value in ("typical", "data sheet") else between.check(value)
 
-    return Accepts(expected, check)
+    words = {"enum": ["typical", "data sheet"]}
+    return Accepts(expected, check, json=either(words, between.json))
 
 
 _SHARE = number("", "a share from 0 to 1", lambda value: 0.0 <= value <= 1.0)
@@ -159,7 +163,7 @@ def _names() -> Accepts:
             raise ValueError("each of them once")
         return names
 
-    return Accepts(expected, check)
+    return Accepts(expected, check, json=listed.json)
 
 
 @dataclass(frozen=True)

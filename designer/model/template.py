@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Literal
 
+from designer.base import atomic_write
 from designer.base.errors import InputError
+from designer.base.plain_json import dumps
 from designer.model.ascii_sketch import sketch
-from designer.model.model_file import read_model_file
+from designer.model.model_file import json_schema, read_model_file
 from designer.model.second_format import second_format
 
 _SKETCH = "\n".join(f"# {line}" for line in sketch().splitlines())
@@ -47,8 +50,12 @@ side_conditions = true          # false: the match alone; or a list of those to 
 # measured = "measured.csv"     # part,value[,tolerance][,board]
 """
 
+SCHEMA = "designer.schema.json"
+"""The file beside a model file from which an editor knows the keys."""
+
 TEXT = (
     f"""\
+#:schema ./{SCHEMA}
 # A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
 # Numbers may carry units as text: "22.1k", "100nF", "1 kHz".
 
@@ -102,6 +109,7 @@ expect = "1-2-2"
 """A file of format 1."""
 
 SECOND = (
+    f"#:schema ./{SCHEMA}\n"
     """\
 # A model file for designer. `designer run THIS_FILE --out FOLDER` makes a design folder.
 # Numbers may carry units as text: "22.1k", "100nF", "1 kHz". Texts with units become SI; plain
@@ -175,8 +183,7 @@ expect = "1-1-1"
 # twin = "exact"                # of 1-2-1 its mirror twin 1-1-2 will not do
 # b = 1.2                       # with every gap and constant force 1.2 times as large
 
-"""
-    + _CIRCUIT
+""" + _CIRCUIT
 )
 """A file of format 2."""
 
@@ -188,6 +195,9 @@ def new(
     format: Literal[1, 2] | None = None,
 ) -> Path:
     """The verb ``new``: write a commented model file to start from; its path.
+
+    Beside a commented file stands ``SCHEMA``: with it an editor that knows JSON Schema completes
+    the keys and marks mistakes. A file of that name that is something else is left alone.
 
     from_ : a model file to begin with: one of format 1 is rewritten in format 2
     (``second_format``), one of format 2 copied. format : of the commented file, 1 unless given.
@@ -207,7 +217,17 @@ def new(
     except OSError as error:
         expected = "a file that can be written"
         raise InputError(place, "PATH", error.strerror or str(error), expected) from None
+    if from_ is None:
+        _write_schema(place.with_name(SCHEMA))
     return place
+
+
+def _write_schema(place: Path) -> None:
+    """Write the JSON Schema of model files, or renew one that an older version wrote."""
+    schema = json_schema()
+    with contextlib.suppress(OSError):  # the model file is good without it
+        if not place.exists() or f'"{schema["title"]}"' in place.read_text("utf-8", "replace"):
+            atomic_write.write(place, dumps(schema))
 
 
 def _text(from_: Path | str | None, format: Literal[1, 2] | None) -> str:
