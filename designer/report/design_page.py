@@ -328,7 +328,12 @@ def _errors(data: ReportData, picture: Picture | Gallery | None) -> PageSection:
 def _certificate(design: Design) -> str:
     c, largest = design.certificate, words.error(design.errors.max_error)
     text = f"Status {c.status}; lower bound {words.error(c.lower_bound)}."
-    if c.status == "bound":
+    if c.status == "bound" and c.lower_bound <= EXACT:
+        text = (
+            f"Not proved optimal: this design reaches {largest}. Whether a better choice from this "
+            "catalogue exists is open."
+        )
+    elif c.status == "bound":
         text = (
             f"Not proved optimal: this design reaches {largest}; what is proved is that no choice "
             f"from this catalogue stays below {words.error(c.lower_bound)}. Whether a choice in "

@@ -13,7 +13,9 @@ from designer.circuit.coefficients import EXACT
 from designer.circuit.design import Design
 from designer.circuit.netlist import Capacitor, Circuit, Diode, Reference, Resistor, Section
 from designer.model.lumped_system import LumpedSystem
+from designer.model.mechanics import MechanicalModel
 from designer.model.model import Dimensionless, Mechanical, SiScales
+from designer.model.relative_motion import relative_motions, subscripted
 from designer.model.si_units import MECHANICAL_UNITS
 from designer.model.system_equations import element_rows
 from designer.report import words
@@ -119,19 +121,30 @@ def opamp_table(circuit: Circuit) -> Table | None:
 
 
 def error_table(design: Design) -> Table | None:
-    system = design.model.second_order()
-    wanted = system.state_matrix()
-    rows = []
-    for name, error in design.errors.errors.items():
-        term = words.TERM.fullmatch(name)
-        want = "0" if name in ("dead-zone null", "dead-zone bias") else words.NONE
-        if term is not None:
-            row, column = (2 * (int(term[i]) - 1) + len(term[i + 1]) for i in (1, 3))
-            want = words.number(float(wanted[row - 1, column]))
-        elif name.endswith("stop slope"):
-            want = words.number(system.relative_stiffness(system.clearances[0]))
-        rows.append((words.coefficient(name), want, words.error(error)))
+    spring = spring_of(design.model)
+    rows = [
+        (words.coefficient(name, spring), _wanted(design, name), words.error(error))
+        for name, error in design.errors.errors.items()
+    ]
     return table(("coefficient", "wanted", "ln(realised/wanted)"), rows, (1, 2))
+
+
+def spring_of(model: MechanicalModel) -> str:
+    """What the stiffness of a stop is counted in."""
+    return "K1" if isinstance(model, Dimensionless) else "the springs on its mass"
+
+
+def _wanted(design: Design, name: str) -> str:
+    """The coefficient as the model has it."""
+    system = design.model.second_order()
+    if term := words.TERM.fullmatch(name):
+        row, column = (2 * (int(term[i]) - 1) + len(term[i + 1]) for i in (1, 3))
+        return words.number(float(system.state_matrix()[row - 1, column]))
+    if name.startswith(("dead-zone null", "dead-zone bias")):
+        return "0"
+    if name.endswith("stop slope"):
+        return words.number(system.relative_stiffness(system.clearances[0]))
+    return words.NONE
 
 
 def scale_table(design: Design, si: SiScales | None) -> Table | None:
@@ -146,8 +159,7 @@ def scale_table(design: Design, si: SiScales | None) -> Table | None:
     if si is not None:
         slow = si.time_scale / scales.seconds
         rows.append(("mechanism's time per circuit time", f"{words.number(slow)} s/s"))
-    if design.circuit.stops:
-        rows.append(("contact begins at (v1)", _thresholds(design)))
+    rows += _thresholds(design)
     names = words.state_symbols(len(scales.volts) // 2)
     for state, volts in zip(names, scales.volts, strict=True):
         rows.append((f"one unit of {state}", words.quantity(float(volts), "V")))
@@ -166,16 +178,33 @@ def scale_table(design: Design, si: SiScales | None) -> Table | None:
     return table(("scale", "value"), rows, (1,))
 
 
-def _thresholds(design: Design) -> str:
-    """v1 where contact begins, with its sign; ± where both stops stand alike."""
-    scales = design.errors.scales
-    upper = words.quantity(scales.threshold, "V")
-    lower = f"−{words.quantity(scales.threshold_lower, 'V')}"
-    if not math.isfinite(scales.threshold_lower):
-        return upper
-    if design.circuit.stops[0].upper is None:
-        return lower
-    return f"± {upper}" if abs(scales.offcentre) <= EXACT else f"{upper} and {lower}"
+def _thresholds(design: Design) -> list[tuple[str, str]]:
+    """Where contact begins in each clearance, on the scale of the mass that moves in it."""
+    system, rows = design.model.second_order(), []
+    for number, (clearance, motion) in enumerate(
+        zip(system.clearances, relative_motions(system), strict=False)
+    ):
+        where = f"v{2 * clearance.mass + 1}"
+        if clearance.other is not None:
+            where = f"{motion.symbol} by the scale of {subscripted(f'x{clearance.mass + 1}')}"
+        named = "" if len(system.clearances) == 1 else f" in {clearance.name}"
+        rows.append((f"contact{named} begins at ({where})", _places(design, number)))
+    return rows
+
+
+def _places(design: Design, number: int) -> str:
+    """Voltages with their signs; ± where both stops stand alike."""
+    scales, clearance = design.errors.scales, design.model.second_order().clearances[number]
+    volts = float(scales.volts[2 * clearance.mass])
+    first = {1: scales.threshold, -1: scales.threshold_lower} if number == 0 else {}
+    places = []
+    for side, stop in clearance.sides:
+        key = f"gap {clearance.name} {'upper' if side > 0 else 'lower'}"
+        realised = stop.gap * volts * math.exp(design.errors.errors.get(key, 0.0))
+        places.append(side * first.get(side, realised))
+    texts = [words.quantity(place, "V").replace("-", "−") for place in places]
+    even = abs(sum(places)) <= EXACT * sum(map(abs, places)) and len(places) == 2
+    return f"± {texts[0]}" if even else " and ".join(texts)
 
 
 def condition_table(design: Design) -> Table | None:

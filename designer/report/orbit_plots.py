@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,19 +22,16 @@ from designer.base.figure_style import (
     NGSPICE_COLOUR,
     axis_limits,
     new_figure,
-    say,
     shade_stops,
     styled,
 )
 from designer.check.checked_design import CheckedResponse
 from designer.circuit.nominal import Trace
 from designer.dynamics.orbit import Orbit, OrbitStatus
+from designer.model.relative_motion import RelativeMotion
 
 ENGINES = {"model": "model", "circuit": "exact circuit", "ngspice": "ngspice"}
 """Names of the engines, by their keys in ``checked_design.traces``."""
-
-BOTH = (1, -1)
-"""Sides with a stop: 1 upper, -1 lower; () for a model without a clearance."""
 
 APERIODIC_PERIODS = 8
 """Drive periods of a response without a period that a time trace shows."""
@@ -47,51 +44,26 @@ WIDEST_TITLE = 48
 def phase_portrait(
     checked: CheckedResponse,
     traces: Mapping[str, Trace],
-    *,
-    sides: Sequence[int] = BOTH,
+    motion: RelativeMotion,
+    clearance: int = 0,
 ) -> Figure:
-    """One response in the plane (x1, x1'), all engines over each other, in model units.
+    """One response in the plane of displacement and velocity in a clearance, all engines over each
+    other, in model units.
 
     The model is a broad light line, the exact circuit a dashed one on it, ngspice dots; triangles
-    mark where an impact begins; beyond ±b the mass is in contact. sides : the stops there are.
+    mark where an impact begins; beyond the stops there is contact. motion : in the clearance with
+    the number ``clearance``.
     """
     figure = new_figure(3.5, 3.2)
-    _portrait(figure.subplots(), checked, traces, sides)
-    return figure
-
-
-@styled
-def portrait_sheet(
-    shown: Sequence[tuple[CheckedResponse, Mapping[str, Trace]]], *, sides: Sequence[int] = BOTH
-) -> Figure:
-    """Phase portraits of all responses as small multiples, each with limits of its own."""
-    columns = max(1, min(3, len(shown)))
-    rows = max(1, -(-len(shown) // columns))
-    figure = new_figure(max(3.2 * columns, 3.5), 2.85 * rows + 0.35)
-    grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    for i, (axes, (checked, traces)) in enumerate(zip(grid, shown, strict=False)):
-        _portrait(axes, checked, traces, sides)
-        axes.set_xlabel("x₁" if i + columns >= len(shown) else "")
-        axes.set_ylabel("x₁′" if i % columns == 0 else "")
-    for axes in grid[len(shown) :]:
-        axes.set_axis_off()
-    drawn = {name for checked, traces in shown for name in _drawn(traces, _orbits(checked))}
-    names = [name for name in ENGINES if name in drawn]
-    if shown:
-        figure.legend(handles=_keys(names, sides), loc="outside lower center", ncols=5)
-    else:
-        say(grid[0], "no responses")
+    _portrait(figure.subplots(), checked, traces, motion, clearance)
     return figure
 
 
 @styled
 def time_traces(
-    checked: CheckedResponse,
-    traces: Mapping[str, Trace],
-    *,
-    sides: Sequence[int] = BOTH,
+    checked: CheckedResponse, traces: Mapping[str, Trace], motion: RelativeMotion
 ) -> Figure:
-    """x1(t) over the n periods of the response, with the stops shaded."""
+    """The displacement in a clearance over the n periods of the response, with the stops shaded."""
     figure = new_figure(3.5, 1.75)
     axes = figure.subplots()
     period = 2.0 * np.pi / checked.model.omega
@@ -101,9 +73,10 @@ def time_traces(
     reference = traces.get("model")
     shown: list[Array] = []
     for name, trace in _drawn(traces, orbits).items():
-        cycles, x = trace.time / period, trace.states[:, 0]
+        cycles, x = trace.time / period, _moved(checked, trace, motion)[:, 0]
         if reference is not None and name != "model" and n > 1:
-            x = _shifted(cycles, x, reference.time / period, reference.states[:, 0], n)
+            wanted = _moved(checked, reference, motion)[:, 0]
+            x = _shifted(cycles, x, reference.time / period, wanted, n)
         keep = (cycles <= span * (1.0 + 1e-9)) & np.isfinite(x)
         cycles, x = cycles[keep], x[keep]
         if not len(x):
@@ -114,26 +87,24 @@ def time_traces(
             axes.plot(cycles[at], x[at], **_look(name, orbits[name]))
         else:
             axes.plot(cycles, x, **_look(name, orbits[name]))
-    stops = _stops(checked, sides)
-    places = [stop.place for stop in stops]
-    limits = axis_limits(np.concatenate([*shown, [0.0]]), places)
+    limits = axis_limits(np.concatenate([*shown, [0.0]]), motion.gaps)
     axes.set_ylim(limits)
     axes.set_xlim(0.0, span)
-    shade_stops(axes, _shaded(stops), limits, across=True)
+    shade_stops(axes, list(motion.stops), limits, across=True)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=span > 2))
     axes.yaxis.set_major_locator(MaxNLocator(4))
     length = f"{1e3 / checked.excitation.frequency:.3g} ms"
     axes.set_xlabel(f"drive periods ({length} each on the bench)", size=8)
-    axes.set_ylabel("x₁")
+    axes.set_ylabel(motion.symbol)
     return figure
 
 
 @styled
-def legend(*, ngspice: bool = True, sides: Sequence[int] = BOTH) -> Figure:
+def legend(*, ngspice: bool = True, stops: bool = True) -> Figure:
     """The key to portraits and traces, for a page that shows many without one."""
     names = [name for name in ENGINES if ngspice or name != "ngspice"]
     figure = new_figure(3.9, 0.48)
-    figure.legend(handles=_keys(names, sides), loc="center left", ncols=3, borderpad=0.0)
+    figure.legend(handles=_keys(names, stops=stops), loc="center left", ncols=3, borderpad=0.0)
     return figure
 
 
@@ -153,58 +124,44 @@ def _drawn(traces: Mapping[str, Trace], orbits: Mapping[str, Orbit]) -> dict[str
     }
 
 
-class _Stop(NamedTuple):
-    """A stop that the first mass meets, in model units."""
-
-    side: int
-    place: float
-    clearance: int
-
-
-def _stops(checked: CheckedResponse, sides: Sequence[int]) -> tuple[_Stop, ...]:
-    """The stops between the first mass and ground."""
-    if checked.design is None:
-        return tuple(_Stop(side, side * checked.model.b, 0) for side in sides)
-    clearances = checked.design.model.at(checked.model.b).second_order().clearances
-    return tuple(
-        _Stop(side, side * stop.gap, number)
-        for number, clearance in enumerate(clearances)
-        if clearance.mass == 0 and clearance.other is None
-        for side, stop in clearance.sides
-    )
-
-
-def _shaded(stops: Sequence[_Stop]) -> list[tuple[int, float]]:
-    return [(stop.side, stop.place) for stop in stops]
+def _moved(checked: CheckedResponse, trace: Trace, motion: RelativeMotion) -> Array:
+    """(k, 2) displacement and velocity in a clearance; nan where a state is not finite."""
+    finite = np.isfinite(trace.states).all(axis=1, keepdims=True)
+    states = np.where(finite, trace.states, np.nan)
+    return motion.of(trace.time, states, checked.model.omega)
 
 
 def _portrait(
-    axes: Axes, checked: CheckedResponse, traces: Mapping[str, Trace], sides: Sequence[int]
+    axes: Axes,
+    checked: CheckedResponse,
+    traces: Mapping[str, Trace],
+    motion: RelativeMotion,
+    clearance: int,
 ) -> None:
-    orbits, stops = _orbits(checked), _stops(checked, sides)
+    orbits = _orbits(checked)
     drawn = {
         name: states[np.isfinite(states).all(axis=1)]
         for name, trace in _drawn(traces, orbits).items()
-        for states in [trace.states[:, :2]]
+        for states in [_moved(checked, trace, motion)]
     }
     every = np.concatenate([np.zeros((1, 2)), *drawn.values()])
-    xlim = axis_limits(every[:, 0], [stop.place for stop in stops])
+    xlim = axis_limits(every[:, 0], motion.gaps)
     ylim = axis_limits(every[:, 1], ())
-    shade_stops(axes, _shaded(stops), xlim)
+    shade_stops(axes, list(motion.stops), xlim)
     for name, states in drawn.items():
         if name == "ngspice":
             scaled = states / np.array([np.ptp(xlim), np.ptp(ylim)])
             states = states[_spaced(scaled[:, 0], scaled[:, 1], 0.045)]
         axes.plot(states[:, 0], states[:, 1], **_look(name, orbits[name]))
     model = checked.model.orbit
-    for stop in stops:
-        here = (model.impact_sides == stop.side) & (model.impact_clearances == stop.clearance)
+    for side, place in motion.stops:
+        here = (model.impact_sides == side) & (model.impact_clearances == clearance)
         entry = model.impact_velocities[here]
         axes.plot(
-            np.full(len(entry), stop.place),
+            np.full(len(entry), place),
             entry,
             ls="",
-            marker=">" if stop.side > 0 else "<",
+            marker=">" if side > 0 else "<",
             **_IMPACT,
             zorder=5,
             clip_on=False,
@@ -213,8 +170,8 @@ def _portrait(
     axes.set_ylim(*ylim)
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.yaxis.set_major_locator(MaxNLocator(5))
-    axes.set_xlabel("x₁")
-    axes.set_ylabel("x₁′")
+    axes.set_xlabel(motion.symbol)
+    axes.set_ylabel(motion.rate)
     shown = [f"{name} {orbit.response}" for name, orbit in orbits.items()]
     text = "   ".join(shown)
     if len(text) > WIDEST_TITLE:
@@ -247,10 +204,10 @@ def _look(name: str, orbit: Orbit) -> dict[str, Any]:
     return {**style, "color": CIRCUIT_COLOUR, "ls": (0, (4.0, 2.2)), "zorder": 3}
 
 
-def _keys(names: Sequence[str], sides: Sequence[int]) -> list[Line2D]:
+def _keys(names: Sequence[str], *, stops: bool) -> list[Line2D]:
     periodic = Orbit(OrbitStatus.PERIODIC)
     handles = [Line2D([], [], **_look(name, periodic), label=ENGINES[name]) for name in names]
-    if sides:
+    if stops:
         box: dict[str, Any] = {"ms": 9, "mfc": CONTACT, "mec": MUTED, "mew": 0.6}
         handles += [
             Line2D([], [], ls="", marker=">", **_IMPACT, label="impact begins"),

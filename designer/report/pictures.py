@@ -14,7 +14,8 @@ from designer.check.checked_design import CheckedResponse, traces
 from designer.circuit.coefficients import EXACT
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model import Dimensionless, Mechanical
-from designer.report import blame_plots, map_plots, orbit_plots, study_plots, words
+from designer.model.relative_motion import relative_motions
+from designer.report import blame_plots, design_tables, map_plots, orbit_plots, study_plots, words
 from designer.report.data import ReportData
 from designer.report.design_page import Pictures
 from designer.report.inline_svg import InlineSvg
@@ -24,6 +25,10 @@ from designer.report.system_drawing import system_drawing
 INTRO = (
     "Displacement x₁ and velocity x₁′ of mass 1, in the model's units, over one response; below, "
     "x₁ over time. The engines lie on each other where they agree."
+)
+EVERY_CLEARANCE = (
+    "Displacement and velocity in each clearance, in the model's units, over one response; below, "
+    "the displacement over time. The engines lie on each other where they agree."
 )
 KEY = (
     "Model: broad light line. Exact circuit: dashed line. ngspice: dots. Triangles: an impact "
@@ -66,7 +71,8 @@ def pictures(data: ReportData) -> Pictures:
         svg = element(map_plots.map_chart(label, one), f"Yield over {one.over} of {label}.")
         out[f"map {label} {one.over}"] = Picture(svg=svg)
     if data.design.errors.max_error > EXACT:
-        errors = {words.coefficient(k): v for k, v in data.design.errors.errors.items()}
+        unit = design_tables.spring_of(data.design.model)
+        errors = {words.coefficient(k, unit): v for k, v in data.design.errors.errors.items()}
         shows = "Size of each coefficient error, as in the table."
         out["errors"] = Picture(svg=element(study_plots.coefficient_chart(errors), shows))
     circuit, pins = data.board
@@ -94,28 +100,38 @@ def _drawing_label(data: ReportData) -> str:
 
 def _portraits(data: ReportData, element: Element) -> Gallery:
     ngspice = any(c.gate is not None for c in data.checked)
-    sides: tuple[int, ...] = ()
-    if data.design.circuit.stops:
-        sides = data.design.model.second_order().clearances[0].positions
-    key = Picture(svg=element(orbit_plots.legend(ngspice=ngspice, sides=sides), KEY))
-    cards = []
-    for i, c in enumerate(data.checked):
-        drawn = traces(data.design, c)
-        omega = words.number(c.model.omega)
-        engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
-        if c.ngspice is not None:
-            engines += f", ngspice {c.ngspice.response}"
-        portrait = element(
-            orbit_plots.phase_portrait(c, drawn, sides=sides),
-            f"Phase portrait at ω = {omega}: {engines}.",
-        )
-        trace = element(
-            orbit_plots.time_traces(c, drawn, sides=sides),
-            f"x₁ over time at ω = {omega}.",
-        )
-        cards.append(Picture("", _caption(data, i, c), svg=portrait + trace,
-                             warning=words.problem(c)))  # fmt: skip
-    return Gallery(INTRO, key, tuple(cards))
+    system = data.design.model.second_order()
+    key = orbit_plots.legend(ngspice=ngspice, stops=bool(system.clearances))
+    cards = [
+        _card(data, response, clearance, element)
+        for response in range(len(data.checked))
+        for clearance in range(max(1, len(system.clearances)))
+    ]
+    alone = [motion.symbol for motion in relative_motions(system)] == ["x₁"]
+    return Gallery(
+        INTRO if alone else EVERY_CLEARANCE, Picture(svg=element(key, KEY)), tuple(cards)
+    )
+
+
+def _card(data: ReportData, response: int, clearance: int, element: Element) -> Picture:
+    """One response, seen in one clearance."""
+    c = data.checked[response]
+    drawn, omega = traces(data.design, c), words.number(c.model.omega)
+    system = data.design.model.at(c.model.b).second_order()
+    motion = relative_motions(system)[clearance]
+    engines = f"model {c.model.orbit.response}, exact circuit {c.circuit.response}"
+    if c.ngspice is not None:
+        engines += f", ngspice {c.ngspice.response}"
+    place, caption = "", _caption(data, response, c)
+    if len(system.clearances) > 1:
+        place = f" in {system.clearances[clearance].name}"
+        caption = f"{motion.label}{place} · {caption}"
+    portrait = orbit_plots.phase_portrait(c, drawn, motion, clearance)
+    shows = element(portrait, f"Phase portrait{place} at ω = {omega}: {engines}.")
+    shows += element(
+        orbit_plots.time_traces(c, drawn, motion), f"{motion.symbol} over time at ω = {omega}."
+    )
+    return Picture("", caption, svg=shows, warning=words.problem(c))
 
 
 def _caption(data: ReportData, response: int, c: CheckedResponse) -> str:

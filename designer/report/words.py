@@ -16,7 +16,10 @@ from designer.yields.yield_count import Yield
 
 NONE = "–"
 
-TERM = re.compile(r"x(\d)('{1,2}) x(\d)('?)")
+TERM = re.compile(r"x(\d+)('{1,2}) x(\d+)('?)")
+_SLOPE = re.compile(r"(?:(upper|lower) )?stop slope(?: (?!x\d+' x)(.+?))?(?: x(\d+)' x(\d+))?")
+_GAP = re.compile(r"gap (.+) (upper|lower)")
+_REST = re.compile(r"(dead-zone null|dead-zone bias|constant)(?: (.+))?")
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -54,18 +57,32 @@ def problem(c: CheckedResponse) -> str:
     return f"{name(c)}: {'; '.join(parts)}" if parts else ""
 
 
-def coefficient(name: str) -> str:
-    term = TERM.fullmatch(name)
-    if term is None:
+def coefficient(name: str, spring: str = "K1") -> str:
+    """A coefficient error's name in words. spring : what stiffnesses are counted in."""
+    if TERM.fullmatch(name):
+        left, right = name.split()
+        return f"{_pretty(right)} in the equation of {_pretty(left)}"
+    if slope := _SLOPE.fullmatch(name):
+        side, clearance, row, column = slope.groups()
+        stop = f"{'a' if side is None else f'the {side}'} stop{_of(clearance)}"
+        if row is None:
+            return f"stiffness of {stop}, over {spring}"
+        return f"{_pretty(f'x{column}')} in the equation of {_pretty(f'x{row}')}″, by {stop}"
+    if gap := _GAP.fullmatch(name):
+        return f"gap to the {gap[2]} stop{_of(gap[1])}, over the gap that sets the amplitude"
+    if rest := _REST.fullmatch(name):
         return {
-            "stop slope": "stiffness of a stop, over K1",
-            "upper stop slope": "stiffness of the upper stop, over K1",
-            "lower stop slope": "stiffness of the lower stop, over K1",
-            "dead-zone null": "stiffness left inside the clearance, over K1",
-            "dead-zone bias": "force left inside the clearance, over K1 times the threshold",
-        }.get(name, name)
-    left, right = name.split()
-    return f"{_pretty(right)} in the equation of {_pretty(left)}"
+            "dead-zone null": f"stiffness left inside the clearance{_of(rest[2])}, over {spring}",
+            "dead-zone bias": f"force left inside the clearance{_of(rest[2])}, over {spring} times "
+            "the threshold",
+            "constant": f"constant force in the equation of {_pretty(rest[2] or '')}″",
+        }[rest[1]]
+    return name
+
+
+def _of(clearance: str | None) -> str:
+    """The clearance that is meant, where there are several."""
+    return "" if clearance is None else f" of {clearance}"
 
 
 def _pretty(state: str) -> str:

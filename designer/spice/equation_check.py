@@ -392,13 +392,13 @@ def _contact(
     gap = dict(clearance.sides)[side].gap
     if gap:
         threshold = side * (level - offset) / (slope - leftover)
-        volts = gap * design.errors.scales.volts[2 * clearance.mass] * _gain(design, index)
+        volts = gap * design.errors.scales.volts[2 * clearance.mass]
         # Both stops of an even clearance alone need not lie at the same distance: an offset of the
         # generator centres them.
         stated = design.errors.scales.threshold_lower if side < 0 else float("nan")
         alone = len(model.clearances) == 1 and clearance.upper == clearance.lower
         volts = stated if alone and np.isfinite(stated) else volts
-        deviation = float(abs(threshold / volts - 1.0))
+        deviation = float(abs(threshold / (volts * _gain(design, index)) - 1.0))
         findings.append(EquationFinding(f"threshold, {place}", deviation, bound))
     return findings
 

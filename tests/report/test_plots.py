@@ -19,6 +19,7 @@ from designer.circuit.nominal import Trace
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.model.find_responses import ModelResponse
+from designer.model.relative_motion import RelativeMotion
 from designer.model.response_table import Response
 from designer.report import orbit_plots, study_plots
 from designer.spice.deck import SolverSettings
@@ -31,6 +32,7 @@ from tests.shared.figure_text import clipped, overlapping
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SETTINGS = SolverSettings("trap", 1e-5)
+MOTION = RelativeMotion("x₁", "", np.array([1.0, 0.0]), 0.0, ((1, 0.25), (-1, -0.25)))
 
 
 def _orbit(n: int = 1, p: int = 1, q: int = 1) -> Orbit:
@@ -76,12 +78,11 @@ def _answer(sample: int, verdict: Verdict, radius: float = 0.5, miss: float = np
 
 
 def _figures() -> dict[str, Callable[[], Figure]]:
-    whole, none = _checked(gate=_heard()), _checked()
+    whole = _checked(gate=_heard())
     labels = ["ω = 1.55   1-1-1", "ω = 0.85   1-2-2"]
     return {
-        "portrait": lambda: orbit_plots.phase_portrait(whole, _traces()),
-        "sheet": lambda: orbit_plots.portrait_sheet([(whole, _traces()), (none, _traces())]),
-        "time": lambda: orbit_plots.time_traces(whole, _traces()),
+        "portrait": lambda: orbit_plots.phase_portrait(whole, _traces(), MOTION),
+        "time": lambda: orbit_plots.time_traces(whole, _traces(), MOTION),
         "legend": orbit_plots.legend,
         "yields": lambda: study_plots.yield_chart(labels, [Yield(20, 3, 1, 1), None]),
         "coefficients": lambda: study_plots.coefficient_chart({"x1'' x1": 1e-3, "stop slope": 0.0}),
@@ -157,7 +158,7 @@ def _lines(figure: Figure, axes: int = 0) -> dict[str, int]:
 
 
 def test_portrait_shows_every_engine_and_names_what_it_shows() -> None:
-    figure = orbit_plots.phase_portrait(_checked(gate=_heard()), _traces())
+    figure = orbit_plots.phase_portrait(_checked(gate=_heard()), _traces(), MOTION)
     shown = _lines(figure)
     assert set(shown) == {"model", "circuit", "ngspice"}
     assert 20 < shown["ngspice"] <= 131 < shown["model"]  # dots that hide nothing
@@ -167,48 +168,64 @@ def test_portrait_shows_every_engine_and_names_what_it_shows() -> None:
 
 
 def test_impacts_stand_on_the_stops() -> None:
-    (axes,) = orbit_plots.phase_portrait(_checked(_orbit(1, 3, 2)), _traces()).axes
+    (axes,) = orbit_plots.phase_portrait(_checked(_orbit(1, 3, 2)), _traces(), MOTION).axes
     marks = {str(m.get_marker()): np.asarray(m.get_xdata()) for m in axes.lines}
     assert marks[">"].tolist() == [0.25] * 3
     assert marks["<"].tolist() == [-0.25] * 2
 
 
 def test_a_model_without_stops_has_no_contact_in_its_pictures() -> None:
-    figure = orbit_plots.phase_portrait(_checked(), _traces(), sides=())
+    figure = orbit_plots.phase_portrait(_checked(), _traces(), replace(MOTION, stops=()))
     assert not figure.axes[0].patches
-    assert len(orbit_plots.time_traces(_checked(), _traces(), sides=(1,)).axes[0].patches) == 1
+    upper = replace(MOTION, stops=MOTION.stops[:1])
+    assert len(orbit_plots.time_traces(_checked(), _traces(), upper).axes[0].patches) == 1
+
+
+def test_a_clearance_between_masses_is_seen_by_what_moves_in_it() -> None:
+    """The second clearance: its own displacement, its own stops, its own impacts."""
+    motion = RelativeMotion("x₁ − x₂", "", np.array([1.0, -1.0]), 0.0, ((1, 0.1), (-1, -0.4)))
+    sides, stops = np.array([1.0, 1.0, -1.0]), np.array([0, 1, 1])
+    orbit = replace(_orbit(1, 2, 1), impact_sides=sides, impact_clearances=stops)
+    traces = {"model": _trace()}
+    (axes,) = orbit_plots.phase_portrait(_checked(orbit), traces, motion, 1).axes
+    marks = {str(m.get_marker()): np.asarray(m.get_xdata()) for m in axes.lines}
+    assert (marks[">"].tolist(), marks["<"].tolist()) == ([0.1], [-0.4])
+    (line,) = (m for m in axes.lines if len(m.get_xdata()) > 100)  # type: ignore[arg-type]
+    states = traces["model"].states
+    assert np.asarray(line.get_xdata()) == pytest.approx(states[:, 0] - states[:, 2])
+    assert np.asarray(line.get_ydata()) == pytest.approx(states[:, 1] - states[:, 3])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x₁ − x₂", "x₁′ − x₂′")
 
 
 def test_failed_ngspice_is_named_but_not_drawn() -> None:
     gate = GateResult(SETTINGS, False, np.nan, SimulationFailed("timestep too small"), (200,))
-    figure = orbit_plots.phase_portrait(_checked(gate=gate), _traces())
+    figure = orbit_plots.phase_portrait(_checked(gate=gate), _traces(), MOTION)
     assert "ngspice" not in _lines(figure)
     assert any("ngspice failed" in t.get_text() for t in figure.axes[0].texts)
 
 
 def test_statuses_that_are_long_take_lines_of_their_own() -> None:
     odd = Orbit(OrbitStatus.NOT_SETTLED, reason="no period")
-    figure = orbit_plots.phase_portrait(_checked(odd, odd, _heard(odd)), _traces(30))
+    figure = orbit_plots.phase_portrait(_checked(odd, odd, _heard(odd)), _traces(30), MOTION)
     assert any(t.get_text().count("\n") == 2 for t in figure.axes[0].texts)
 
 
 @pytest.mark.parametrize("traces", [{}, {"model": _trace()}], ids=["none", "model"])
 def test_engines_without_a_trace_are_left_out(traces: dict[str, Trace]) -> None:
     checked = _checked(failed("no mode holds") if not traces else None, failed("x"), _heard())
-    figure_style.to_svg(orbit_plots.phase_portrait(checked, traces))
-    figure_style.to_svg(orbit_plots.time_traces(checked, traces))
+    figure_style.to_svg(orbit_plots.phase_portrait(checked, traces, MOTION))
+    figure_style.to_svg(orbit_plots.time_traces(checked, traces, MOTION))
 
 
 def test_states_that_are_not_finite_are_left_out() -> None:
     broken = _trace()
     broken.states[5:] = np.inf
-    figure_style.to_svg(orbit_plots.phase_portrait(_checked(), {"model": broken}))
-    figure_style.to_svg(orbit_plots.time_traces(_checked(), {"model": broken}))
+    figure_style.to_svg(orbit_plots.phase_portrait(_checked(), {"model": broken}, MOTION))
+    figure_style.to_svg(orbit_plots.time_traces(_checked(), {"model": broken}, MOTION))
 
 
-def test_empty_sheet_and_empty_charts() -> None:
+def test_empty_charts() -> None:
     for figure in (
-        orbit_plots.portrait_sheet([]),
         study_plots.yield_chart([], []),
         study_plots.coefficient_chart({}),
         study_plots.margin_chart([], []),
@@ -219,7 +236,7 @@ def test_empty_sheet_and_empty_charts() -> None:
 def test_time_traces_of_a_longer_period_are_brought_into_phase() -> None:
     n, late = 3, _trace(3, delay=2.0 * np.pi)
     checked = _checked(_orbit(n), _orbit(n))
-    (axes,) = orbit_plots.time_traces(checked, {"model": _trace(3), "circuit": late}).axes
+    (axes,) = orbit_plots.time_traces(checked, {"model": _trace(3), "circuit": late}, MOTION).axes
     model, circuit = (line for line in axes.lines if len(line.get_xdata()) > 100)  # type: ignore[arg-type]
     assert np.allclose(np.asarray(model.get_ydata()), np.asarray(circuit.get_ydata()), atol=1e-9)
     assert axes.get_xlim() == (0.0, 3.0)
@@ -272,4 +289,4 @@ def test_a_label_is_text_and_never_a_formula() -> None:
 def test_model_that_was_not_found_is_drawn_all_the_same() -> None:
     checked = _checked()
     lost = replace(checked, model=replace(checked.model, found=False))
-    assert set(_lines(orbit_plots.phase_portrait(lost, _traces()))) == {"model", "circuit"}
+    assert set(_lines(orbit_plots.phase_portrait(lost, _traces(), MOTION))) == {"model", "circuit"}

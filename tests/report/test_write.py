@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from designer.base import figure_style
@@ -16,12 +17,15 @@ from designer.base.page import Table
 from designer.catalog.catalog import Catalog, load_catalog
 from designer.check import checked_design
 from designer.check.synthesis_result import synthesise
+from designer.circuit.coefficients import coefficient_errors
+from designer.circuit.design import Certificate, Design
 from designer.dynamics.counts import Counts
 from designer.dynamics.orbit import Orbit, OrbitStatus, failed
 from designer.jobs.origin import provenance
 from designer.model.ascii_sketch import sketch
 from designer.model.mechanics import Sides
-from designer.model.model_file import parse_model_file
+from designer.model.model_file import parse_model_file, read_model_file
+from designer.report import design_tables, words
 from designer.report.data import ReportData
 from designer.report.response_tables import ngspice_table
 from designer.report.write import render_html, render_markdown, write_report
@@ -33,6 +37,7 @@ from designer.verdicts.verdict import Verdict
 from designer.yields.layers import samples_task
 from designer.yields.study import RunResult, Study, plan_study
 from tests.shared.blank_figures import blank_figures
+from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.model_text import dimensionless
 from tests.shared.paper_cases import PAPER as EXAMPLE, synthesised
 from tests.shared.report_data import changed
@@ -454,6 +459,39 @@ def test_errors_that_are_not_zero_have_a_picture_and_a_bound(whole: ReportData) 
     assert len(page.pictures()) == 2 * len(whole.checked) + 6
     assert "this design reaches 1.23 %" in page.text
     assert "stays below 0.4 %" in page.text
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("x2'' x1", "x₁ in the equation of x₂″"),
+        ("stop slope", "stiffness of a stop, over K1"),
+        ("lower stop slope B", "stiffness of the lower stop of B, over K1"),
+        ("stop slope x2' x1", "x₁ in the equation of x₂″, by a stop"),
+        ("stop slope A x12' x1", "x₁ in the equation of x₁₂″, by a stop of A"),
+        ("dead-zone null", "stiffness left inside the clearance, over K1"),
+        ("dead-zone bias B", "force left inside the clearance of B, over K1 times the threshold"),
+        ("gap B upper", "gap to the upper stop of B, over the gap that sets the amplitude"),
+        ("constant x2", "constant force in the equation of x₂″"),
+    ],
+)
+def test_coefficients_of_any_system_have_names_for_people(name: str, text: str) -> None:
+    assert words.coefficient(name) == text
+
+
+def test_thresholds_of_several_clearances_are_those_of_the_circuit() -> None:
+    """Each of two contacts, as the model's gap by the scale and as an op-amp of the stage turns."""
+    model = read_model_file(EXAMPLE.parent / "three-masses.toml").model
+    system = model.second_order()
+    scale = Scale(1e-3, np.array([8.0, 8.0, 5.0, 6.0, 7.0, 3.0]), 1.0)
+    circuit = exact_circuit(system, scale)
+    errors = coefficient_errors(circuit, system)
+    design = Design(model, circuit, errors, Certificate("bound", 0.0, "none"), {}, {}, 0.0)
+    shown = design_tables.scale_table(design, None)
+    assert shown is not None
+    rows = {row[0]: row[1] for row in shown.rows}
+    assert rows["contact in A begins at (v1)"] == "± 2.4\u00a0V"
+    assert rows["contact in B begins at (v5)"] == "2.1\u00a0V"
 
 
 def test_model_in_si_units_without_a_clearance(catalog: Catalog) -> None:

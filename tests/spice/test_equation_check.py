@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +19,9 @@ from designer.circuit.design import Certificate, Design
 from designer.circuit.netlist import Circuit, Resistor
 from designer.cli import tables
 from designer.jobs.study_stage import satisfied
-from designer.model.mechanics import SecondOrderSystem, Sides
+from designer.model.mechanics import MechanicalModel, SecondOrderSystem, Sides
 from designer.model.model import Dimensionless
-from designer.model.model_file import parse_model_file
+from designer.model.model_file import parse_model_file, read_model_file
 from designer.spice.equation_check import (
     FLOOR,
     EquationCheck,
@@ -30,6 +31,7 @@ from designer.spice.equation_check import (
     transfer,
 )
 from designer.spice.pool import SpicePool
+from tests.shared.exact_circuits import Scale, exact_circuit
 from tests.shared.model_text import COARSE_CIRCUIT
 from tests.shared.paper_cases import synthesised
 from tests.shared.stages import bought, model as stage_model, one_sided, rectifier, stage
@@ -50,6 +52,7 @@ omega = 0.85
 """
     + COARSE_CIRCUIT
 )
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OPEN = ("transfer, open",)
 ALL = {
     "transfer, open", "transfer, upper contact", "transfer, lower contact",
@@ -162,7 +165,7 @@ def test_right_circuits_pass(pool: SpicePool, name: str, findings: set[str]) -> 
     assert len(said["findings"]) == len(findings)
 
 
-def around(circuit: Circuit, model: Dimensionless) -> Design:
+def around(circuit: Circuit, model: MechanicalModel) -> Design:
     """A design of a circuit that is there already."""
     errors = coefficient_errors(circuit, model.second_order())
     return Design(model, circuit, errors, Certificate("bound", 0.0, "none"), {}, {}, 0.0)
@@ -193,6 +196,16 @@ def test_every_stage_passes(pool: SpicePool, name: str) -> None:
         wrong = around(circuit, stage_model(sides))
         spoilt = check(with_value(wrong, feedback, 1.05), (), pool)
         assert not by_name(spoilt)[f"slope, {contacts[0]} contact"].passed
+
+
+def test_a_stage_between_two_masses_is_read_by_what_moves_in_it(pool: SpicePool) -> None:
+    """Its displacement is on a net of its own, whose volts are not those of the first mass."""
+    model = read_model_file(EXAMPLES / "backlash.toml").model
+    system = model.second_order()
+    scale = Scale(1e-3, np.array([8.0, 8.0, 5.0, 6.0]), 1.0)
+    result = check(around(exact_circuit(system, scale), model), (), pool)
+    assert set(by_name(result)) == ALL
+    assert all(f.deviation < FLOOR / 10.0 for f in result.findings)
 
 
 @pytest.mark.parametrize(
