@@ -32,6 +32,9 @@ from .counts import (
     Pairs as Pairs,
     read_counts as read_counts,
 )
+from .drive_states import (
+    with_drive_states as with_drive_states,
+)
 from .flow import (
     MAX_EVENTS as MAX_EVENTS,
     Flow as Flow,

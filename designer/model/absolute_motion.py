@@ -13,9 +13,10 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.dynamics import step_budget
+from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import Orbit
-from designer.dynamics.piecewise_linear import Drive, Guard, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
 from designer.dynamics.step_budget import Budget
 
 OPEN_PERIODS = 200
@@ -30,7 +31,8 @@ def absolute_extremes(flow: Flow, orbit: Orbit, ground: Array) -> Array:
     """
     if not len(orbit.extremes) or not ground.any():
         return orbit.extremes
-    moved = Flow(_with_drive(flow, ground), Drive(flow.drive.omega), fast=False)
+    rest = Drive(flow.drive.omega, 0.0, flow.drive.offset)
+    moved = Flow(_in_absolute_terms(flow, ground), rest, fast=False)
     start = np.concatenate([orbit.start, [0.0, 1.0]])
     with moved.within(Budget(step_budget.SETTLING)):
         run = moved.run(start, orbit.n or OPEN_PERIODS, mode=orbit.mode or None, measure=True)
@@ -39,39 +41,15 @@ def absolute_extremes(flow: Flow, orbit: Orbit, ground: Array) -> Array:
     return np.asarray(run.extremes[:-2])
 
 
-def _with_drive(flow: Flow, ground: Array) -> PiecewiseLinearSystem:
+def _in_absolute_terms(flow: Flow, ground: Array) -> PiecewiseLinearSystem:
     """The system of the states (z + ground sin ωt, sin ωt, cos ωt); it counts no impacts."""
-    system, drive, n = flow.system, flow.drive, flow.system.size
+    driven, n = with_drive_states(flow.system, flow.drive), flow.system.size
+    forth, back = np.eye(n + 2), np.eye(n + 2)
+    forth[:n, n], back[:n, n] = ground, -ground
 
     def build(key: ModeKey) -> Mode:
-        mode = system.mode(key)
-        A = np.zeros((n + 2, n + 2))
-        A[:n, :n] = mode.A
-        A[:n, n] = drive.amplitude * mode.B - mode.A @ ground
-        A[:n, n + 1] = drive.omega * ground
-        A[n, n + 1], A[n + 1, n] = drive.omega, -drive.omega
-        d = np.concatenate([mode.d + drive.offset * mode.B, [0.0, 0.0]])
-        guards = tuple(_guard(g, drive, ground) for g in mode.guards)
-        return Mode(A, np.zeros(n + 2), d, guards, sides=())
+        mode = driven.mode(key)
+        guards = tuple(replace(g, C=g.C @ back, clearance=-1) for g in mode.guards)
+        return replace(mode, A=forth @ mode.A @ back, guards=guards, sides=())
 
-    return replace(
-        system,
-        states=(*system.states, "sin", "cos"),
-        build=build,
-        clearances=(),
-        displacement=(),
-        velocity=(),
-        mirror=None,
-        working=(),
-        _modes={},
-    )
-
-
-def _guard(guard: Guard, drive: Drive, ground: Array) -> Guard:
-    on_sine = drive.amplitude * guard.D - float(guard.C @ ground)
-    return Guard(
-        np.concatenate([guard.C, [on_sine, 0.0]]),
-        0.0,
-        guard.e + drive.offset * guard.D,
-        guard.target,
-    )
+    return replace(driven, build=build, clearances=(), displacement=(), velocity=(), _modes={})

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from designer.base.errors import InputError
-from designer.model.lumped_checks import check
+from designer.model.lumped_checks import check, check_damped
 from designer.model.lumped_elements import GROUND, Elements, Gap
 from designer.model.mechanics import Clearance, SecondOrderSystem
 from designer.model.model import GREATEST, SMALLEST
@@ -67,6 +67,7 @@ class LumpedSystem(Elements):
 
     def __post_init__(self) -> None:
         check(self)
+        check_damped(self.second_order().state_matrix())
 
     def second_order(self) -> SecondOrderSystem:
         """The equations of motion."""

@@ -8,7 +8,7 @@ states, sine and cosine, which start at any phase: as exact as everything else.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +17,10 @@ from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.reduction import FloatingCircuit
+from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow, FlowStatus
 from designer.dynamics.orbit import Orbit, failed
-from designer.dynamics.piecewise_linear import Drive, Mode, ModeKey, PiecewiseLinearSystem
+from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spread.random_streams import uniforms
 from designer.spread.spread import draw_many
 from designer.verdicts.exact_rung import Case, settled
@@ -69,35 +70,10 @@ class PowerUpEnd(NamedTuple):
     """The end of the recipe; None where the flow failed."""
 
 
-def with_generator(system: PiecewiseLinearSystem, drive: Drive) -> PiecewiseLinearSystem:
-    """The system with the generator's sine and cosine as its last two states."""
-    n, swing = system.size, drive.amplitude
-
-    def build(key: ModeKey) -> Mode:
-        mode = system.mode(key)
-        A = np.zeros((n + 2, n + 2))
-        A[:n, :n] = mode.A
-        A[:n, n] = swing * mode.B
-        A[n, n + 1], A[n + 1, n] = drive.omega, -drive.omega
-        guards = tuple(replace(g, C=np.concatenate([g.C, [g.D * swing, 0.0]])) for g in mode.guards)
-        B, d = (np.concatenate([vector, np.zeros(2)]) for vector in (mode.B, mode.d))
-        return replace(mode, A=A, B=B, d=d, guards=guards)
-
-    return PiecewiseLinearSystem(
-        states=(*system.states, "sine", "cosine"),
-        build=build,
-        start=system.start,
-        clearances=system.clearances,
-        displacement=tuple(np.insert(r, n, [swing * r[n], 0.0]) for r in system.displacement),
-        velocity=tuple(np.insert(r, n, [0.0, swing * drive.omega * r[n]]) for r in system.velocity),
-        continuous=system.continuous,
-    )
-
-
 def until_strobe(driven: PiecewiseLinearSystem, drive: Drive, phase: float) -> Arrival | None:
     """The first strobe after switching on at drive phase ``phase`` [rad]; None if the flow fails.
 
-    driven : the system ``with_generator``.
+    driven : the system with the drive's sine and cosine as states (``with_drive_states``).
     """
     left = 1.0 - (phase / (2.0 * np.pi)) % 1.0
     start = np.zeros(driven.size)
@@ -120,7 +96,7 @@ def follow(
     ------
     ArithmeticError : no mode of the system holds at some state on the way.
     """
-    driven = with_generator(system, stages[0][0])
+    driven = with_drive_states(system, stages[0][0])
     arrivals = [until_strobe(driven, stages[0][0], phase) for phase in phases]
     for number, (drive, periods) in enumerate(stages):
         flow = Flow(system, drive)  # one for all phases: its tables cost more than a few periods

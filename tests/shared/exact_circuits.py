@@ -17,6 +17,8 @@ from designer.model.mechanics import SecondOrderSystem
 from tests.shared.stages import CATALOG, VREF
 
 FARAD = 10e-9
+IDLE = 8.0
+"""Volts at which a half's output stands, a drop beside it, where the other half begins to drive."""
 STAGE = DeadZoneStage("rectifier", CATALOG.diode("1N4148"), CATALOG.reference("LM4040C50"))
 
 
@@ -62,6 +64,9 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
             values |= {f"R{first}": 10e3, f"R{first + 2}": 10e3 * slope}
             if stop.gap:
                 values[f"R{first + 1}"] = 10e3 * VREF / (abs(stop.gap) * own)
+        if len(clearance.sides) == 2:
+            span = own * sum(stop.gap for _, stop in clearance.sides)
+            values |= dict.fromkeys((f"R{base + 8}", f"R{base + 9}"), 10e3 * IDLE / span)
         masses = [(small, clearance.mass)]
         if clearance.other is not None:
             masses.append((small + 1, clearance.other))

@@ -12,13 +12,14 @@ from designer.base.arrays import Array
 from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.reduction import Reduction
 from designer.dynamics.attractors import settle
+from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, PiecewiseLinearSystem
 from designer.spice import deck
 from designer.spice.deck import SolverSettings
 from designer.spice.worker import open_simulator
 from designer.spread.spread import draw
-from designer.yields.power_up import follow, until_strobe, with_generator
+from designer.yields.power_up import follow, until_strobe
 from tests.shared.bench_plans import SPREAD
 from tests.shared.paper_cases import subject
 
@@ -47,7 +48,7 @@ def test_the_first_strobe_is_that_of_another_integrator(phase: float) -> None:
     system = Reduction(subject(2).circuit, board).system()
     e = subject(2).excitation
     drive = Excitation(e.frequency, 3.0 * e.amplitude, 0.1 * e.amplitude).drive
-    met = until_strobe(with_generator(system, drive), drive, phase)
+    met = until_strobe(with_drive_states(system, drive), drive, phase)
     assert met is not None
     state, _, clipped = met
     left = (1.0 - phase / (2.0 * math.pi)) * drive.period
@@ -59,7 +60,7 @@ def test_the_first_strobe_is_that_of_another_integrator(phase: float) -> None:
 def test_at_phase_zero_it_is_the_flow_itself() -> None:
     system = subject(3).system
     drive = subject(3).excitation.drive
-    met = until_strobe(with_generator(system, drive), drive, 0.0)
+    met = until_strobe(with_drive_states(system, drive), drive, 0.0)
     assert met is not None
     wanted = Flow(system, drive).run(np.zeros(4), 1).strobes[-1]
     np.testing.assert_allclose(met[0], wanted, rtol=1e-10)
@@ -129,7 +130,7 @@ def test_ngspice_ends_where_the_exact_circuit_does(sample: int | None, degrees: 
     nets = known.circuit.state_nets
     waves = open_simulator("shared").run(turned, nets, (periods + 1) / e.frequency)
     phase = math.radians(degrees)
-    met = until_strobe(with_generator(system, e.drive), e.drive, phase)
+    met = until_strobe(with_drive_states(system, e.drive), e.drive, phase)
     assert met is not None
     run = Flow(system, e.drive).run(met[0], periods)
     first = (1.0 - degrees / 360.0) / e.frequency

@@ -14,6 +14,7 @@ from designer.circuit.board_arrays import Boards
 from designer.circuit.ensemble import Ensemble
 from designer.circuit.netlist import Excitation, Resistor, nominal_board
 from designer.circuit.reduction import Reduction
+from designer.dynamics.drive_states import with_drive_states
 from designer.dynamics.flow import Flow
 from designer.spread.spread import draw, draw_many
 from designer.verdicts.verdict import Verdict
@@ -24,7 +25,6 @@ from designer.yields.power_up import (
     power_up_block,
     switched_on,
     until_strobe,
-    with_generator,
 )
 from designer.yields.start_recipe import FINER, SLOWER, Recipe, RecipeKind, hertz, volts
 from designer.yields.start_recipe_search import (
@@ -249,7 +249,7 @@ def test_reached_rows_are_what_a_plain_run_from_zero_shows() -> None:
         board = draw(of.circuit, of.spread, of.seed, row.sample)
         system = Reduction(of.circuit, board).system()
         drive = direct.target.drive
-        met = until_strobe(with_generator(system, drive), drive, row.phase)
+        met = until_strobe(with_drive_states(system, drive), drive, row.phase)
         assert met is not None
         run = Flow(system, drive).run(met[0], 900)
         counted = period_counts(run.strobes, run.counts)
