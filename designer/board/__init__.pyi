@@ -7,6 +7,7 @@ from .board_check import (
 )
 from .board_parts import (
     board_circuit as board_circuit,
+    trimmed_clearance as trimmed_clearance,
 )
 from .bom import (
     bill as bill,

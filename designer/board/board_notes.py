@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from designer.base.units import format_quantity
 from designer.base.views import View
 from designer.board.board_parts import (
@@ -16,15 +14,19 @@ from designer.board.board_parts import (
     fault_current,
     protection_offset,
     trim_reach,
+    trimmed_clearance,
 )
 from designer.board.component import Component
 from designer.catalog.catalog import Catalog
 from designer.check.synthesis_result import Synthesis
+from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Connector, Trimmer
 from designer.circuit.netlist import Circuit, Section, nominal_board
-from designer.circuit.reduction import Reduction
+from designer.circuit.working_modes import at_rest
 from designer.model.board_table import BoardChoice
 
+CENTRED = 1e-3
+"""Of the distance between two stops: so near to their middle nobody sets a trimmer."""
 PROBE = 100e-12
 """Capacitance [F] of a metre of coaxial cable, as the notes assume for a probe."""
 
@@ -137,11 +139,11 @@ def _protection(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[
 
 
 def _displacement(circuit: Circuit) -> tuple[str, str]:
-    """Nets of the displacement in the first clearance and of its stage's output; of a circuit
-    without a clearance the first mass's."""
+    """Nets of the displacement in the clearance that the trim sets and of its stage's output; of a
+    circuit without a clearance the first mass's."""
     if not circuit.stops:
         return circuit.state_nets[0], circuit.state_nets[0]
-    stop = circuit.stops[0]
+    stop = circuit.stops[trimmed_clearance(circuit)]
     own = circuit.state_nets[circuit.states.index(stop.state)]
     return (own if stop.difference is None else stop.difference[0]), stop.output
 
@@ -162,7 +164,9 @@ def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
         f"{name} and {series.name} where the generator has none."
     )
     moving, output = _displacement(circuit)
-    several = f", clearance {circuit.stops[0].clearance}" if len(circuit.stops) > 1 else ""
+    several = ""
+    if len(circuit.stops) > 1:
+        several = f", clearance {circuit.stops[trimmed_clearance(circuit)].clearance}"
     steps = [
         f"Turn {name} until its wiper, net `trim`, is at 0 V.",
         "Start the board as the first line of `setup.csv` says. On the X-Y display, "
@@ -182,16 +186,20 @@ def _trim(made: Synthesis, circuit: Circuit, choice: BoardChoice) -> list[str]:
 
 
 def _centred(circuit: Circuit) -> str:
-    """Where the displacement in the first clearance is to rest."""
+    """Where the displacement in the clearance that the trim sets is to rest."""
     moving, _ = _displacement(circuit)
-    system = Reduction(circuit, nominal_board(circuit)).system()
-    mode = system.mode(circuit.rest)
-    still = np.concatenate([np.linalg.solve(mode.A, -mode.d), [0.0, 1.0]])
-    past = [float(row @ still) for row in system.contact_rows(0).values()] if circuit.stops else []
-    if len(past) == 2:
+    nominal = Boards.of(circuit, [nominal_board(circuit)])
+    rest, stops = at_rest(nominal, trimmed_clearance(circuit))
+    ends = [float(volts[0]) for volts in stops.values()]
+    away = float(rest[0]) - sum(ends) / max(len(ends), 1)
+    if not ends:
+        return f"`{moving}` rests at {_q(away, 'V', 3)}"
+    if len(ends) == 1:
+        return f"`{moving}` rests {_q(abs(away), 'V', 4)} from that voltage"
+    if abs(away) < CENTRED * abs(ends[0] - ends[1]):
         return f"`{moving}` rests in the middle of the two voltages"
-    away = [f"{_q(abs(volts), 'V', 4)} from that voltage" for volts in past]
-    return f"`{moving}` rests {away[0] if away else 'at ' + _q(float(still[0]), 'V', 3)}"
+    where = "above" if away > 0.0 else "below"
+    return f"`{moving}` rests {_q(abs(away), 'V', 4)} {where} the middle of the two voltages"
 
 
 def _spare(circuit: Circuit) -> list[str]:

@@ -216,13 +216,25 @@ def _protection(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iter
 
 
 def _trimmed_node(circuit: Circuit) -> str | None:
-    """The driven summing node that the trim feeds: of the mass at the first clearance whose mass is
+    """The driven summing node that the trim feeds: of the mass at ``trimmed_clearance`` if that is
     driven, else the first; None where nothing is driven."""
     driven = driven_nodes(circuit)
-    plates = {c.name: set(c.nets) for c in circuit.capacitors}
-    velocities = [circuit.states[circuit.states.index(s.state) + 1] for s in circuit.stops]
-    nodes = [node for name in velocities for node in driven if node in plates[name]]
-    return next(iter([*nodes, *driven]), None)
+    own = _driven_at(circuit, trimmed_clearance(circuit)) if circuit.stops else ()
+    return next(iter((*own, *driven)), None)
+
+
+def trimmed_clearance(circuit: Circuit) -> int:
+    """Index of the clearance in which the trim sets the rest point: the first whose mass is driven,
+    else the first."""
+    places = range(len(circuit.stops))
+    return next((k for k in places if _driven_at(circuit, k)), 0)
+
+
+def _driven_at(circuit: Circuit, clearance: int) -> tuple[str, ...]:
+    """The summing node of the mass at a clearance, if the generator drives it."""
+    state = circuit.states.index(circuit.stops[clearance].state)
+    plates = {c.name: c.nets for c in circuit.capacitors}[circuit.states[state + 1]]
+    return tuple(node for node in driven_nodes(circuit) if node in plates)
 
 
 def _trim(circuit: Circuit, choice: BoardChoice, catalog: Catalog) -> Iterator[Fitting]:

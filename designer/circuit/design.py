@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.frames import frame, table_html
 from designer.circuit.coefficients import CoefficientErrors
-from designer.circuit.netlist import Circuit
+from designer.circuit.netlist import Circuit, nominal_board
+from designer.circuit.reduction import Reduction
 from designer.circuit.resistors import Composite, composites_of
 from designer.dynamics.orbit import Orbit
 from designer.model.find_responses import ModelResponse
@@ -139,15 +141,30 @@ class Design:
         return 2 * stops[0].mass if stops else 0
 
     def impact_volts(self, orbit: Orbit, volts: Array) -> Array:
-        """(k,) volts per unit of the model's velocity at each impact of a board's orbit, by the
-        mass that moves in its clearance. volts (states,) : ``volts``."""
+        """(k,) volts per unit of the model's velocity at each impact of a board's orbit, by its
+        clearance. volts (states,) : ``volts``."""
+        return self._clearance_volts(volts[1::2])[orbit.impact_clearances]
+
+    def _clearance_volts(self, volts: Array) -> Array:
+        """(clearances,) volts per unit in each clearance, of its first mass and the difference
+        amplifier before its stage. volts (masses,) : per unit of each mass."""
         stops = self.model.second_order().clearances
-        rates = np.array([2 * stop.mass + 1 for stop in stops], dtype=np.intp)
-        return np.asarray(volts[rates[orbit.impact_clearances]])
+        return self.clearance_gains * volts[[stop.mass for stop in stops]]
+
+    @cached_property
+    def clearance_gains(self) -> Array:
+        """(clearances,) volts of the displacement in each clearance per volt of its first mass's:
+        the gain of a difference amplifier, 1 without one."""
+        reduction = Reduction(self.circuit, nominal_board(self.circuit, ideal=True))
+        rows = reduction.system().displacement
+        places = [self.circuit.states.index(stop.state) for stop in self.circuit.stops]
+        return np.array([float(row[place]) for row, place in zip(rows, places, strict=True)])
 
     def in_model_units(self, orbit: Orbit, volts: Array) -> Orbit:
         """An orbit of a board, in volts and seconds, in model units. volts : as of ``volts``."""
-        seconds, moving = self.errors.scales.seconds, float(volts[self.moving])
+        seconds, graze = self.errors.scales.seconds, orbit.graze
+        if len(graze):
+            graze = graze / self._clearance_volts(volts[0::2])[:, None]
         return replace(
             orbit,
             start=orbit.start / volts if len(orbit.start) else orbit.start,
@@ -155,8 +172,7 @@ class Design:
             impact_times=orbit.impact_times / seconds,
             impact_velocities=orbit.impact_velocities / self.impact_volts(orbit, volts),
             lyapunov=orbit.lyapunov * seconds,
-            penetration=orbit.penetration / moving,
-            miss=orbit.miss / moving,
+            graze=graze,
         )
 
     def volts(self, b: float | None = None) -> Array:

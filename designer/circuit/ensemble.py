@@ -275,8 +275,7 @@ class Ensemble:
             asymmetry=float(facts[kernel.ASYMMETRY]),
             multipliers=multipliers,
             lyapunov=float(np.log(radius) / (n * period)) if radius > 0.0 else -np.inf,
-            penetration=float(graze[:, 0].min(initial=np.inf)),
-            miss=float(graze[:, 1].min(initial=np.inf)),
+            graze=graze.copy(),
             reason=f"while classifying period {n}" if grazing else "",
             periods=spent,
         )

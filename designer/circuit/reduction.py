@@ -92,7 +92,7 @@ class Reduction:
 
     def _motion(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         """Rows of the displacement in each clearance and of its velocity: of one mass the states,
-        of two what their difference amplifier makes of them, in volts of the first one's."""
+        of two the output of their difference amplifier."""
         c = self.circuit
         size, moving = len(c.states), [c.states.index(s.state) for s in c.stops]
         displacement, velocity = map(list, motion_of_states(size, moving))

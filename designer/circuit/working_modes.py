@@ -175,20 +175,38 @@ OF_EACH = ("A", "B", "d", "guard", "past", "good", "displacement", "velocity")
 """What of ``kernel.Modes`` has an axis of boards."""
 
 
-def at_rest(boards: Boards) -> tuple[Array, Mapping[int, Array]]:
-    """v1 (N,) [V] at which each board rests with the generator off, inside the clearance or against
-    a preloaded stop, and v1 at which fv leaves zero, by side: 1 upper, -1 lower. nan for a board
-    without a rest point."""
+def at_rest(boards: Boards, clearance: int = 0) -> tuple[Array, Mapping[int, Array]]:
+    """Displacement (N,) [V] in a clearance at which each board rests with the generator off, open
+    or against a preloaded stop, and the displacement at which the stage's output leaves zero, by
+    side: 1 upper, -1 lower. nan for a board without a rest point. Without clearances that of the
+    first mass, and no side.
+
+    clearance : its index. Of one between two masses the displacement is the voltage of its
+    difference amplifier.
+    """
     circuit = boards.circuit
     equations, n = NodalEquations(circuit, boards.stacked), len(circuit.states)
     mode = _solved(equations, circuit.rest)
     still = mode if circuit.rest == circuit.open else _solved(equations, circuit.open)
     A = np.where(mode.good[:, None, None], mode.rates[..., :n], np.eye(n))
     x = np.linalg.solve(A, -mode.rates[..., n + 1][..., None])[..., 0]
-    j = circuit.states.index(circuit.stops[0].state) if circuit.stops else 0
-    stops = {
-        equations.sides(way.target)[0]: -way.row[..., n + 1] / way.row[..., j]
-        for way in still.exits
-        if way.clearance == 0
-    }
-    return np.where(mode.good, x[:, j], np.nan), stops
+    row = _displacement(circuit, still, clearance)
+    moved = (row[..., :n] * x).sum(axis=-1) + row[..., n + 1]
+    stops = {}
+    for way in still.exits:
+        if way.clearance == clearance:  # scaled to displacement: side · displacement + a constant
+            side = equations.sides(way.target)[clearance]
+            stops[side] = row[..., n + 1] - side * way.row[..., n + 1]
+    return np.where(mode.good, moved, np.nan), stops
+
+
+def _displacement(circuit: Circuit, still: _SolvedMode, clearance: int) -> Array:
+    """(..., n + 2) row of the displacement in a clearance over (states, drive, 1)."""
+    n = len(circuit.states)
+    if not circuit.stops:
+        return np.eye(1, n + 2)[0]
+    stop = circuit.stops[clearance]
+    if stop.difference is None:
+        return np.eye(1, n + 2, circuit.states.index(stop.state))[0]
+    net, sign = stop.difference
+    return np.asarray(sign * still.voltage[net])

@@ -247,8 +247,7 @@ def describe(
         asymmetry=asymmetry(flow, x, n, peak),
         multipliers=multipliers,
         lyapunov=float(np.log(radius) / span) if radius > 0.0 else -np.inf,
-        penetration=run.penetration,
-        miss=run.miss,
+        graze=run.graze,
         reason="" if status is OrbitStatus.PERIODIC else f"while classifying period {n}",
     )
 

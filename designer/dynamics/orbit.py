@@ -87,10 +87,9 @@ class Orbit(Motion):
     """(states,) Floquet multipliers, complex; empty where the engine has none."""
     lyapunov: float = float("nan")
     """Largest exponent per unit of the system's time (nan where unknown)."""
-    penetration: float = float("inf")
-    """Smallest penetration of all contacts, in units of displacement."""
-    miss: float = float("inf")
-    """Nearest approach to a stop without contact, in units of displacement."""
+    graze: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    """(clearances, 2) smallest penetration and nearest approach to a stop without contact in each
+    clearance, in units of the displacement in it; inf where there is none."""
     reason: str = ""
     """Why, where the status is failed, not settled or diverged."""
     periods: int = 0
@@ -102,6 +101,16 @@ class Orbit(Motion):
         if not len(self.impact_clearances):
             first = np.zeros(len(self.impact_sides), dtype=np.int64)
             object.__setattr__(self, "impact_clearances", first)
+
+    @property
+    def penetration(self) -> float:
+        """Smallest penetration of all contacts, of whichever clearance."""
+        return float(self.graze[:, 0].min(initial=np.inf))
+
+    @property
+    def miss(self) -> float:
+        """Nearest approach to a stop without contact, of whichever clearance."""
+        return float(self.graze[:, 1].min(initial=np.inf))
 
     @property
     def symmetric(self) -> bool | None:

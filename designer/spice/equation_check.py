@@ -398,7 +398,7 @@ def _contact(
         stated = design.errors.scales.threshold_lower if side < 0 else float("nan")
         alone = len(model.clearances) == 1 and clearance.upper == clearance.lower
         volts = stated if alone and np.isfinite(stated) else volts
-        deviation = float(abs(threshold / (volts * _gain(design, index)) - 1.0))
+        deviation = float(abs(threshold / (volts * design.clearance_gains[index]) - 1.0))
         findings.append(EquationFinding(f"threshold, {place}", deviation, bound))
     return findings
 
@@ -419,17 +419,6 @@ def _moving(design: Design, stop: Stop) -> str:
     return circuit.state_nets[circuit.states.index(stop.state)]
 
 
-def _gain(design: Design, index: int) -> float:
-    """Volts of the displacement in a clearance per volt of the first mass's."""
-    circuit = design.circuit
-    stop = circuit.stops[index]
-    if stop.difference is None:
-        return 1.0
-    net, sign = stop.difference
-    solved = Reduction(circuit, nominal_board(circuit, ideal=True)).solution(circuit.open)
-    return float(sign * solved.voltage[net][circuit.states.index(stop.state)])
-
-
 def _wanted_slope(design: Design, model: SecondOrderSystem, index: int, side: int) -> float:
     """fv per volt of displacement in contact: the model's stop at the design's scales, through the
     force resistor."""
@@ -440,4 +429,4 @@ def _wanted_slope(design: Design, model: SecondOrderSystem, index: int, side: in
     per_volt = scales.volts[velocity] / scales.volts[velocity - 1]
     output = circuit.stops[index].output
     force = conductance(circuit, output, capacitor.minus)
-    return float(rate * per_volt * capacitor.value / force) / _gain(design, index)
+    return float(rate * per_volt * capacitor.value / force) / float(design.clearance_gains[index])

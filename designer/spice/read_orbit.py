@@ -147,8 +147,7 @@ def read(waveforms: Waveforms, reading: Reading) -> Read:
         impact_sides=_joined([each.sides for each in impacts])[order],
         impact_clearances=_joined(which)[order].astype(np.int64),
         asymmetry=_asymmetry(t, y, marks[-1], n, reading.period, peak),
-        penetration=min((each.depth for each in impacts), default=np.inf),
-        miss=min((each.miss for each in impacts), default=np.inf),
+        graze=np.array([[each.depth, each.miss] for each in impacts]).reshape(-1, 2),
         reason=reason,
         periods=last,
     )

@@ -16,7 +16,7 @@ import numpy as np
 
 from designer.base.arrays import Array
 from designer.base.views import View
-from designer.board.board_parts import board_circuit
+from designer.board.board_parts import board_circuit, trimmed_clearance
 from designer.circuit.board_arrays import Boards
 from designer.circuit.board_parts_only import Trimmer
 from designer.circuit.netlist import Circuit, Resistor, nominal_board
@@ -167,9 +167,10 @@ def settings(trim: DcTrim, boards: Boards, seed: int, indices: range) -> Array:
     The middle of the travel where a board has no rest point.
     """
     nominal = Boards.of(trim.circuit, [nominal_board(trim.circuit)])
-    wanted, stops = at_rest(nominal)
+    clearance = trimmed_clearance(trim.circuit)
+    wanted, stops = at_rest(nominal, clearance)
     middle = trim.at(boards, np.full(len(boards), 0.5))
-    _, read = at_rest(middle)
+    _, read = at_rest(middle, clearance)
     step = SCREEN * max((abs(float(v[0])) for v in stops.values()), default=0.0) / 2**BITS
     people = [np.random.default_rng([seed, i, TAG]) for i in indices]
     target = np.full(len(boards), float(wanted[0]))
@@ -183,10 +184,12 @@ def settings(trim: DcTrim, boards: Boards, seed: int, indices: range) -> Array:
 
 
 def _turned(trim: DcTrim, boards: Boards, target: Array) -> Array:
-    """(N,) the setting at which v1 rests at ``target`` [V], the nearest end where none does."""
+    """(N,) the setting at which the displacement in the trimmed clearance rests at ``target`` [V],
+    the nearest end where it does nowhere."""
+    clearance = trimmed_clearance(trim.circuit)
 
     def off(position: Array) -> Array:
-        return at_rest(trim.at(boards, position))[0] - target
+        return at_rest(trim.at(boards, position), clearance)[0] - target
 
     before, here = np.full(len(boards), END), np.full(len(boards), 1.0 - END)
     error, now = off(before), off(here)

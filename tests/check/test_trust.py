@@ -143,7 +143,7 @@ def test_where_nothing_was_reached_the_status_speaks() -> None:
 def _open(orbit: Orbit, flow: Flow, factor: float) -> Trust:
     """Of the orbit with a miss of so many times its error."""
     near = factor * trust.of_orbit(flow, orbit).error * float(np.abs(orbit.extremes[0]).max())
-    return trust.of_orbit(flow, replace(orbit, miss=near))
+    return trust.of_orbit(flow, replace(orbit, graze=np.array([[np.inf, near]])))
 
 
 def test_a_verdict_has_no_measured_figures() -> None:

@@ -20,7 +20,7 @@ from designer.circuit.working_modes import at_rest
 from designer.dynamics.flow import Flow
 from designer.dynamics.piecewise_linear import Drive, ModeKey
 from designer.model.mechanics import Clearance, SecondOrderSystem, Side
-from tests.shared.exact_circuits import Scale, exact_circuit
+from tests.shared.exact_circuits import Scale, exact_circuit, unit_volts
 
 
 def random_system(seed: int) -> SecondOrderSystem:
@@ -108,9 +108,9 @@ def test_every_mode_has_the_model_s_matrices(seed: int) -> None:
         rows, theirs = reduced.contact_rows(k), model.contact_rows(k)
         assert rows.keys() == theirs.keys() == set(clearance.positions)
         for side, row in rows.items():
-            in_model = row[:-2] * volts / volts[2 * clearance.mass]
-            assert in_model == pytest.approx(theirs[side][:-2], abs=1e-5)
-            assert row[-1] / volts[2 * clearance.mass] == pytest.approx(theirs[side][-1], abs=1e-5)
+            unit = unit_volts(clearance, scale)
+            assert row[:-2] * volts / unit == pytest.approx(theirs[side][:-2], abs=1e-5)
+            assert row[-1] / unit == pytest.approx(theirs[side][-1], abs=1e-5)
 
 
 @settings(max_examples=40)
@@ -157,6 +157,7 @@ def test_orbits_agree(seed: int) -> None:
         wanted = system.piecewise_linear(omega)
         reduced = Reduction(circuit, board).system()
         unit = scale.volts[2 * clearance.mass : 2 * clearance.mass + 2]
+        unit = unit * unit_volts(clearance, scale) / unit[0]
         moved, moving = reduced.displacement[k][:-2], reduced.velocity[k][:-1]
         theirs_moved, theirs_moving = wanted.displacement[k][:-2], wanted.velocity[k][:-1]
         assert moved * scale.volts / unit[0] == pytest.approx(theirs_moved, abs=1e-4)
@@ -268,6 +269,21 @@ def test_what_the_saturating_stage_cannot_make_is_refused(clearance: Clearance, 
     with pytest.raises(InputError) as caught:
         exact_circuit(system, SCALE, DeadZoneStage())
     assert text in str(caught.value)
+
+
+def test_a_board_rests_in_each_clearance_by_its_own_amplifier() -> None:
+    """A constant force moves the masses; between two of them the difference amplifier shows it."""
+    system = two(constant=np.array([-0.1, -0.02]))
+    circuit = exact_circuit(system, SCALE)
+    boards = Boards.of(circuit, [replace(nominal_board(circuit), inverse_gain=1e-9, bias={})])
+    x = np.linalg.solve(system.stiffness, system.constant)
+    for k, clearance in enumerate(system.clearances):
+        unit = unit_volts(clearance, SCALE)
+        rest, ends = at_rest(boards, k)
+        assert rest[0] == pytest.approx(unit * (system.displacement(clearance) @ x), rel=1e-5)
+        assert {side: v[0] for side, v in ends.items()} == pytest.approx(
+            {side: side * unit * stop.gap for side, stop in clearance.sides}, rel=1e-5
+        )
 
 
 def test_a_preloaded_board_rests_against_its_stop() -> None:

@@ -13,12 +13,14 @@ from designer.circuit import build
 from designer.circuit.dead_zone_parts import DeadZoneStage
 from designer.circuit.netlist import Circuit
 from designer.circuit.terms import terms
-from designer.model.mechanics import SecondOrderSystem
+from designer.model.mechanics import Clearance, SecondOrderSystem
 from tests.shared.stages import CATALOG, VREF
 
 FARAD = 10e-9
 IDLE = 8.0
 """Volts at which a half's output stands, a drop beside it, where the other half begins to drive."""
+DIFFERENCE = 1.5
+"""Gain of the difference amplifiers."""
 STAGE = DeadZoneStage("rectifier", CATALOG.diode("1N4148"), CATALOG.reference("LM4040C50"))
 
 
@@ -30,6 +32,13 @@ class Scale:
     volts: Array
     generator: float
     """Generator volts for the model's drive."""
+
+
+def unit_volts(clearance: Clearance, scale: Scale) -> float:
+    """Volts of a unit of displacement in a clearance: of its first mass, or behind the difference
+    amplifier."""
+    gain = 1.0 if clearance.other is None else DIFFERENCE
+    return gain * float(scale.volts[2 * clearance.mass])
 
 
 def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
@@ -55,7 +64,7 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
             velocity = volts[2 * i + 1]
             values[f"R{160 + i}"] = VREF * system.mass[i] / (abs(constant) * velocity * ramp)
     for k, clearance in enumerate(system.clearances):
-        own = volts[2 * clearance.mass]
+        own = unit_volts(clearance, scale)
         base, small = 200 + 100 * k, 50 + 10 * k
         gain, reference = 1.0, clearance.first.stiffness
         for side, stop in clearance.sides:
@@ -70,8 +79,9 @@ def exact_values(system: SecondOrderSystem, scale: Scale) -> dict[str, float]:
         masses = [(small, clearance.mass)]
         if clearance.other is not None:
             masses.append((small + 1, clearance.other))
-            ratio = own / volts[2 * clearance.other]
-            values |= {f"R{base + 20}": 20e3, f"R{base + 21}": 20e3 / ratio, f"R{base + 22}": 20e3}
+            ratio = volts[2 * clearance.mass] / volts[2 * clearance.other]
+            values |= {f"R{base + 20}": 20e3, f"R{base + 21}": 20e3 / ratio}
+            values |= {f"R{base + 22}": DIFFERENCE * 20e3}
             values |= {f"R{base + 24}": 10e3, f"R{base + 25}": 10e3}
         for number, mass in masses:
             rate = reference / system.mass[mass] * volts[2 * mass + 1] * ramp

@@ -108,6 +108,9 @@ def test_ngspice_shows_the_model_s_response(case: str, pool: SpicePool) -> None:
     assert checked.agrees, (checked.circuit.response, checked.ngspice)
     assert checked.gate is not None
     assert checked.gate.wave < WAVE_BOUND
+    shown = design.in_model_units(checked.circuit, design.volts())
+    assert shown.graze == pytest.approx(found[0].orbit.graze, rel=1e-2)
+    assert shown.impact_velocities == pytest.approx(found[0].orbit.impact_velocities, rel=1e-2)
     traces = checked_design.traces(design, checked)
     grid = traces["model"].time
     peaks = np.abs(found[0].orbit.extremes).max(axis=1)

@@ -32,7 +32,12 @@ from designer.verdicts.verdict import Answer, Question, Verdict
 BLANK = Answer(0, 0, Verdict.OK, "1-2-2", "", 0.5, 1.0, 1.0, 0.0, 40)
 HEARD = CrossCheck(0, 0, StartKind.OWN, Why.RANDOM, "1-2-2", "", "", 2, False)
 NOMINAL = Orbit(
-    OrbitStatus.PERIODIC, n=1, p=2, q=2, multipliers=np.array([0.5 + 0j]), penetration=2.0, miss=4.0
+    OrbitStatus.PERIODIC,
+    n=1,
+    p=2,
+    q=2,
+    multipliers=np.array([0.5 + 0j]),
+    graze=np.array([[2.0, 4.0]]),
 )
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from designer.base.design_folder import Folder
@@ -188,7 +189,7 @@ def test_boards_at_a_boundary_count_before_a_study_ends(
 
     monkeypatch.setattr(layers, "fill_cross_checks", fill_cross_checks)
     p = plan(200)
-    nominal = replace(p.questions[0].start, penetration=1.0, miss=1.0)
+    nominal = replace(p.questions[0].start, graze=np.ones((1, 2)))
     spec = replace(p.questions[0].spec, expect=None)
     one = replace(p.questions[0], spec=spec, start=nominal, settings=object())  # type: ignore[arg-type]
     pool: Any = object()
