@@ -204,9 +204,9 @@ def _displacement(circuit: Circuit, still: _SolvedMode, clearance: int) -> Array
     """(..., n + 2) row of the displacement in a clearance over (states, drive, 1)."""
     n = len(circuit.states)
     if not circuit.stops:
-        return np.eye(1, n + 2)[0]
+        return np.asarray(np.eye(1, n + 2)[0])
     stop = circuit.stops[clearance]
     if stop.difference is None:
-        return np.eye(1, n + 2, circuit.states.index(stop.state))[0]
+        return np.asarray(np.eye(1, n + 2, circuit.states.index(stop.state))[0])
     net, sign = stop.difference
     return np.asarray(sign * still.voltage[net])
