@@ -26,7 +26,7 @@ from designer.dynamics.orbit import Motion, OrbitStatus
 from designer.dynamics.steady_state import Steady
 
 FORMAT = 1
-RULES = 2
+RULES = 3
 """Raised whenever a rule changes that decides what a step shows: then old blocks are not reused."""
 _COLUMNS = [
     ("status", pa.string()),
@@ -35,6 +35,7 @@ _COLUMNS = [
     ("q", pa.int64()),
     ("symmetric", pa.bool_()),
     ("lyapunov", pa.float64()),
+    ("lyapunov_error", pa.float64()),
     ("radius", pa.float64()),
     ("start", pa.list_(pa.float64())),
     ("end", pa.list_(pa.float64())),

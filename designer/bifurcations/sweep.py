@@ -18,6 +18,7 @@ from designer.base.arrays import Array
 from designer.base.threads import parallel
 from designer.bifurcations.subject import Subject
 from designer.dynamics.attractors import starts
+from designer.dynamics.orbit import OrbitStatus
 from designer.dynamics.steady_state import Course, Steady
 
 BLOCK = 64
@@ -104,9 +105,14 @@ class Window:
     """How many they are."""
     track: str
     """The track they lie on; "starts" where several starts are taken together."""
+    lyapunov: tuple[float, float] | None = None
+    """Least and greatest exponent of aperiodic steps; None of others."""
+    lyapunov_error: float | None = None
+    """Largest standard error of these exponents; None of others."""
 
     def as_dict(self) -> dict[str, Any]:
         """By the keys of the contract."""
+        chaos = {"lyapunov": self.lyapunov, "lyapunov_error": self.lyapunov_error}
         return {
             "from": self.low,
             "to": self.high,
@@ -114,6 +120,7 @@ class Window:
             "symmetric": self.symmetric,
             "steps": self.steps,
             "track": self.track,
+            **(chaos if self.lyapunov is not None else {}),
         }
 
 
@@ -235,7 +242,16 @@ def _windows(sweep: Sweep, tracks: Sequence[str], name: str) -> list[Window]:
         for key in [k for k in running if k not in shown]:
             first = running.pop(key)
             low, high = float(values[first]), float(values[i - 1])
-            out.append(Window(low, high, *key, i - first, name))
+            steps = [s for t in tracks for s in sweep.steps[t][first:i] if s.response == key[0]]
+            out.append(Window(low, high, *key, i - first, name, *_exponents(steps)))
         for key in shown:
             running.setdefault(key, i)
     return sorted(out, key=lambda w: (w.low, w.high, w.response, str(w.symmetric)))
+
+
+def _exponents(steps: Sequence[Steady]) -> tuple[tuple[float, float] | None, float | None]:
+    """Least and greatest exponent of aperiodic steps, and the largest error of one."""
+    if steps[0].status is not OrbitStatus.APERIODIC:
+        return None, None
+    values = [s.lyapunov for s in steps]
+    return (min(values), max(values)), max(s.lyapunov_error for s in steps)

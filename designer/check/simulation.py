@@ -201,6 +201,7 @@ def _figures(orbit: Orbit) -> dict[str, Any]:
         "x1_min": float(low),
         "largest_multiplier": orbit.radius,
         "lyapunov": orbit.lyapunov,
+        "lyapunov_error": orbit.lyapunov_error,
         "penetration": orbit.penetration,
         "miss": orbit.miss,
     }
@@ -441,7 +442,9 @@ def _alike(a: Orbit, b: Orbit) -> bool:
 
 
 def _measured(flow: Flow, orbit: Orbit) -> Orbit:
-    """With the extremes over 200 periods where the orbit is not periodic and has none."""
+    """With its exponent measured to a bound and, over 200 periods, its extremes where the orbit is
+    not periodic and has none."""
+    orbit = attractors.with_exponent(flow, orbit)
     if len(orbit.extremes) or not len(orbit.start):
         return orbit
     with flow.within(Budget(step_budget.SETTLING)):

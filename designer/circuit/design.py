@@ -172,6 +172,7 @@ class Design:
             impact_times=orbit.impact_times / seconds,
             impact_velocities=orbit.impact_velocities / self.impact_volts(orbit, volts),
             lyapunov=orbit.lyapunov * seconds,
+            lyapunov_error=orbit.lyapunov_error * seconds,
             graze=graze,
         )
 

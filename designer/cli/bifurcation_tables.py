@@ -26,6 +26,7 @@ def _sweep(answer: Mapping[str, Any]) -> None:
     windows = answer["windows"]
     widest = sorted(windows, key=lambda w: -w["steps"])[:LONGEST]
     si = answer.get("si_unit")
+    chaos = any("lyapunov" in w for w in widest)
     table(
         "Windows",
         (
@@ -37,6 +38,7 @@ def _sweep(answer: Mapping[str, Any]) -> None:
                 "response": w["response"],
                 "symmetric": YES_NO[w["symmetric"]],
                 "steps": str(w["steps"]),
+                **({"λ": _exponents(w)} if chaos else {}),
             }
             for w in sorted(widest, key=lambda w: (w["track"], w["from"]))
         ),
@@ -47,6 +49,14 @@ def _sweep(answer: Mapping[str, Any]) -> None:
         say("\nBifurcation points")
         for text in _points(answer["points"][:LONGEST], si):
             say(text)
+
+
+def _exponents(window: Mapping[str, Any]) -> str:
+    """Least and greatest exponent of an aperiodic window, with the largest standard error."""
+    if "lyapunov" not in window:
+        return ""
+    low, high = window["lyapunov"]
+    return f"{low:.2g} to {high:.2g} (± {window['lyapunov_error']:.1g})"
 
 
 def _points(points: Sequence[Mapping[str, Any]], si: str | None) -> Iterator[str]:

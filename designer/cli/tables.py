@@ -204,6 +204,9 @@ def simulated(answer: Mapping[str, Any]) -> None:
             say(f"ω = {r['omega']:g}: {coexisting(r['starts'])}")
         if r["reason"]:
             say(f"ω = {r['omega']:g}: {r['response']}: {r['reason']}")
+        if r["lyapunov_error"] is not None:
+            growth = f"{r['lyapunov']:.4g} ± {r['lyapunov_error']:.1g}"
+            say(f"ω = {r['omega']:g}: largest exponent {growth} (standard error)")
         for line in untrusted({"this response": r.get("trust")}):
             say(f"ω = {r['omega']:g}: {line}")
 

@@ -28,6 +28,7 @@ from designer.dynamics.kernel_orbit import (
     STROBE_TOLERANCE as STROBE_TOLERANCE,
     WORTH,
 )
+from designer.dynamics.lyapunov_exponent import BLOCK, Bound, LyapunovExponent, lyapunov
 from designer.dynamics.orbit import Orbit, OrbitStatus
 from designer.dynamics.piecewise_linear import ModeKey
 from designer.dynamics.step_budget import Budget
@@ -39,6 +40,10 @@ STATIONARY = 0.01
 """Change of how far a motion is from repeating, over half of the last stage, below which it has
 settled. What approaches an orbit of multiplier ρ changes by 1 - ρ^1600, so only ρ > 0.999994 may be
 taken for settled."""
+FIRST = 300
+"""Drive periods over which chaos is first looked for."""
+SURE = 4.0
+"""Standard errors that a small exponent has to be above 0 to be called chaos."""
 ENGINE_ERROR = 1e-10
 """Of the peak: contacts shallower and misses nearer than this are undecided."""
 
@@ -75,24 +80,39 @@ def _settle(flow: Flow, x: Array, mode: ModeKey | None, budget: Budget) -> Orbit
         if found is not None:
             return replace(found, periods=spent)
         if stage >= 3:
-            exponent, x, mode = lyapunov(flow, x, mode, 300)
-            spent += 300
-            if exponent * flow.drive.period > CHAOS:
-                return Orbit(
-                    OrbitStatus.APERIODIC, start=x, mode=mode, lyapunov=exponent, periods=spent
-                )
+            growth = lyapunov(flow, x, mode, FIRST)
+            spent, x, mode = spent + FIRST, growth.start, growth.mode
+            if growth.value * flow.drive.period > CHAOS:
+                return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
             found, cost = long_orbit(flow, x, mode)
             spent += cost
             if found is not None:
                 return replace(found, periods=spent)
     still = is_stationary(run.strobes)
-    reason = f"no period up to {LONG_PERIOD} and no chaos after {spent} drive periods: "
-    return Orbit(
+    if not still:  # a growth too small to be seen at once
+        growth = lyapunov(flow, x, mode, FIRST, Bound(1.0 / SURE, 0.0, 20_000))
+        spent += BLOCK * len(growth.rates)
+        if growth.value > SURE * growth.error:
+            return _unperiodic(OrbitStatus.APERIODIC, growth, spent)
+    why = "quasi-periodic, or of a longer period" if still else "very slow"
+    return _unperiodic(
         OrbitStatus.APERIODIC if still else OrbitStatus.NOT_SETTLED,
-        start=x,
-        mode=mode or (),
-        lyapunov=exponent,
-        reason=reason + ("quasi-periodic, or of a longer period" if still else "very slow"),
+        growth,
+        spent,
+        f"no period up to {LONG_PERIOD} and no chaos after {spent} drive periods: {why}",
+    )
+
+
+def _unperiodic(
+    status: OrbitStatus, growth: LyapunovExponent, spent: int, reason: str = ""
+) -> Orbit:
+    return Orbit(
+        status,
+        start=growth.start,
+        mode=growth.mode,
+        lyapunov=growth.value,
+        lyapunov_error=growth.error,
+        reason=reason,
         periods=spent,
     )
 
@@ -265,27 +285,13 @@ def asymmetry(flow: Flow, x: Array, n: int, peak: Array, points: int = 128) -> f
     return float((np.abs(np.roll(trace, -half, axis=0) - image).max(axis=0) / peak).max())
 
 
-def lyapunov(
-    flow: Flow, x: Array, mode: ModeKey | None, periods: int, block: int = 5
-) -> tuple[float, Array, ModeKey]:
-    """Largest exponent per unit time over ``periods`` by the exact variational flow.
-
-    The tangent vector is renormalised every ``block`` periods. Returns the state reached too.
-    """
-    rng = np.random.default_rng(0)
-    v = rng.standard_normal((len(x), 1))
-    growth, done = 0.0, 0
-    while done < periods:
-        run = flow.run(x, block, mode=mode, tangent=v)
-        if run.status is not FlowStatus.DONE or run.tangent is None:
-            break
-        size = float(np.linalg.norm(run.tangent))
-        if done:  # the first block only turns the vector towards the leading direction
-            growth += np.log(max(size, 1e-300))
-        v, x, mode = run.tangent / max(size, 1e-300), run.strobes[-1], run.mode
-        done += block
-    span = max(done - block, 1) * flow.drive.period
-    return float(growth / span), x, mode if mode is not None else flow.system.start
+def with_exponent(flow: Flow, orbit: Orbit) -> Orbit:
+    """An aperiodic motion with its exponent to ``lyapunov_exponent.Bound``; any other as it is."""
+    if orbit.status is not OrbitStatus.APERIODIC or not len(orbit.start):
+        return orbit
+    with flow.within(Budget(step_budget.SETTLING)):
+        growth = lyapunov(flow, orbit.start, orbit.mode or None, FIRST, Bound())
+    return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
 
 
 def starts(scale: Array, count: int, seed: int = 0) -> Array:

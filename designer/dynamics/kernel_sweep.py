@@ -73,10 +73,11 @@ def _lap(
 
 
 @compiled
-def exponent(model: DrivenModel, x: Float, cursor: Int, periods: int) -> float:
+def exponent(model: DrivenModel, x: Float, cursor: Int, periods: int, rates: Float) -> float:
     """Carry x (4,), written, over ``periods``; the growth of a tangent vector per period.
 
-    cursor : (2,) mode, -1 for the one that holds at x, and on return the flow's code. nan where the
+    cursor : (2,) mode, -1 for the one that holds at x, and on return the flow's code. rates ← of
+    the whole blocks of ``RENEWAL`` periods that count, as many as there is room for. nan where the
     flow stopped.
     """
     phi = np.zeros((4, 1))
@@ -101,6 +102,9 @@ def exponent(model: DrivenModel, x: Float, cursor: Int, periods: int) -> float:
         if done >= ALIGN:
             growth += np.log(size)
             counted += n
+            block = done // RENEWAL - ALIGN // RENEWAL
+            if n == RENEWAL and block < len(rates):
+                rates[block] = np.log(size) / n
         done += n
     return float(growth / max(counted, 1))
 
@@ -114,11 +118,12 @@ def travel(
     strobes: Float,
     watch: Watch,
     cursor: Int,
+    rates: Float,
 ) -> float:
     """From x (4,) over ``settle`` periods, the last ``tangents`` of them with a tangent vector;
     then watch those of ``strobes`` (keep + 1, 4). Returns the growth per period.
 
-    cursor : (2,) on return the mode and the flow's code.
+    rates ← its parts, as of ``exponent``. cursor : (2,) on return the mode and the flow's code.
     """
     cursor[0], cursor[1] = -1, DONE
     free, growth = settle - tangents, np.nan
@@ -128,7 +133,7 @@ def travel(
         for i in range(4):
             x[i] = passed[free, i]
     if tangents > 0 and cursor[1] == DONE:
-        growth = exponent(model, x, cursor, tangents)
+        growth = exponent(model, x, cursor, tangents, rates)
     if cursor[1] != DONE:
         return growth
     keep = strobes.shape[0] - 1
@@ -213,7 +218,7 @@ def classify(
             return APERIODIC
         if turn == turns - 1:
             break
-        growth = exponent(model, x, cursor, MORE)
+        growth = exponent(model, x, cursor, MORE, np.zeros(0))
         if cursor[1] == DONE:
             cursor[1] = _lap(model, x, cursor, np.zeros((0, 0)), tail, impacts)
         if cursor[1] != DONE:

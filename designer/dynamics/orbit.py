@@ -87,6 +87,9 @@ class Orbit(Motion):
     """(states,) Floquet multipliers, complex; empty where the engine has none."""
     lyapunov: float = float("nan")
     """Largest exponent per unit of the system's time (nan where unknown)."""
+    lyapunov_error: float = float("nan")
+    """Its standard error where it was measured on a motion without a period; nan of a periodic
+    orbit, whose exponent follows from its multipliers."""
     graze: Array = field(default_factory=lambda: np.zeros((0, 2)))
     """(clearances, 2) smallest penetration and nearest approach to a stop without contact in each
     clearance, in units of the displacement in it; inf where there is none."""

@@ -17,17 +17,26 @@ import numpy as np
 from designer.base.arrays import Array
 from designer.base.threads import interrupt
 from designer.dynamics import attractors, kernel_orbit, kernel_sweep as kernel
-from designer.dynamics.attractors import lyapunov, peaks_near, settle
+from designer.dynamics.attractors import peaks_near, settle
 from designer.dynamics.counts import MAX_PERIOD, Pairs
 from designer.dynamics.flow import MAX_EVENTS, Flow, FlowStatus
 from designer.dynamics.kernel_modal import ModalTables, Watch
 from designer.dynamics.kernel_orbit import CHAOS, WORTH
+from designer.dynamics.lyapunov_exponent import (
+    BLOCK,
+    Bound,
+    LyapunovExponent,
+    lyapunov,
+    until,
+)
 from designer.dynamics.orbit import SYMMETRY_TOLERANCE, Motion, Orbit, OrbitStatus
 
 SURELY = 1e-6
 """Below it at half a period, an asymmetry stays far under the tolerance at all other times."""
 ROOM = 48
 """Impacts on the upper stop per period that are kept at first; more where there are more."""
+SWEPT = Bound(relative=0.1, absolute=CHAOS, periods=4000)
+"""Of the exponents of a diagram; a single motion's is measured ten times as closely."""
 _STATUS = {
     kernel.PERIODIC: OrbitStatus.PERIODIC,
     kernel.APERIODIC: OrbitStatus.APERIODIC,
@@ -87,6 +96,8 @@ class Steady(Motion):
     """Drive periods that were run in all."""
     more: Pairs = ()
     """Impacts on the upper and the lower stop of each further clearance; () unless periodic."""
+    lyapunov_error: float = float("nan")
+    """Standard error of ``lyapunov``; nan unless aperiodic."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +127,7 @@ class DrivenSystem:
 
 def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
     """By the general flow, period after period."""
-    exponent, state = float("nan"), np.array(x, dtype=float)
+    growth, state = None, np.array(x, dtype=float)
     free = course.settle - course.tangents
     spent = course.settle + course.keep
     if free:
@@ -125,7 +136,8 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
             return _stopped(run.status, state, spent)
         state = run.strobes[-1]
     if course.tangents:
-        exponent, state, _ = lyapunov(flow, state, None, course.tangents)
+        growth = lyapunov(flow, state, None, course.tangents)
+        state = growth.start
     strobes, minima, velocities = [state], [], []
     for _ in range(course.keep):
         run = flow.run(strobes[-1], 1, measure=True)
@@ -136,14 +148,31 @@ def by_flow(flow: Flow, x: Array, course: Course) -> Steady:
         upper = (run.impacts.side > 0) & (run.impacts.clearance == 0)
         velocities += run.impacts.velocity[upper].tolist()
     end, found = strobes[-1], (np.array(minima), np.array(velocities))
-    growth = exponent * flow.drive.period
-    if course.tangents >= kernel.SPAN and growth > CHAOS and not _repeats(flow, strobes):
-        orbit = Orbit(OrbitStatus.APERIODIC, start=end, lyapunov=exponent)
+    chaos = growth is not None and growth.value * growth.period > CHAOS
+    if growth and chaos and course.tangents >= kernel.SPAN and not _repeats(flow, strobes):
+        orbit = _measured(flow, Orbit(OrbitStatus.APERIODIC, start=end), growth.rates)
     else:
         orbit = settle(flow, end)
-        if not np.isfinite(orbit.lyapunov):
-            orbit = replace(orbit, lyapunov=exponent)
+        if orbit.status is OrbitStatus.APERIODIC:
+            orbit = _measured(flow, orbit)
+        elif growth is not None and not np.isfinite(orbit.lyapunov):
+            orbit = replace(orbit, lyapunov=growth.value)
     return _of_orbit(orbit, end, found, spent)
+
+
+def _measured(flow: Flow, orbit: Orbit, rates: Array | None = None) -> Orbit:
+    """An aperiodic motion with its exponent to ``SWEPT``. rates : what is known of its growth."""
+    x, mode = orbit.start, orbit.mode or None
+
+    def further(blocks: int) -> Array:
+        nonlocal x, mode
+        more = lyapunov(flow, x, mode, BLOCK * (blocks + 1))
+        x, mode = more.start, more.mode
+        return more.rates
+
+    known = until(SWEPT, np.zeros(0) if rates is None else rates, further)
+    growth = LyapunovExponent(known, flow.drive.period, x, mode or ())
+    return replace(orbit, lyapunov=growth.value, lyapunov_error=growth.error)
 
 
 def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, Array], spent: int) -> Steady:
@@ -159,6 +188,7 @@ def _of_orbit(orbit: Orbit, end: Array, found: tuple[Array, Array], spent: int) 
         q=orbit.q if periodic else 0,
         symmetric=orbit.symmetric,
         lyapunov=orbit.lyapunov,
+        lyapunov_error=orbit.lyapunov_error,
         radius=orbit.radius if periodic else float("nan"),
         start=orbit.start if len(orbit.start) else end,
         end=end,
@@ -191,6 +221,7 @@ def _by_kernel(
 ) -> Steady:
     model = kernel.DrivenModel(tables, period, MAX_EVENTS)
     strobes, cursor = np.empty((course.keep + 1, 4)), np.zeros(2, dtype=np.int64)
+    rates = np.empty(max(course.tangents - kernel.ALIGN, 0) // kernel.RENEWAL)
     room, entries = 0, ROOM * course.keep
     while entries > room:  # more impacts than room: again, with room for all
         room = entries
@@ -198,7 +229,9 @@ def _by_kernel(
             np.empty(course.keep), np.empty(room), np.zeros(4), np.zeros(1, dtype=np.int64)
         )
         at = np.array(x, dtype=float)
-        growth = kernel.travel(model, at, course.settle, course.tangents, strobes, watch, cursor)
+        growth = kernel.travel(
+            model, at, course.settle, course.tangents, strobes, watch, cursor, rates
+        )
         entries = int(watch.entries[0])
     spent = course.settle + course.keep
     if cursor[1] != kernel_orbit.DONE:
@@ -221,6 +254,10 @@ def _by_kernel(
     spent += int(counted[kernel_orbit.SPENT])
     if code == kernel.NOT_SETTLED and course.patience:  # a long period, or none, but settled
         return _of_orbit(settle(flow(), orbit), strobes[-1], found, spent)
+    exponent = float(facts[2]) / period, float("nan")
+    if code == kernel.APERIODIC:
+        plain = growth > CHAOS and course.tangents >= kernel.SPAN  # else it was later that it was
+        exponent = _swept_exponent(model, orbit, rates if plain else rates[:0])
     stopped = code == kernel.STOPPED
     n, p, q = (
         int(counted[place]) if code == kernel.PERIODIC else 0
@@ -232,7 +269,8 @@ def _by_kernel(
         p=p,
         q=q,
         symmetric=_symmetric(flow, facts[1], orbit, n, peak) if n else None,
-        lyapunov=float(facts[2]) / period,
+        lyapunov=exponent[0],
+        lyapunov_error=exponent[1],
         radius=float(facts[0]) if n else float("nan"),
         start=orbit,
         end=strobes[-1],
@@ -240,6 +278,19 @@ def _by_kernel(
         velocities=found[1],
         periods=spent,
     )
+
+
+def _swept_exponent(model: kernel.DrivenModel, x: Array, rates: Array) -> tuple[float, float]:
+    """Exponent and its error of the chaos through x (4,), of which some rates are known."""
+    x, place = x.copy(), np.array([-1, kernel_orbit.DONE])
+
+    def further(blocks: int) -> Array:
+        room = np.empty(blocks)
+        kernel.exponent(model, x, place, kernel.ALIGN + blocks * kernel.RENEWAL, room)
+        return room if place[1] == kernel_orbit.DONE else room[:0]
+
+    growth = LyapunovExponent(until(SWEPT, rates, further), model.period, x, ())
+    return growth.value, growth.error
 
 
 def _symmetric(flow: Callable[[], Flow], half: float, x: Array, n: int, peak: Array) -> bool:

@@ -204,6 +204,7 @@ def orbit_json(orbit: Orbit, si: SiScales | None = None) -> dict[str, Any]:
         ],
         "multipliers": list(orbit.multipliers.astype(complex)),
         "lyapunov": orbit.lyapunov,
+        "lyapunov_error": orbit.lyapunov_error,
         "penetration": orbit.penetration,
         "miss": orbit.miss,
         "reason": orbit.reason,
