@@ -5,16 +5,19 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import sys
 from collections.abc import Generator, Iterator
 
 # Before anything imports matplotlib.pyplot: tests run without a display.
 os.environ["MPLBACKEND"] = "Agg"
+# Many processes read the same sources: without bytecode files each compiles all of them anew.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 from hypothesis import settings
 
 from tests.shared.blank_figures import blank_figures
-from tests.shared.compile_kernels import compile_kernels
 
 # What a script starts in the background is deaf to Ctrl-C, and so is all that it starts: the tests
 # of Ctrl-C are to hold there too.
@@ -45,6 +48,8 @@ def pytest_collection_finish() -> None:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """The exact engine is compiled once, before several processes need it at the same moment."""
     if getattr(session.config.option, "numprocesses", None):
+        from tests.shared.compile_kernels import compile_kernels
+
         compile_kernels()
 
 
