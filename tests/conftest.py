@@ -10,14 +10,15 @@ from collections.abc import Generator, Iterator
 
 # Before anything imports matplotlib.pyplot: tests run without a display.
 os.environ["MPLBACKEND"] = "Agg"
-# Many processes read the same sources: without bytecode files each compiles all of them anew.
-sys.dont_write_bytecode = False
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 from hypothesis import settings
 
 from tests.shared.blank_figures import blank_figures
+
+# Many processes read the same sources: without bytecode files each compiles all of them anew.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # What a script starts in the background is deaf to Ctrl-C, and so is all that it starts: the tests
 # of Ctrl-C are to hold there too.

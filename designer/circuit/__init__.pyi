@@ -59,7 +59,6 @@ from .netlist import (
     Reference as Reference,
     Resistor as Resistor,
     Section as Section,
-    Stop as Stop,
     nominal_board as nominal_board,
 )
 from .nodal import (
@@ -109,6 +108,9 @@ from .stage_title import (
     dead_zone_titles as dead_zone_titles,
     section_stages as section_stages,
     stage_names as stage_names,
+)
+from .stop import (
+    Stop as Stop,
 )
 from .swept_board import (
     BoardSubject as BoardSubject,

@@ -15,19 +15,10 @@ from designer.catalog.catalog import Catalog
 from designer.catalog.diode_curve import DiodeModel, diode_model
 from designer.catalog.entries import DiodeEntry, ReferenceEntry
 from designer.circuit.dead_zone_place import DeadZonePlace, part_of
-from designer.circuit.netlist import (
-    GROUND,
-    NEGATIVE,
-    POSITIVE,
-    Circuit,
-    Contact,
-    Diode,
-    Part,
-    Section,
-    Stop,
-)
+from designer.circuit.netlist import GROUND, NEGATIVE, POSITIVE, Circuit, Diode, Part, Section
 from designer.circuit.reference_rails import FEEDS, RAILS, RECTIFIER_FEEDS, ReferenceRails
 from designer.circuit.resistors import Resistors
+from designer.circuit.stop import Contact, Stop
 from designer.model.circuit_table import CircuitSpec
 from designer.model.mechanics import Clearance, MechanicalModel, Side
 

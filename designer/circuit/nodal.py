@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import GROUND, Board, Circuit, Diode, Section, Stop
+from designer.circuit.netlist import GROUND, Board, Circuit, Diode, Section
+from designer.circuit.stop import Stop
 from designer.dynamics.piecewise_linear import ModeKey
 
 

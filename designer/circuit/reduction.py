@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 
 from designer.base.arrays import Array
-from designer.circuit.netlist import Board, Circuit, Stop
+from designer.circuit.netlist import Board, Circuit
 from designer.circuit.nodal import NodalEquations, Solution
+from designer.circuit.stop import Stop
 from designer.circuit.working_modes import working_keys
 from designer.dynamics.piecewise_linear import (
     Guard,

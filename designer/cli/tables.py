@@ -6,15 +6,11 @@ import sys
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from designer.base.si_unit import value_text
 from designer.base.units import format_quantity
 from designer.cli.console import grid, say, table
-
-if TYPE_CHECKING:
-    from designer.catalog.catalog import Catalog
-    from designer.spice.opamp_check import FigureCheck
 
 YES_NO = {True: "yes", False: "no", None: "-"}
 
@@ -348,57 +344,6 @@ def files(folder: Path, reused: bool) -> None:
     """Where the results are."""
     how = "was there already, from the same inputs" if reused else "written"
     say(f"{folder}: {how}")
-
-
-def checks(name: str, measured: Sequence[FigureCheck]) -> None:
-    """An op-amp's figures, by the catalogue and by its model in ngspice."""
-    table(
-        f"{name} in ngspice",
-        (
-            {
-                "figure": row.figure + (" (assumed)" if row.assumed else ""),
-                "catalogue": format_quantity(row.expected, row.unit),
-                "measured": format_quantity(row.measured, row.unit),
-                "": "" if row.agrees else f"differ by more than {100 * row.tolerance:g} %",
-            }
-            for row in measured
-        ),
-    )
-
-
-def catalog(known: Catalog) -> None:
-    """What can be bought."""
-    units = {"resistor": "Ω", "capacitor": "F"}
-    table(
-        "Families",
-        (
-            {
-                "name": f.name,
-                "kind": f.kind,
-                "series": " ".join(f.series),
-                "range": " to ".join(format_quantity(end, units[f.kind]) for end in f.range),
-                "grade": f"{100 * f.grade:g} %",
-                "price class": str(f.price),
-            }
-            for f in known.families
-        ),
-    )
-    table(
-        "Op-amps",
-        (
-            {
-                "name": o.name,
-                "sections": str(o.sections),
-                "saturation": f"{o.saturation.nominal:g} V at ± {o.rated_supply:g} V",
-                "gain-bandwidth": format_quantity(o.gbw.nominal, "Hz"),
-                "price class": str(o.price),
-            }
-            for o in known.opamps
-        ),
-    )
-    for kind in ("Diodes", "References", "Trimmers", "Headers"):
-        names = [entry.name for entry in getattr(known, kind.lower())]
-        say(f"{kind}: {', '.join(names) or 'none'}")
 
 
 def untrusted(trust: Mapping[str, Any]) -> list[str]:

@@ -23,14 +23,14 @@ def catalog(
 ) -> Output:
     """List what can be bought (part families, op-amps, diodes, …), or check an op-amp's model."""
     from designer.catalog.catalog import load_catalog
-    from designer.cli import tables
+    from designer.cli import catalog_tables
 
     known = load_catalog()
     if check is None:
         kinds = ("opamps", "families", "diodes", "references", "trimmers", "headers")
         names = {kind: [entry.name for entry in getattr(known, kind)] for kind in kinds}
         answer = {"format": 1, **names, "hash": known.hash}
-        return Output(answer, lambda: tables.catalog(known))
+        return Output(answer, lambda: catalog_tables.catalog(known))
     from designer.spice.opamp_check import checks
 
     session.progress.stage(f"{check} in ngspice")
@@ -38,7 +38,7 @@ def catalog(
     rows = [{**asdict(row), "agrees": row.agrees} for row in measured]
     return Output(
         {"format": 1, "opamp": check, "checks": rows, "hash": known.hash},
-        lambda: tables.checks(check, measured),
+        lambda: catalog_tables.checks(check, measured),
         all(row.agrees for row in measured),
     )
 

@@ -27,9 +27,10 @@ from numpy.typing import NDArray
 from designer.base.arrays import Array
 from designer.base.progress import doing
 from designer.circuit.design import Design
-from designer.circuit.netlist import Excitation, Stop, nominal_board
+from designer.circuit.netlist import Excitation, nominal_board
 from designer.circuit.noise_gains import conductance
 from designer.circuit.reduction import Reduction
+from designer.circuit.stop import Stop
 from designer.model.find_responses import ModelResponse
 from designer.model.mechanics import SecondOrderSystem
 from designer.spice import deck
