@@ -33,7 +33,7 @@ LONGEST = 60
 LEVELS = 3
 """Step sizes that the numerics gate tries; finer ones, near a border, are not waited for."""
 REFINEMENTS = 1
-"""How often the step is halved where ngspice disagrees."""
+"""Rounds of finer steps where ngspice disagrees."""
 
 
 @dataclass(frozen=True)

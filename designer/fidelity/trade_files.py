@@ -208,13 +208,16 @@ def _board_blocks(boards: Sequence[Mapping[str, Any]]) -> list[Block]:
         "ok": lambda b: str(b["ok"]),
         "only exact": lambda b: str(b["lost"]),
         "only ngspice": lambda b: str(b["gained"]),
+        "at the gate's step alone": lambda b: str(b.get("resolved", 0)),
         "undecided": lambda b: str(b["undecided"]),
         "difference": lambda b: _percent(b["difference"]),
         "interval": lambda b: f"{_percent(b['low'])} to {_percent(b['high'])}",
     }
     return [
         "Yield of the exact circuit less that of ngspice with ideal op-amps on the boards that "
-        "both decided, with its 95 % interval. The interval holds for all boards that were "
+        "both decided, with its 95 % interval. Where they differ, ngspice's step is divided by "
+        "four, at most three times, until its answer depends on it no more: boards that differ at "
+        "the gate's step alone are charged to ngspice. The interval holds for all boards that were "
         "asked: those that one of them left undecided count as ok on the exact circuit alone "
         "for its upper end, and in ngspice alone for its lower end.",
         table_of(boards, columns),

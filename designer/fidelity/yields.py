@@ -24,14 +24,15 @@ from designer.fidelity.label import ResponseLabel
 from designer.spice.deck import SolverSettings
 from designer.spice.pool import SpicePool
 from designer.verdicts import exact_rung
-from designer.verdicts.cross_check import Ask, StartKind, Why
+from designer.verdicts.cross_check import Ask, CrossCheck, StartKind, Why
 from designer.verdicts.ngspice_runs import cross_checks
-from designer.verdicts.verdict import StudyPlan, Verdict
+from designer.verdicts.verdict import Answer, StudyPlan, Verdict
 from designer.yields.study import plan_study
 
 REFINEMENTS = 3
-"""How often ngspice's step is halved for a board at most: further than in a study, for here ngspice
-is what is measured against, and what it leaves open widens the interval both ways."""
+"""Rounds of finer steps of ngspice for a board at most, down to a 64th of the gate's: further than
+in a study, for here ngspice is what is measured against, and what it leaves open widens the
+interval both ways."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ class Tally:
     """Drive periods of ngspice."""
     seconds: float = 0.0
     """CPU time of the exact circuit [s]."""
+    resolved: int = 0
+    """Boards of which ngspice says something else at the gate's step than at those that agree."""
 
     def __add__(self, other: Tally) -> Tally:
         return Tally(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
@@ -89,6 +92,8 @@ class BoardTrade:
     """Drive periods of ngspice for a board, mean."""
     seconds: dict[str, float] = field(default_factory=dict)
     """CPU time of a board, by rung [s]."""
+    resolved: int = 0
+    """Boards of which ngspice says something else at the gate's step than at those that agree."""
 
     @classmethod
     def of(cls, label: ResponseLabel, tally: Tally, spice: float) -> BoardTrade:
@@ -105,6 +110,7 @@ class BoardTrade:
             tally.undecided,
             periods,
             {"circuit": exactly, "ideal": periods * spice},
+            tally.resolved,
         )
 
     @property
@@ -196,7 +202,13 @@ def tally(
         runs=len(periods),
         periods=float(sum(periods)),
         seconds=seconds,
+        resolved=sum(_resolved(heard.get(answer.sample), answer) for answer in answers),
     )
+
+
+def _resolved(check: CrossCheck | None, answer: Answer) -> bool:
+    """Whether the engines differ at the gate's step alone."""
+    return check is not None and check.finer > 1 and check.agrees(answer) is True
 
 
 def _interval(lost: int, gained: int, n: int) -> tuple[float, float]:

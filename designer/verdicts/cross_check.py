@@ -33,7 +33,7 @@ more. Every slow one of it starts from the nominal orbit as well."""
 BOUNDARY_SAMPLES = 10
 """How many of the boards that are nearest to a boundary are asked, from both starts."""
 UNDECIDED = "undecided"
-"""The answer where the last two step sizes give different responses."""
+"""The answer where the last two step sizes give different responses: it is not resolved."""
 OR = " or "
 """Between the two answers of an undecided board."""
 
@@ -100,6 +100,9 @@ class CrossCheck(Ask):
     """Whether the run's orbit was symmetric; False too where it has none."""
     either: str = ""
     """The last two answers of an undecided one, with `OR` between them."""
+    finer: int = 1
+    """By how much the gate's step was divided in the run that answers: above 1 where the answer at
+    that step was not the exact circuit's."""
 
     def agrees(self, answer: Answer) -> bool | None:
         """Whether ngspice names the response that the exact rung names; None without an answer.

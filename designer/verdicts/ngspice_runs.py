@@ -50,16 +50,22 @@ REMAINDER = 5e-4
 MOST_PERIODS = 4000
 """Longest way to an attractor that ngspice is sent, in drive periods; beyond it a sample is left
 out by name."""
-MOST_AGAIN = 2 * MOST_PERIODS
-"""Longest run that is made again, in drive periods at the step of the first; half steps count
-twice."""
+MOST_AGAIN = 4 * MOST_PERIODS
+"""Longest run that is made again, in drive periods at the step of the first; a quarter of the step
+counts four times."""
+FINER = 4
+"""By how much the step is divided in each round where ngspice disagrees. Half a step may say the
+same by the same error: next to a period doubling it takes a sixteenth to see."""
+SURE_ROUND = 2
+"""The first round whose answer may charge the exact circuit with a difference, if so many are
+allowed."""
 STRETCH = 40
 """Drive periods after which the exact trajectory is looked at again, and for which it must have
 stayed with the attractor before it counts as arrived."""
 LONG = 4 * MAX_PERIOD
 """Drive periods in which any period, or none, is seen."""
-OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 1
-"""How often the step is halved where ngspice disagrees, until two step sizes say the same."""
+OWN_REFINEMENTS, NOMINAL_REFINEMENTS = 2, 2
+"""Rounds of finer steps at most where ngspice disagrees."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ class Query:
     expected: str
     """Response of the exact circuit."""
     refinements: int = OWN_REFINEMENTS
-    """How often the step is halved at most."""
+    """Rounds of finer steps at most."""
 
     @property
     def steps(self) -> float:
@@ -95,6 +101,8 @@ class NgspiceAnswer:
     """Whether the orbit is its own mirror image."""
     either: str = ""
     """Both answers of an undecided one, if both are any."""
+    finer: int = 1
+    """By how much the step of the run that answers was divided."""
 
 
 def cross_checks(
@@ -136,7 +144,7 @@ def checks_run(
     ----------
     rung : the op-amps' model. Above ``ideal`` a board's own orbit is only near ngspice's, so that
         as many periods are discarded as shrink a deviation to a hundredth.
-    refinements : how often the step is halved at most, of runs from the nominal orbit.
+    refinements : rounds of finer steps at most, of runs from the nominal orbit.
 
     Yields
     ------
@@ -272,11 +280,13 @@ def run_queries(
     """ngspice's answers, in order.
 
     A first answer that is the expected one stands: its settings have passed the gate at two step
-    sizes. Where it is another the step is halved, at most as often as the query says, until two
-    step sizes say the same, whichever it is; where they never do, the answer is `UNDECIDED`. A
-    failed run is no answer: it is neither the same as another nor different. Nor is one that has
-    not settled: it is made again, longer (`longer`). Neither is done where it would take more than
-    `MOST_AGAIN` periods' steps. ``progress`` is called once a query.
+    sizes. Where it is another the step is divided by `FINER`, round after round, as often as the
+    query says at most, until the answer depends on it no more: two steps in a row say the same, and
+    where that is not the expected response, the second of them is that of round `SURE_ROUND` or
+    later, if that many are allowed. Where they never do, the answer is `UNDECIDED`. A failed run is
+    no answer: it is neither the same as another nor different. Nor is one that has not settled: it
+    is made again, longer (`longer`). Neither is done where it would take more than `MOST_AGAIN`
+    periods' steps. ``progress`` is called once a query.
     """
     # The longest first: the workers then end together.
     order = sorted(range(len(queries)), key=lambda k: -queries[k].steps)
@@ -303,13 +313,13 @@ def queries_run(
 
 @dataclass(frozen=True)
 class _Run:
-    """A run to be made. halved : how often its step has been. before : the last answer at a larger
-    step, None where there was none."""
+    """A run to be made. round : how often its step has been divided. before : the last answer at a
+    larger step, None where there was none."""
 
     query: Query
     subject: GateSubject
     settings: SolverSettings
-    halved: int = 0
+    round: int = 0
     before: str | None = None
 
 
@@ -319,11 +329,13 @@ def _task(tried: _Run) -> Task[Read]:
 
 def _after(tried: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
     """The run that follows, or the final answer."""
-    query = tried.query
-    none = not is_answer(answer.response)
-    if not none and answer.response == (tried.before or query.expected):
+    query, fine = tried.query, FINER**tried.round
+    answer = replace(answer, finer=fine)
+    none, expected = not is_answer(answer.response), answer.response == query.expected
+    same = not none and answer.response == (tried.before or query.expected)
+    if same and (expected or tried.round >= SURE_ROUND):
         return answer
-    fine, more = 2**tried.halved, longer(tried.subject)
+    more = longer(tried.subject)
     # A few strobes of a motion without a period may look like one.
     brief = tried.subject.brief and query.expected == OrbitStatus.APERIODIC
     if (
@@ -333,13 +345,13 @@ def _after(tried: _Run, answer: NgspiceAnswer) -> _Run | NgspiceAnswer:
     ):
         return replace(tried, subject=more)
     if (
-        tried.halved < query.refinements
-        and 2 * fine * numerics_gate.length(tried.subject) <= MOST_AGAIN
+        tried.round < query.refinements
+        and FINER * fine * numerics_gate.length(tried.subject) <= MOST_AGAIN
     ):
-        half = replace(tried.settings, max_step=tried.settings.max_step / 2.0)
+        finer = replace(tried.settings, max_step=tried.settings.max_step / FINER)
         before = tried.before if none else answer.response
-        return replace(tried, settings=half, halved=tried.halved + 1, before=before)
-    return answer if none else _undecided(tried.before, answer)
+        return replace(tried, settings=finer, round=tried.round + 1, before=before)
+    return answer if none or same else _undecided(tried.before, answer)
 
 
 def longer(subject: GateSubject) -> GateSubject:
@@ -350,12 +362,14 @@ def longer(subject: GateSubject) -> GateSubject:
 
 def _undecided(before: str | None, answer: NgspiceAnswer) -> NgspiceAnswer:
     if before is None:
-        return NgspiceAnswer(
-            UNDECIDED, f"only one run had an answer: {answer.response}", answer.remedies
-        )
-    both = f"{before}, at a smaller step {answer.response}"
-    return NgspiceAnswer(
-        UNDECIDED, both, answer.remedies, either=OR.join((before, answer.response))
+        reason = f"only one run had an answer: {answer.response}"
+        return replace(answer, response=UNDECIDED, reason=reason, symmetric=False)
+    return replace(
+        answer,
+        response=UNDECIDED,
+        reason=f"{before}, at a smaller step {answer.response}",
+        symmetric=False,
+        either=OR.join((before, answer.response)),
     )
 
 

@@ -16,7 +16,7 @@ from designer.verdicts.verdict import StudyPlan, rounded
 
 RULES = {
     "samples": 2,
-    "ngspice": 3,
+    "ngspice": 4,
     "tuned": 3,
     "reached": 3,
     "trimmed": 1,

@@ -494,7 +494,7 @@ def test_the_json_has_the_keys_of_the_contract_and_the_sheet_says_them() -> None
     assert (
         "| waveform within 0.1 % | board | ngspice, full op-amps | step ×2 | 0.06 % | yes |" in text
     )
-    assert "| 1: ω = 1.55, b = 0.25 | 40 | 39 | 0 | 1 | 0 | -2.5 % |" in text
+    assert "| 1: ω = 1.55, b = 0.25 | 40 | 39 | 0 | 1 | 0 | 0 | -2.5 % |" in text
     for key in ("error", "numerical_error"):
         assert len(front(answer, key).axes) == 1
 
