@@ -1,5 +1,6 @@
 from . import (
     board_notes as board_notes,
+    placement_drawing as placement_drawing,
     schematic_drawing as schematic_drawing,
 )
 from .board_check import (
@@ -36,6 +37,9 @@ from .kicad_names import (
     circuit_net as circuit_net,
     footprint_name as footprint_name,
     identifier as identifier,
+)
+from .kicad_placement import (
+    place as place,
 )
 from .kicad_project import (
     Project as Project,

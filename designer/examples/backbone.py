@@ -17,17 +17,24 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.base.figure_style import INK, MUTED, new_figure, styled
 from designer.bifurcations.branch_survey import survey
 from designer.bifurcations.continuation import Branch
 from designer.bifurcations.points import PointKind
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+    name_axes,
+)
 from designer.examples.first_touch import first_touches, linear_orbit
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import of_model
 
-SOFTER = (1.0, 0.5, 0.25)
+SOFTER = (1.0, 0.7, 0.5)
 """Factors on force and damping: the weaker both are, the nearer the fold lies to the backbone."""
 LOW, HIGH = 0.9, 4.4
 """Frequencies over ω₁ between which the resonance is followed."""
@@ -117,8 +124,18 @@ def _figure(model: LumpedSystem, branches: Sequence[tuple[float, Branch]]) -> Fi
     for (factor, branch), colour in zip(branches, (INK, "#0072b2", "#009e73"), strict=True):
         axes.plot(*_curve(branch, True), color=colour, lw=1.3, label=f"× {factor:g}")
         axes.plot(*_curve(branch, False), color=colour, lw=0.9, ls=(0, (3, 2)))
-    axes.set_xlabel("ω")
-    axes.set_ylabel("largest x")
-    axes.grid(True, color=GRID, lw=0.5)
+    name_axes(axes, "ω", "largest x")
     axes.legend(title="damping and force")
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="The stops on both sides stiffen the motion as it grows, so the resonance leans to higher "
+    "frequencies, as that of a hardening spring does. Between the fold at its tip and the "
+    "one below, a large and a small motion exist side by side. The free vibrations, in grey, "
+    "are the spine about which the forced curves bend.",
+    board="Both responses are on the board: one on the flank of the resonance, one below it, where "
+    "each stop is hit twice a period. Both lie away from the windows in which another count of "
+    "impacts takes over.",
+)

@@ -13,11 +13,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
+from designer.base.figure_style import INK, MUTED, new_figure, styled
 from designer.base.page import table
 from designer.dynamics.attractors import settle
 from designer.dynamics.orbit import OrbitStatus
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+    name_axes,
+)
 from designer.model.driven import model_flow
 from designer.model.lumped_system import LumpedSystem
 from designer.model.mechanics import MechanicalModel
@@ -93,8 +100,18 @@ def _figure(curves: list[tuple[int, Array, Array]]) -> Figure:
         axes.plot(omegas, np.where(np.isfinite(heights), heights, np.nan), color=INK, lw=1.3)
         axes.axvline(n, color=MUTED, lw=0.7, ls=(0, (4, 3)))
         axes.annotate(f"{n}-1-0", (n, 1.0), xycoords=("data", "axes fraction"), ha="center")
-    axes.set_xlabel("ω/ω_b")
-    axes.set_ylabel("largest x")
     axes.set_yscale("log")
-    axes.grid(True, color=GRID, lw=0.5)
+    name_axes(axes, "ω/ω_b", "largest x")
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="The mass meets its second spring on one side only, so half of each swing is fast and "
+    "half is slow. It answers a drive at twice its own frequency with one impact in two drive "
+    "periods: the subharmonic resonance. In its place the small motion without impacts "
+    "exists too; which of them is met depends on the start.",
+    board="Both responses are on the board. The stage with diodes makes the stop. One of clipping "
+    "amplifiers leaves a stiffness inside the clearance where its resistors are off their values, "
+    "and a light oscillator feels it.",
+)

@@ -2,72 +2,169 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
-from designer.base.page import Picture, bullets, table
+from designer.base.errors import Unreachable
+from designer.base.page import Block, Picture, bullets, table
 from designer.base.progress import Progress
-from designer.examples.evidence import Evidence
+from designer.board import placement_drawing
+from designer.board.board_parts import board_circuit
+from designer.board.component import components
+from designer.board.kicad_placement import place
+from designer.check import checked_design
+from designer.check.checked_design import traces
+from designer.check.synthesis_result import Synthesis
+from designer.examples.evidence import Evidence, figure_block
 from designer.jobs.export_job import export
 from designer.jobs.job_outcome import JobOutcome
 from designer.jobs.rules_job import rules
 from designer.jobs.study_job import run
-from designer.report import comparison
+from designer.model.relative_motion import relative_motions
+from designer.report import comparison, orbit_plots
+from designer.spice.pool import SpicePool
 
 FOLDER = "design"
+"""Of the report: the whole design folder, which no repository needs."""
+COPIED = ("bom.csv", "circuit.cir", "setup.csv", "schematic.svg")
+"""Files of the design that stand beside the page."""
+TITLE = "On a board"
 
 
 def board_part(
-    model: Path, out: Path, samples: int, seed: int, jobs: int, progress: Progress
+    model: Path, out: Path, note: str, samples: int, seed: int, jobs: int, progress: Progress
 ) -> Evidence:
     """Take the file to a board in the folder ``design`` of the report; finished work is kept.
 
+    note : what of the example the board shows, and what it cannot.
+
     Raises
     ------
-    InputError, Unreachable, EnvironmentMissing : as the verbs.
+    InputError, EnvironmentMissing : as the verbs.
     """
     folder = out / FOLDER
-    outcome = run(
-        model, folder, samples=samples, seed=seed, jobs=jobs, resume=True, progress=progress
-    )
-    export(folder, progress=progress)
-    counts = rules(folder, progress=progress).answer["counts"]
-    blocks = [
+    try:
+        outcome = run(
+            model, folder, samples=samples, seed=seed, jobs=jobs, resume=True, progress=progress
+        )
+    except Unreachable as error:
+        return Evidence(TITLE, [note, f"No circuit was found. {error}"])
+    export(folder, resume=True, progress=progress)
+    checked = rules(folder, progress=progress).answer
+    for name in COPIED:
+        shutil.copyfile(folder / name, out / name)
+    portraits = _portraits(outcome.synthesis)
+    links = ", ".join(f"[{name}]({name})" for name in COPIED[:3])
+    blocks: list[Block] = [
+        note,
+        f"{samples} boards with the reference spread, judged on the exact circuit and compared "
+        "with ngspice on some of them:",
         _responses(outcome.answer["responses"]),
-        bullets(_facts(outcome, counts)),
-        Picture("The circuit", "The circuit.", f"{FOLDER}/schematic.svg"),
-        Markup(f"Files of the design, KiCad's among them, are in [{FOLDER}]({FOLDER}/)."),
+        bullets([*_facts(outcome), *_rules(checked)]),
+        *(figure_block(name, caption) for name, (caption, _) in portraits.items()),
+        Picture("schematic", "The circuit, one stage a cell.", COPIED[3]),
+        figure_block("board", "The board with its parts placed; KiCad routes it."),
+        Markup(f"To build and to measure it: {links}."),
     ]
-    return Evidence("On a board", blocks)
+    figures = {name: figure for name, (_, figure) in portraits.items()}
+    figures["board"] = _board(outcome.synthesis)
+    return Evidence(TITLE, blocks, figures, numbers=_numbers(outcome.answer))
 
 
-def _responses(answers: list[Mapping[str, Any]]) -> Any:
+def _portraits(made: Synthesis) -> dict[str, tuple[str, Figure]]:
+    """Of each response in each clearance, with its caption, by the picture's name."""
+    with SpicePool(1) as pool:
+        checked = checked_design.check(made.design, made.model_responses, pool)
+    out = {}
+    for number, response in enumerate(checked):
+        system = made.design.model.at(response.model.b).second_order()
+        drawn = traces(made.design, response)
+        for index, motion in enumerate(relative_motions(system)):
+            figure = orbit_plots.phase_portrait(response, drawn, motion, index)
+            caption = (
+                f"{response.circuit.response} at ω = {response.model.omega:.4g}: {motion.label}, "
+                "the model (broad line), the exact circuit (broken line) and ngspice (dots)."
+            )
+            out[f"portrait-{number + 1}-{index + 1}"] = (caption, figure)
+    return out
+
+
+def _board(made: Synthesis) -> Figure:
+    circuit, choice = board_circuit(made)
+    placed = place(circuit, components(circuit, made.catalog, choice))
+    return placement_drawing.placement_drawing(placed)
+
+
+def _responses(answers: Sequence[Mapping[str, Any]]) -> Block:
     rows = []
     for each in answers:
-        counted = each["yield"]
-        rate = counted["ok"] / max(counted["samples"] - counted["failed"], 1)
-        interval = f"{counted['low']:.3f} to {counted['high']:.3f}"
-        engines = (str(each[name]) for name in ("model", "circuit", "ngspice"))
-        failed = str(counted["failed"])
-        rows.append((f"{each['omega']:.4g}", *engines, f"{rate:.3f}", interval, failed))
-    head = ("ω", "model", "exact circuit", "ngspice", "yield", "95 % interval", "failed")
-    return table(head, rows, numeric=(0, 4, 6))
+        counted, agreement = each["yield"], each["agreement"]
+        rows.append(
+            (
+                f"{each['omega']:.4g}",
+                *(str(each[name]) for name in ("expected", "model", "circuit", "ngspice")),
+                *(str(counted[name]) for name in ("ok", "lost", "grazing", "failed")),
+                f"{each['rate']:.2f} ({counted['low']:.2f} to {counted['high']:.2f})",
+                _asked(agreement) if agreement else "not asked",
+            )
+        )
+    verdicts = ("ok", "lost", "grazing", "failed")
+    engines = ("wanted", "model", "exact circuit", "ngspice")
+    head = ("ω", *engines, *verdicts, "yield (95 %)", "ngspice agrees on")
+    return table(head, rows, numeric=(0, 5, 6, 7, 8))
 
 
-def _facts(outcome: JobOutcome, counts: Mapping[str, int]) -> list[str]:
-    design, answer = outcome.design, outcome.answer
+def _asked(agreement: Mapping[str, Any]) -> str:
+    """Boards started on their own orbit, and on the nominal design's."""
+    nominal = agreement["nominal_start"]
+    return (
+        f"{agreement['agreed']} of {agreement['asked']} on their own orbit, {nominal['agreed']} of "
+        f"{nominal['asked']} from the nominal one"
+    )
+
+
+def _facts(outcome: JobOutcome) -> list[str]:
+    answer, made = outcome.answer, outcome.synthesis
     certificate = answer["certificate"]
-    made = outcome.synthesis
-    bill = comparison.bill_of(design.circuit, made.modelfile.circuit, made.catalog)
-    bound = "" if certificate["lower_bound"] is None else f" of {certificate['lower_bound']:.2e}"
+    bill = comparison.bill_of(made.design.circuit, made.modelfile.circuit, made.catalog)
+    bound = certificate["lower_bound"]
+    proved = "" if bound is None else f", lower bound {bound:.2g}"
+    check = answer["equation_check"]
+    within = sum(finding["passed"] for finding in check["findings"])
     return [
-        f"Largest error of a coefficient: {answer['max_error']:.2e}; certificate: "
-        f"{certificate['status']}, with the lower bound{bound}.",
+        f"Largest error of a coefficient {answer['max_error']:.2g}; certificate: "
+        f"{certificate['status']}{proved}.",
         f"{bill.parts} parts, {bill.packages} packages of op-amps, {bill.distinct} distinct "
         f"values, {bill.price:.2f} € a board.",
-        f"Design rules: {counts['pass']} pass, {counts['fail']} fail, {counts['not run']} not run "
-        "(they ask for a routed board).",
+        f"The netlist in ngspice against the equations: {within} of {len(check['findings'])} "
+        "comparisons within their bounds.",
+        f"All responses on one board: {answer['all_on_one_board']['built']['ok']} of "
+        f"{answer['all_on_one_board']['built']['samples']}."
+        if answer["all_on_one_board"]
+        else "One response, so every board that shows it shows all.",
     ]
+
+
+def _rules(answer: Mapping[str, Any]) -> list[str]:
+    """How many design rules pass, and what each that fails has found."""
+    counts = answer["counts"]
+    texts = [
+        f"Design rules: {counts['pass']} pass, {counts['fail']} fail, {counts['not run']} not run "
+        "(they ask for a routed board)."
+    ]
+    return texts + [
+        f"Fails: {rule['title']}: {rule['found']}, {rule['limit']}."
+        for rule in answer["rules"]
+        if rule["status"] == "fail"
+    ]
+
+
+def _numbers(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """What the report's JSON has of the board."""
+    keys = ("max_error", "certificate", "parts", "responses", "all_on_one_board", "equation_check")
+    return {key: answer[key] for key in keys}

@@ -13,8 +13,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.base.figure_style import INK, MUTED, new_figure, plain_numbers, styled
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+    name_axes,
+)
 from designer.examples.first_touch import first_touches
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile
@@ -79,9 +86,17 @@ def _figure(model: LumpedSystem) -> Figure:
     for mode in modes:
         axes.axvline(float(mode), color=MUTED, lw=0.8, ls=(0, (4, 3)))
     axes.axhline(model.b, color=INK, lw=0.7)
-    axes.set_xlabel("ω")
-    axes.set_ylabel("b of the first touch")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.grid(True, color=GRID, lw=0.5)
+    plain_numbers(axes.yaxis)
+    name_axes(axes, "ω", "b of the first touch")
     axes.legend()
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="Near each mode the chain moves in its own shape, and each clearance is reached first "
+    "where its mass moves most. The two responses of the file differ only in frequency: at the "
+    "lower one the first mass hits each of its stops twice a period.",
+    board="Each clearance has a stage of its own, with its own thresholds and slope. Diodes make "
+    "them: the thresholds of amplifiers that clip do not keep a ratio.",
+)

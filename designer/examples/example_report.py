@@ -2,9 +2,9 @@
 
     python -m designer.examples.example_report examples/aberdeen.toml reports/examples/aberdeen
 
-The first part holds what the tool computes against closed forms. The second is the design folder
-``design`` beside the page, as the verbs ``run``, ``export`` and ``rules`` make it. A file that this
-module does not know by its name gets the parts that every system has.
+The first part holds what the tool computes against closed forms. The second shows the design that
+the verbs ``run``, ``export`` and ``rules`` make in the folder ``design`` beside the page. A file
+that this module does not know by its name gets the parts that every system has.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from markupsafe import Markup
 
 from designer.base.defaults import cores
-from designer.base.errors import DesignerError
 from designer.base.page import Block, Page, PageSection, Verbatim
-from designer.base.progress import Progress, progress_for
+from designer.base.progress import Progress
 from designer.catalog.catalog import load_catalog
 from designer.examples import (
     backbone,
@@ -31,28 +31,30 @@ from designer.examples import (
     weight,
 )
 from designer.examples.board_part import board_part
-from designer.examples.evidence import Evidence, Show, figure_block
+from designer.examples.evidence import Evidence, Example, figure_block
 from designer.examples.frequency_sweep import frequency_sweep
 from designer.jobs.origin import provenance
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile, read_model_file
 from designer.model.system_equations import equations_of, number_of
-from designer.paper.report_files import write_files
+from designer.paper.report_files import make_report, write_files
 from designer.report import system_drawing
 
 FORMAT = 1
-SAMPLES, SEED = 1000, 71
+SAMPLES, SEED = 100, 71
 DATA = "example.json"
-SHOWS: Mapping[str, Show] = {
-    "aberdeen": persistence.evidence,
-    "preloaded": grazing_map.evidence,
-    "shaw-holmes": bilinear.evidence,
-    "duffing-gap": backbone.evidence,
-    "backlash": rattle.evidence,
-    "three-masses": chain_modes.evidence,
-    "hammer-base": weight.evidence,
+EXAMPLES: Mapping[str, Example] = {
+    "aberdeen": persistence.EXAMPLE,
+    "preloaded": grazing_map.EXAMPLE,
+    "shaw-holmes": bilinear.EXAMPLE,
+    "duffing-gap": backbone.EXAMPLE,
+    "backlash": rattle.EXAMPLE,
+    "three-masses": chain_modes.EXAMPLE,
+    "hammer-base": weight.EXAMPLE,
 }
 """What is shown of each model file, by its name."""
+OTHER = Example(lambda _: [], "", "")
+"""The same of a file with another name."""
 
 
 def report(
@@ -76,10 +78,13 @@ def report(
     progress = Progress() if progress is None else progress
     jobs = cores() if jobs is None else jobs
     file = read_model_file(model)
-    parts = [_system(file), *evidence(file, model.stem, jobs, progress)]
+    example = EXAMPLES.get(model.stem, OTHER)
+    progress.stage("what the system shows", None)
+    parts = [_system(file), *example.show(file), frequency_sweep(file, jobs)]
+    parts[0] = replace(parts[0], blocks=[*parts[0].blocks, example.see])
     numbers = {"samples": samples, "seed": seed, "circuit": circuit}
     if circuit:
-        parts.append(board_part(model, out, samples, seed, jobs, progress))
+        parts.append(board_part(model, out, example.board, samples, seed, jobs, progress))
     out.mkdir(parents=True, exist_ok=True)
     document = {
         "format": FORMAT,
@@ -101,13 +106,6 @@ def _system(file: ModelFile) -> Evidence:
         Verbatim(equations_of(file.model, number_of)),
     ]
     return Evidence("The system", blocks, {"system": figure})
-
-
-def evidence(file: ModelFile, name: str, jobs: int, progress: Progress) -> list[Evidence]:
-    """What is shown of the model; ``name`` of the file, without ending."""
-    progress.stage("what the system shows", None)
-    special = SHOWS[name](file) if name in SHOWS else []
-    return [*special, frequency_sweep(file, jobs)]
 
 
 def _page(
@@ -143,14 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--jobs", type=int)
     parser.add_argument("--no-circuit", action="store_false", dest="circuit")
-    asked = parser.parse_args(arguments)
-    try:
-        with progress_for(False) as progress:
-            report(progress=progress, **vars(asked))
-    except DesignerError as error:
-        print(f"example_report: {error}", file=sys.stderr)
-        return error.exit_status
-    return 0
+    return make_report(report, parser, arguments)
 
 
 if __name__ == "__main__":

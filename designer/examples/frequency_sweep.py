@@ -9,7 +9,6 @@ from designer.bifurcations import sweep
 from designer.bifurcations.sweep import DOWN, UP, SweepPlan, Window
 from designer.dynamics.steady_state import Course
 from designer.examples.evidence import Evidence, figure_block
-from designer.model.mechanics import MechanicalModel
 from designer.model.model_file import ModelFile
 from designer.model.swept_model import ModelSubject
 from designer.report import bifurcation_plots
@@ -23,7 +22,7 @@ NAMED = 12
 
 def frequency_sweep(file: ModelFile, jobs: int) -> Evidence:
     """The part of a report about what is reached at each frequency."""
-    low, high = _range(file.model)
+    low, high = _range(file)
     plan = SweepPlan(
         ModelSubject(file.model),
         "omega",
@@ -43,11 +42,14 @@ def frequency_sweep(file: ModelFile, jobs: int) -> Evidence:
     return Evidence("Over the drive frequency", blocks, {name: figure})
 
 
-def _range(model: MechanicalModel) -> tuple[float, float]:
-    """From well below the first mode to above the last one, with the stops half the time met."""
-    system = model.second_order()
+def _range(file: ModelFile) -> tuple[float, float]:
+    """From well below the first mode to above the last one, with the stops half the time met, and
+    above every response that is wanted."""
+    system = file.model.second_order()
+    wanted = [1.1 * response.omega for response in file.responses if response.omega is not None]
     off, on = system.natural_frequencies(), system.natural_frequencies(closed=True)
-    return 0.4 * float(off[0]), 1.4 * float((2.0 * off * on / (off + on))[-1])
+    highest = 1.4 * float((2.0 * off * on / (off + on))[-1])
+    return 0.4 * float(off[0]), max([highest, *wanted])
 
 
 def _table(windows: list[Window]) -> Table | None:

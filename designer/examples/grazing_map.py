@@ -29,7 +29,13 @@ from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
 from designer.base.page import table
 from designer.dynamics.flow import Flow
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+)
 from designer.examples.first_touch import first_touches, linear_state
 from designer.model.driven import model_flow
 from designer.model.lumped_system import LumpedSystem
@@ -234,3 +240,17 @@ def _figure(maps: Sequence[GrazingMap]) -> Figure:
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:.0e}")
     figure.legend(loc="outside lower center", ncols=4)
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="A relaxed stop begins to push from zero, a pre-stressed one with a finite force. Near "
+    "grazing the first changes the trace of the Jacobian by a square root, the second by an "
+    "inverse square root, which has no bound: this is what makes a pre-stressed stop lose its "
+    "orbit at the first touch.",
+    board="The pre-stressed stop is for comparison in the model alone. Its force jumps at contact, "
+    "and a dead-zone stage is continuous, so a circuit refuses the key preload. A damper in "
+    "the contact is refused for the same reason. The board is of the file as it stands: a "
+    "relaxed stop above, and below one that the mass rests against, whose negative gap is the "
+    "nearest thing to a pre-stressed stop that can be built.",
+)

@@ -19,7 +19,13 @@ from designer.base.arrays import Array
 from designer.base.figure_style import GRID, INK, MUTED, new_figure, plain_numbers, styled
 from designer.base.page import table
 from designer.dynamics.attractors import settle
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+)
 from designer.examples.first_touch import linear_state, located_touch
 from designer.model.driven import model_flow
 from designer.model.mechanics import MechanicalModel
@@ -157,3 +163,17 @@ def _figure(passages: Sequence[Passage]) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel("x at the strobe")
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="Turn the base amplitude up until the mass just touches the stop. At most frequencies the "
+    "period-1 motion is lost at once, and a wide band of strobe points appears. Where twice "
+    "the natural frequency is a whole multiple of the drive's, the same motion goes on with a "
+    "soft impact, and nothing is seen to happen.",
+    board="The stop stands on the base, so what the circuit computes is the motion relative to the "
+    "base. A base that moves as a sin ωt is a force of ω² a on that motion: the generator "
+    "makes it, and its amplitude is set anew for each frequency. A stop that stands still "
+    "while the base moves would need the base's motion as a voltage of its own, and is "
+    "refused.",
+)

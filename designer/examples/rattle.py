@@ -11,8 +11,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from designer.base.arrays import Array
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.base.figure_style import INK, MUTED, new_figure, styled
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+    name_axes,
+)
 from designer.examples.first_touch import first_touches, located_touch
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile
@@ -79,7 +86,15 @@ def _figure(model: LumpedSystem, omega: float, compared: tuple[Comparison, ...])
     shares: Array = np.array([0.0, quiet_share(model), 1.0])
     axes.plot(shares, [_gap(model, omega, float(s)) for s in shares], color=MUTED, lw=1.2)
     axes.plot(SHARES, [c.computed for c in compared], "o", ms=4.5, mfc="none", color=INK)
-    axes.set_xlabel("share of the force on the second mass")
-    axes.set_ylabel("gap of the first touch")
-    axes.grid(True, color=GRID, lw=0.5)
+    name_axes(axes, "share of the force on the second mass", "gap of the first touch")
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="What matters is the motion of one mass relative to the other. If the force is shared as "
+    "the masses are, both move alike and the gap could be as small as one likes: nothing "
+    "rattles. The farther the share is from that, the larger the gap that is still closed.",
+    board="A difference stage makes the relative displacement, one dead-zone stage makes the "
+    "force, and an inverter lets it act on the other mass with the opposite sign.",
+)

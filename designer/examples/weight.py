@@ -12,8 +12,15 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from designer.base.figure_style import GRID, INK, MUTED, new_figure, styled
-from designer.examples.evidence import Comparison, Evidence, comparison_table, figure_block
+from designer.base.figure_style import INK, MUTED, new_figure, plain_numbers, styled
+from designer.examples.evidence import (
+    Comparison,
+    Evidence,
+    Example,
+    comparison_table,
+    figure_block,
+    name_axes,
+)
 from designer.examples.first_touch import located_touch
 from designer.model.lumped_system import LumpedSystem
 from designer.model.model_file import ModelFile
@@ -79,9 +86,17 @@ def _figure(model: LumpedSystem, compared: tuple[Comparison, ...]) -> Figure:
         axes.semilogy(omegas / (2.0 * math.pi), amplitudes, lw=1.2, label=label, **look)
     dots = [ratio * own / (2.0 * math.pi) for ratio in RATIOS]
     axes.plot(dots, [c.computed for c in compared], "o", ms=4.5, mfc="none", color=INK)
-    axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel("base amplitude [mm]")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.grid(True, color=GRID, lw=0.5)
+    plain_numbers(axes.yaxis)
+    name_axes(axes, "frequency [Hz]", "base amplitude [mm]")
     axes.legend()
     return figure
+
+
+EXAMPLE = Example(
+    evidence,
+    see="The weight alone takes most of the gap to the anvil, so a small motion of the base is "
+    "enough to hit it. Without the weight the base would have to move several times as far.",
+    board="Anvil and spring stand on the base, so the circuit computes the motion relative to it. "
+    "The generator makes the base's motion, the weight is a current from the reference "
+    "voltage into the velocity integrator.",
+)

@@ -21,10 +21,9 @@ from typing import Any
 
 from designer.base.defaults import cores
 from designer.base.design_folder import Folder
-from designer.base.errors import DesignerError
 from designer.base.manifest import read_json
 from designer.base.plain_json import dumps, plain
-from designer.base.progress import Progress, progress_for
+from designer.base.progress import Progress
 from designer.base.report_pieces import CaseStore
 from designer.base.toml_writer import toml_text
 from designer.base.version import __version__
@@ -41,7 +40,7 @@ from designer.jobs.study_folder import FolderStores
 from designer.model.circuit_table import CircuitSpec
 from designer.model.model_file import ModelFile, parse_model_file, read_model_file
 from designer.paper.circuits import model_file
-from designer.paper.report_files import README, write_files
+from designer.paper.report_files import README, make_report, write_files
 from designer.paper.robust_design_page import lever_chart, robust_design_page, yield_chart
 from designer.paper.tolerance_cases import TITLES, cases
 from designer.report import comparison
@@ -249,14 +248,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--short", type=int, default=SHORT)
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--jobs", type=int)
-    asked = parser.parse_args(arguments)
-    try:
-        with progress_for(False) as progress:
-            report(progress=progress, **vars(asked))
-    except DesignerError as error:
-        print(f"search_report: {error}", file=sys.stderr)
-        return error.exit_status
-    return 0
+    return make_report(report, parser, arguments)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from . import (
     compare_table as compare_table,
     comparison as comparison,
     measured_table as measured_table,
+    orbit_plots as orbit_plots,
     simulate_plots as simulate_plots,
     system_drawing as system_drawing,
 )

@@ -48,9 +48,9 @@ class _Page(MechanicalSheet):
         self.top = 0.6 + _ROW * max(rows, 2)
         high = self.top + 0.6 + _LANE * len(model.gaps)
         width = _FIRST + _PITCH * (len(model.masses) - 1) + _WIDTH + 4.6
-        low = -1.1 - _DEEP * len(self.below)
-        super().__init__(width, high, low)
-        self._draw(low)
+        self.floor = 0.5 - 1.1 - _DEEP * len(self.below) if self.below else 0.0
+        super().__init__(width, high, self.floor - 1.1)
+        self._draw()
 
     def _joints(self) -> dict[str, Joint]:
         """Springs and dampers by their symbols."""
@@ -88,8 +88,8 @@ class _Page(MechanicalSheet):
     def _middle(self, place: int) -> float:
         return self._left(place) + 0.5 * _WIDTH if place else _WALL
 
-    def _draw(self, low: float) -> None:
-        self.wall(_WALL, 0.0 if not self.below else low + 0.5, self.top, -1)
+    def _draw(self) -> None:
+        self.wall(_WALL, self.floor, self.top, -1)
         self._ground()
         for place in range(1, len(self.row)):
             self._mass(place)
@@ -105,9 +105,9 @@ class _Page(MechanicalSheet):
         base = self.model.base
         if base is None:
             return
-        self.arrow(_WALL - 0.1, _WALL + 1.2, self.top + 0.35)
+        self.arrow(_WALL - 0.1, _WALL + 1.2, self.floor - 0.35)
         stay = ", the stops stay" if base.stops == "fixed" and self.model.gaps else ""
-        self.text(_WALL - 0.4, self.top + 0.6, f"y = {self.values['Y']} sin ωt{stay}", "left")
+        self.text(_WALL - 0.4, self.floor - 0.95, f"y = {self.values['Y']} sin ωt{stay}", "left")
 
     def _mass(self, place: int) -> None:
         left, name = self._left(place), self.row[place]

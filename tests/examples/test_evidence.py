@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +110,31 @@ def test_a_report_without_a_board(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     for name in ("example.json", "first-touches.png", "frequency-sweep.png"):
         assert (out / name).stat().st_size > 1000
         assert name in page
+
+
+@pytest.mark.slow
+def test_a_report_with_a_board(tmp_path: Path) -> None:
+    """The cheapest example: its circuit, 20 boards in both engines, the board, and the files that
+    stand beside the page."""
+    out = tmp_path / "shaw-holmes"
+    example_report.report(EXAMPLES / "shaw-holmes.toml", out, samples=20, progress=Progress())
+    page = (out / "README.md").read_text("utf-8")
+    for name in re.findall(r"\]\(([\w.-]+)\)", page):
+        assert 200 < (out / name).stat().st_size < 150_000, name
+    board = json.loads((out / "example.json").read_text("utf-8"))["parts"][-1]
+    assert board["max_error"] < 1e-3
+    for answer in board["responses"]:
+        assert answer["expected"] == answer["model"] == answer["circuit"] == answer["ngspice"]
+        assert answer["yield"]["ok"] == answer["yield"]["samples"] == 20
+        assert answer["agreement"]["agreed"] == answer["agreement"]["asked"] > 0
+    assert all(finding["passed"] for finding in board["equation_check"]["findings"])
+    assert {line["reference"] for line in _bill(out / "bom.csv")} >= {"R1", "C1", "U1"}
+
+
+def _bill(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return [{**row, "reference": name} for row in rows for name in row["designators"].split()]
 
 
 def test_bad_input_ends_in_a_message(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
